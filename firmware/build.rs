@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// Checks that the linker makes last, when all is placed. The guard is `GUARD_LEN` of
-/// `boards/mod.rs`; emulated UARTs have 10 kB in `.data`.
+/// Assertions that the linker checks after it has placed all sections. 4K is `GUARD_LEN` in
+/// `boards/limits.rs`. The limit of `.data` finds large statics whose first value is not all zeros;
+/// the emulated UARTs take 10 kB of it.
 const LINKER_CHECKS: &str = r#"
 ASSERT(__e_shell <= _stack_end - 4K, "the companion reaches into the stack's guard");
 ASSERT(SIZEOF(.data) <= 16K, "what is large has a first value that is not all zeros");

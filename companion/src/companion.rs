@@ -47,7 +47,8 @@ pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// it, the time in which cruise speed flies the margin. ArduCopter's own 3 s would fly the last
 /// velocity on through walls while a link stalls; the shortest are four setpoints.
 const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
-/// Most rows of the mission table taken in one step; more would be a cycle in the table.
+/// Maximum number of rows of the mission table that one step takes. More would mean that the table
+/// has a cycle.
 const MAX_ROWS_PER_STEP: usize = 4;
 /// Most events that wait for the shell.
 const MAX_EVENTS: usize = 16;

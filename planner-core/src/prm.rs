@@ -187,7 +187,7 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     config.check()?;
     let mut sight = Sight::new(grid, config);
     for place in range.start..range.end.min(workspace.len()) {
-        sight.stand_at(workspace.point(place));
+        sight.move_to(workspace.point(place));
         let edge = |other: usize| {
             let (a, b) = (workspace.node(place), workspace.node(other));
             Edge { a: a.min(b), b: a.max(b) }

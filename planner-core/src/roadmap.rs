@@ -119,9 +119,9 @@ pub struct RoadmapHeader {
     /// Value at which stored clearances saturate, metres: an edge with this value has at least that
     /// much.
     pub max_clearance_m: f32,
-    /// Start nodes; they are nodes `0..starts`.
+    /// Number of start nodes; these are the nodes `0..starts`.
     pub starts: u16,
-    /// Goal nodes; they are nodes `starts..starts + goals`.
+    /// Number of goal nodes; these are the nodes `starts..starts + goals`.
     pub goals: u16,
 }
 

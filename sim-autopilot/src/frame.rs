@@ -99,8 +99,8 @@ pub fn write_raw(sender: (u8, u8, u8), message_id: u32, seed: u8, payload: &[u8]
     out.extend(crc.to_le_bytes());
 }
 
-/// Kind of the bytes at the front of the buffer.
-enum Front {
+/// What the buffer begins with.
+enum ParseStatus {
     /// The beginning of what may be a frame.
     Partial,
     /// No frame.
@@ -128,13 +128,13 @@ impl Framer {
             self.drop_first(noise.unwrap_or(self.bytes.len()));
             let first_us = *self.came_us.first()?;
             match front(&self.bytes) {
-                Front::Whole(total) => {
+                ParseStatus::Whole(total) => {
                     let frame = Frame::read(&self.bytes[..total]);
                     self.drop_first(total);
                     return Some(frame);
                 }
-                Front::Partial if now_us <= first_us + PARTIAL_LIFETIME_US => return None,
-                Front::Partial | Front::Noise => self.drop_first(1),
+                ParseStatus::Partial if now_us <= first_us + PARTIAL_LIFETIME_US => return None,
+                ParseStatus::Partial | ParseStatus::Noise => self.drop_first(1),
             }
         }
     }
@@ -145,21 +145,21 @@ impl Framer {
     }
 }
 
-fn front(bytes: &[u8]) -> Front {
+fn front(bytes: &[u8]) -> ParseStatus {
     let header = header_len(bytes);
     if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !FLAG_SIGNED != 0) {
-        return Front::Noise;
+        return ParseStatus::Noise;
     }
     if bytes.len() < header {
-        return Front::Partial;
+        return ParseStatus::Partial;
     }
-    let Some(seed) = seed(message_id(bytes)) else { return Front::Noise };
+    let Some(seed) = seed(message_id(bytes)) else { return ParseStatus::Noise };
     let end = header + usize::from(bytes[1]);
-    let Some(&[low, high]) = bytes.get(end..end + 2) else { return Front::Partial };
+    let Some(&[low, high]) = bytes.get(end..end + 2) else { return ParseStatus::Partial };
     if calculate_crc(&bytes[1..end], seed) == u16::from_le_bytes([low, high]) {
-        Front::Whole(end + 2)
+        ParseStatus::Whole(end + 2)
     } else {
-        Front::Noise
+        ParseStatus::Noise
     }
 }
 

@@ -243,7 +243,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_ekf_status(&self, port: &mut Port) {
+    pub(super) fn send_ekf_status_report(&self, port: &mut Port) {
         port.send(&dialect::EKF_STATUS_REPORT_DATA {
             velocity_variance: 0.01,
             pos_horiz_variance: 0.02,

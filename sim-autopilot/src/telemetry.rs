@@ -212,7 +212,7 @@ impl Snapshot {
             105 => self.send_imu(port),
             132 => self.send_distance(port),
             147 => self.send_battery(port),
-            193 => self.send_ekf_status(port),
+            193 => self.send_ekf_status_report(port),
             230 => port.send(&dialect::ESTIMATOR_STATUS_DATA {
                 time_usec: self.time_us,
                 flags: dialect::EstimatorStatusFlags::from_bits_truncate(if self.gps.2 { 895 } else { 0x27 }),

@@ -26,9 +26,9 @@ const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Time after which the take-off is requested again: longer than ArduCopter takes to spin up and
 /// lift off (2.3 s).
 const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
-/// Gap in the positions, while HEARTBEAT is heard, after which the autopilot has rebooted and
-/// forgotten its streams.
-const ALL_STREAMS_LOST_AFTER: Duration = Duration::from_millis(1500);
+/// When no position arrives for this long while HEARTBEAT still does, the autopilot has rebooted and
+/// lost its streams.
+const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Least time between two requests for all streams.
 const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
 /// Age up to which HEARTBEAT counts as heard: HEARTBEAT comes at 1 Hz, and one late is not yet
@@ -176,7 +176,7 @@ impl Requests {
         if heard {
             self.repeat_limits(kind, now, timers, links);
         }
-        let lost = !silent && telemetry.position_age(now) > ALL_STREAMS_LOST_AFTER;
+        let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
         let tunes = lost && timers.is_due(Timer::Streams, now) && self.begin(telemetry, s, timers, links);
         let doubts = telemetry.doubts_origin();
         if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now) {

@@ -160,7 +160,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.guidance.returning
                 && (self.config.division.is_none() || self.detours.home.seeks())
                 && !self.neighbours.is_deaf(now),
-            pad_taken: match follow && (self.guidance.returning || self.detours.home.is_on()) {
+            pad_blocked_for: match follow && (self.guidance.returning || self.detours.home.is_on()) {
                 true if self.guidance.descends() => self.guidance.filter.hindered_for(now),
                 true => self.guidance.filter.barred_for(now),
                 false => Duration::default(),

@@ -35,8 +35,8 @@ const STANDSTILL_WITHIN_M: f32 = 0.6;
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time of unhindered flight after which a vehicle was not kept from going on.
 const FREE_AFTER: Duration = Duration::from_secs(5);
-/// Standstill after which a vehicle that yields in its descent climbs back up its column.
-const CLIMB_BACK_AFTER: Duration = Duration::from_secs(1);
+/// A vehicle that yields in its descent climbs back up its column after it has stood for this long.
+const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 
 /// A neighbour whose set meets that of the vehicle.
 struct Found {
@@ -200,7 +200,7 @@ impl Filter {
 
     /// Whether the vehicle, stopped in its descent, is to climb back up its column.
     pub(super) fn climbs_back(&self, now: Instant) -> bool {
-        self.yields && self.stopped_for(now) >= CLIMB_BACK_AFTER
+        self.yields && self.stopped_for(now) >= ABORT_DESCENT_AFTER
     }
 }
 

@@ -47,7 +47,8 @@ impl Guidance {
         self.halt_m = along_m;
     }
 
-    /// Whether the raw point is where the setpoint stands: another path may begin beside it.
+    /// Whether the setpoint is at rest on the raw point. Only then may another path begin, even one
+    /// that starts a little away from it.
     pub(crate) fn is_settled(&self) -> bool {
         self.settled
     }

@@ -120,8 +120,8 @@ pub struct Framer {
 
 const _: () = assert!(size_of::<Framer>() <= 480);
 
-/// Kind of the bytes at the front of the buffer.
-enum Front {
+/// What the buffer begins with.
+enum ParseStatus {
     /// Too few bytes to decide; this many are needed in all.
     Needs(usize),
     /// Bytes that are not a frame.
@@ -167,15 +167,15 @@ impl Framer {
     pub fn next(&mut self, now: Instant, input: &mut &[u8]) -> Option<Frame> {
         loop {
             let needed = match self.front() {
-                Front::Good(total) => return Some(self.take(total)),
-                Front::Needs(_) if self.expires_at().is_some_and(|due| now > due) => {
+                ParseStatus::Good(total) => return Some(self.take(total)),
+                ParseStatus::Needs(_) if self.expires_at().is_some_and(|due| now > due) => {
                     let counted = u32::from(self.uncounted == 0);
                     self.counters.expired = self.counters.expired.wrapping_add(counted);
                     self.drop_start();
                     continue;
                 }
-                Front::Needs(needed) => needed,
-                Front::Unknown(total) => {
+                ParseStatus::Needs(needed) => needed,
+                ParseStatus::Unknown(total) => {
                     if self.uncounted == 0 {
                         self.counters.unknown = self.counters.unknown.wrapping_add(1);
                         self.uncounted = total;
@@ -183,13 +183,13 @@ impl Framer {
                     self.drop_start();
                     continue;
                 }
-                Front::BadCrc => {
+                ParseStatus::BadCrc => {
                     let counted = u32::from(self.uncounted == 0);
                     self.counters.bad_crc = self.counters.bad_crc.wrapping_add(counted);
                     self.drop_start();
                     continue;
                 }
-                Front::False => {
+                ParseStatus::False => {
                     self.drop_start();
                     continue;
                 }
@@ -212,31 +212,35 @@ impl Framer {
         }
     }
 
-    fn front(&self) -> Front {
+    fn front(&self) -> ParseStatus {
         let b = &self.buf[..self.len];
         let (header, crc_at, signature, id) = match b {
-            [] | [V1_START | V2_START] => return Front::Needs(self.len + 1),
+            [] | [V1_START | V2_START] => return ParseStatus::Needs(self.len + 1),
             [V1_START, len, ..] => {
                 let id = b.get(5).map(|&id| u32::from(id));
                 (6, 6 + usize::from(*len), 0, id)
             }
-            [V2_START, _] => return Front::Needs(3),
-            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => return Front::False,
+            [V2_START, _] => return ParseStatus::Needs(3),
+            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => return ParseStatus::False,
             [V2_START, len, incompat, ..] => {
                 let signature = if incompat & FLAG_SIGNED != 0 { SIGNATURE_LEN } else { 0 };
                 let id = b.get(7..10).map(|id| u32::from_le_bytes([id[0], id[1], id[2], 0]));
                 (10, 10 + usize::from(*len), signature, id)
             }
-            _ => return Front::False,
+            _ => return ParseStatus::False,
         };
-        let Some(id) = id else { return Front::Needs(header) };
+        let Some(id) = id else { return ParseStatus::Needs(header) };
         let total = crc_at + 2;
-        let Some(extra) = extra_crc(id) else { return Front::Unknown(total + signature) };
+        let Some(extra) = extra_crc(id) else { return ParseStatus::Unknown(total + signature) };
         if self.len < total {
-            return Front::Needs(total);
+            return ParseStatus::Needs(total);
         }
         let crc = u16::from_le_bytes([b[crc_at], b[crc_at + 1]]);
-        if calculate_crc(&b[1..crc_at], extra) == crc { Front::Good(total) } else { Front::BadCrc }
+        if calculate_crc(&b[1..crc_at], extra) == crc {
+            ParseStatus::Good(total)
+        } else {
+            ParseStatus::BadCrc
+        }
     }
 
     /// Copies the good frame at the front out and removes it.

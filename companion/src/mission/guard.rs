@@ -337,7 +337,7 @@ pub struct Inputs {
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
     /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way by a vehicle that stands for good.
-    pub pad_taken: Duration,
+    pub pad_blocked_for: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,
     /// The way aside asked for, or flown, leads to where it is to land.
@@ -465,7 +465,7 @@ impl Guard {
             Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.no_room_for(limit) && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.no_room_for(limit) && i.offboard && i.can_land_aside,
-            Self::PadTaken => i.pad_taken >= limit && i.can_land_aside,
+            Self::PadTaken => i.pad_blocked_for >= limit && i.can_land_aside,
             Self::NoPlaceAside => i.plan_failed && i.lands_aside,
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear >= limit,

@@ -84,7 +84,7 @@ pub struct Row {
 
 pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);
 
-/// States, a bit for each.
+/// Bit mask of the states.
 pub(crate) const fn bits(states: &[State]) -> u32 {
     let (mut bits, mut i) = (0, 0);
     while i < states.len() {

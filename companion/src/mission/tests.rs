@@ -225,7 +225,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::LandingClear => i.column_clear = long,
         G::NoRoomToLand => (i.column_blocked, i.offboard, i.can_turn_back) = (long, true, true),
         G::NoRoomHere => (i.column_blocked, i.offboard, i.can_land_aside) = (long, true, true),
-        G::PadTaken => (i.pad_taken, i.can_land_aside) = (long, true),
+        G::PadTaken => (i.pad_blocked_for, i.can_land_aside) = (long, true),
         G::NoPlaceAside => (i.plan_failed, i.lands_aside) = (true, true),
         G::AsideReached => i.aside_reached = true,
         G::ColumnBlocked => (i.column_blocked, i.in_state) = (long, long),

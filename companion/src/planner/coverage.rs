@@ -305,7 +305,7 @@ pub fn plan<
             fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
         let loss = Loss { work: &whole, swarm: &swarm, fates: &fates };
-        losses::again(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
+        losses::redivide(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
     Ok(())
 }

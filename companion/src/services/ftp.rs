@@ -28,7 +28,7 @@ use self::packet::{
 use self::stream::{Stream, due};
 use crate::link::frame::Frame;
 use crate::storage::store::window::Taken;
-use crate::storage::store::{Answer, Erasing, File, Store, UploadError, UploadState};
+use crate::storage::store::{Erasing, File, ReadOutcome, Store, UploadError, UploadState};
 use crate::time::{Duration, Instant};
 
 /// Message id of FILE_TRANSFER_PROTOCOL.
@@ -151,9 +151,9 @@ impl Ftp {
     }
 
     /// Takes what the flash answered.
-    pub fn answer(&mut self, answer: Answer<'_>) {
+    pub fn answer(&mut self, answer: ReadOutcome<'_>) {
         match (core::mem::replace(&mut self.doing, Doing::Nothing), answer) {
-            (Doing::Read(request, true), Answer::Bytes(bytes)) => match self.stream {
+            (Doing::Read(request, true), ReadOutcome::Bytes(bytes)) => match self.stream {
                 Some(stream) if stream.request().is(&request) => {
                     let due = due(&request, Some(&stream));
                     self.stream = stream.advanced_by(bytes.len());
@@ -161,7 +161,7 @@ impl Ftp {
                 }
                 _ => self.ack(&request, bytes),
             },
-            (Doing::Sum(request, true), Answer::Sum(sum)) => {
+            (Doing::Sum(request, true), ReadOutcome::Sum(sum)) => {
                 self.ack(&request, &sum.to_le_bytes());
             }
             (Doing::Read(request, true) | Doing::Sum(request, true), _) => {

@@ -30,7 +30,7 @@ use core::ops::Range;
 use self::area::{Area, Condition, Seal};
 pub(crate) use self::flash::crc32;
 pub use self::flash::{
-    Answer, Erasing, Fault, File, FlashRequest, Layout, MAX_PROGRAM, MAX_READ, ReadFlash, WORD,
+    Erasing, Fault, File, FlashRequest, Layout, MAX_PROGRAM, MAX_READ, ReadFlash, ReadOutcome, WORD,
 };
 use self::job::Job;
 use self::journal::Journal;

@@ -53,7 +53,8 @@ const TURN_CLAIM: Duration = Duration::from_secs(1);
 const TURN_S: u64 = 2;
 /// Time from a search that found no detour to the next search, seconds.
 const DETOUR_RETRY_S: u64 = 10;
-/// Wait while all others stand that is a dead end: the vehicle that is waited for found no detour.
+/// If a vehicle waits this long while all others stand, it is in a dead end: the vehicle that it
+/// waits for found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(30);
 /// Time from a search that found no landing place aside to the next search, seconds.
 const SIDESTEP_RETRY_S: u64 = 30;

@@ -186,7 +186,7 @@ fn mission(
 #[inline(never)]
 fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights) -> u32 {
     let mut sum = 1;
-    let names = ["flights::plan, 3", "losses::again, 3"];
+    let names = ["flights::plan, 3", "losses::redivide, 3"];
     for zones in [&[][..], &NO_FLY_ZONES[..]] {
         let corners = FIVE_VERTICES.iter().chain(zones.iter().flatten());
         let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
@@ -208,7 +208,7 @@ fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights
         lane_m: 5.0,
         count: VEHICLES,
     };
-    divided(meter, &case, ["flights::plan, 32", "losses::again, 32"], lent, out, &mut sum);
+    divided(meter, &case, ["flights::plan, 32", "losses::redivide, 32"], lent, out, &mut sum);
     sum
 }
 
@@ -273,7 +273,7 @@ fn divided(
     let fates: Vec<Fate, VEHICLES> = (0..case.count).map(fate).collect();
     let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
     meter
-        .call(again_name, bytes, || losses::again(&loss, losses, pack, schedule, routes, out))
+        .call(again_name, bytes, || losses::redivide(&loss, losses, pack, schedule, routes, out))
         .expect("a division");
     add(sum, out);
 }

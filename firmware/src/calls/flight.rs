@@ -130,10 +130,10 @@ pub fn fly<M: Meter>(
         other.place = flight.place + near(seed, &mut rng, if hard { 6.0 } else { 20.0 });
         other.progress_m = uniform(&mut rng, 0.0, 60.0);
     }
-    flight.tell_all(&mut rng, |_| true);
+    flight.send_states_from(&mut rng, |_| true);
     if hard {
         for _ in 0..below(&mut rng, MAX_AGEING_STEPS) {
-            flight.tell(0, &mut rng);
+            flight.send_state_from(0, &mut rng);
             flight.tick(OTHER_STEP, AGEING_TIME);
         }
     }
@@ -146,7 +146,7 @@ pub fn fly<M: Meter>(
             for other in flight.others.iter_mut().filter(|other| !other.silent) {
                 other.place = here + near(seed, &mut rng, if hard { 3.0 } else { 12.0 });
             }
-            flight.tell_all(&mut rng, |other| !other.silent);
+            flight.send_states_from(&mut rng, |other| !other.silent);
         }
         let (now, companion) = (flight.now, &mut *flight.companion);
         flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
@@ -177,7 +177,7 @@ pub fn filter<M: Meter>(
         if round % 2 == 1 {
             flight.others[0].place = flight.place;
         }
-        flight.tell_all(&mut rng, |_| true);
+        flight.send_states_from(&mut rng, |_| true);
         for _ in 0..4 {
             flight.tick(OTHER_STEP, STEP_TIME);
         }
@@ -187,7 +187,7 @@ pub fn filter<M: Meter>(
             let away_m = uniform(&mut rng, nearest_m, nearest_m.max(furthest_m) + 0.1);
             flight.others[i].place = flight.place + way * (away_m / way.norm().max(0.01));
         }
-        flight.tell_all(&mut rng, |_| true);
+        flight.send_states_from(&mut rng, |_| true);
         let (now, companion) = (flight.now, &mut *flight.companion);
         flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
         // The whole step beside them; and time passes, so that what they say next is new.
@@ -252,10 +252,10 @@ impl<'a, M: Meter> Flight<'a, M> {
 
     fn take_off(&mut self) {
         let mut rng = Pcg32::seed_from_u64(0);
-        self.tell_all(&mut rng, |_| true);
+        self.send_states_from(&mut rng, |_| true);
         for step in 0..MAX_TAKE_OFF_STEPS {
             if step.is_multiple_of(4) {
-                self.tell(0, &mut rng);
+                self.send_state_from(0, &mut rng);
             }
             if self.companion.state() == companion::State::Ready {
                 let mut order = [0; 33];
@@ -318,16 +318,16 @@ impl<'a, M: Meter> Flight<'a, M> {
         self.drain();
     }
 
-    fn tell_all(&mut self, rng: &mut Pcg32, who: impl Fn(&Other) -> bool) {
+    fn send_states_from(&mut self, rng: &mut Pcg32, who: impl Fn(&Other) -> bool) {
         for i in 0..self.others.len() {
             if who(&self.others[i]) {
-                self.tell(i, rng);
+                self.send_state_from(i, rng);
             }
         }
     }
 
     /// A neighbour sends its intent and its position.
-    fn tell(&mut self, i: usize, rng: &mut Pcg32) {
+    fn send_state_from(&mut self, i: usize, rng: &mut Pcg32) {
         let Other { place, flags, progress_m, .. } = self.others[i];
         let system_id = 2 + i as u8;
         let points = (0..intent::MAX_POINTS).map(|_| place + anywhere(rng, 3.0)).collect();
@@ -346,7 +346,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         let len = intent.encode(&mut payload);
         self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
         if self.has_area() {
-            self.tell_roster(system_id);
+            self.send_roster_from(system_id);
         }
         let at = frames::enu_to_geodetic(&ORIGIN, &place);
         let mut position = [0; 28];
@@ -361,8 +361,8 @@ impl<'a, M: Meter> Flight<'a, M> {
         self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), GLOBAL_POSITION_INT, &position);
     }
 
-    /// The roster that the neighbour reports: all fly.
-    fn tell_roster(&mut self, system_id: u8) {
+    /// Gives the companion the roster message of a neighbour: all fly.
+    fn send_roster_from(&mut self, system_id: u8) {
         for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES) {
             let known = VEHICLES.min(first + roster::MAX_ENTRIES) - first;
             let entries = core::iter::repeat_n(Entry::default(), known).collect();

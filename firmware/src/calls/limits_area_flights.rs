@@ -274,7 +274,7 @@ fn again(
     routes: &mut Plan<VEHICLES>,
 ) -> Result<(), losses::Error> {
     let Memory { losses, pack, schedule, out } = memory;
-    let divided = to.call("losses::again", || losses::again(loss, losses, pack, schedule, routes, out));
+    let divided = to.call("losses::redivide", || losses::redivide(loss, losses, pack, schedule, routes, out));
     assert!(divided.is_err() || is_finite(out), "{:?}", loss.fates);
     to.is(divided.is_ok());
     divided

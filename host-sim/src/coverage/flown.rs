@@ -10,7 +10,7 @@ use crate::scenario::Scenario;
 
 /// Findings about a flight.
 pub struct Judged {
-    /// Findings for `result.json`.
+    /// The part of `result.json` about the coverage.
     pub result: CoverageResult,
     /// Borders of the area.
     pub outlines: Vec<Outline>,

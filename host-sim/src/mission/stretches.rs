@@ -7,11 +7,11 @@ use planner_core::flight::{Flight, Task};
 use super::ready::{Mission, SwarmPlan};
 use crate::capacity::WAYPOINTS;
 
-/// Divisions that are kept for losses.
-const DIVISIONS_FOR_LOSSES: usize = 3;
+/// Number of divisions, out of `MAX_DIVISIONS`, that are reserved for losses of vehicles.
+const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 
-/// When a flight asks for a division, seconds after the plan began by its labels; none where it is the whole route.
-fn division_requested_at_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
+/// Time at which a flight will ask for a division by its plan, seconds after the plan began; none if its route ends with its path.
+fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.end_m(&flight.path).filter(|_| photographs.goes_on)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
@@ -41,8 +41,7 @@ fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
 
 /// Lots when the first vehicle of a plan requests a division, by rank; none where no route goes on.
 pub fn next_lots(plan: &SwarmPlan) -> Option<Vec<Lot>> {
-    let hold_s =
-        plan.flights.iter().filter_map(division_requested_at_s).min_by(f32::total_cmp)? + COMMITMENT_S;
+    let hold_s = plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
     flights.sort_by_key(|flight| flight.id);
     Some(flights.into_iter().map(|flight| lot(flight, hold_s)).collect())
@@ -55,12 +54,12 @@ impl Mission {
         let mut next = next_lots(plan);
         while let Some(lots) = next {
             losses.push(lots);
-            if losses.len() > MAX_DIVISIONS - DIVISIONS_FOR_LOSSES {
+            if losses.len() > MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES {
                 bail!(
                     "area too large: {}: its routes take more than {} stretches of {WAYPOINTS} corners each\nhint: more \
                      vehicles, wider lanes, or the plans of `cover`, which autopilots fly alone",
                     self.scenario.path,
-                    MAX_DIVISIONS - DIVISIONS_FOR_LOSSES
+                    MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES
                 );
             }
             next = next_lots(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);

@@ -153,7 +153,7 @@ pub struct Geofence {
 }
 
 impl Geofence {
-    /// Whether a place is inside; its faces are.
+    /// Whether a place is inside the box or on one of its faces.
     pub fn holds(&self, place: &Point) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&place[axis]))
     }

@@ -51,7 +51,7 @@ impl HeightGrid {
         self.cell_m
     }
 
-    /// Cells east and north.
+    /// Number of cells to the east and to the north.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }

@@ -39,8 +39,8 @@ use crate::quote::quoted_path;
 pub fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     let grid = match ending.to_ascii_lowercase().as_str() {
-        "asc" => asc::read(path)?.laid_out(frame)?,
-        "tif" | "tiff" => geotiff::read(path)?.laid_out(frame)?,
+        "asc" => asc::read(path)?.resampled(frame)?,
+        "tif" | "tiff" => geotiff::read(path)?.resampled(frame)?,
         "las" | "laz" => cloud::read(path, frame)?,
         _ => return Err(TerrainError::Format),
     };

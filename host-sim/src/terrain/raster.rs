@@ -36,8 +36,9 @@ impl Raster {
         [(x - self.corner[0]) / self.cell[0], (self.corner[1] - y) / self.cell[1]]
     }
 
-    /// The heights in the mission frame, in cells of about the file's size.
-    pub(super) fn laid_out(&self, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+    /// Resamples the heights to a grid in the mission frame, whose cells are about as large as the
+    /// file's.
+    pub(super) fn resampled(&self, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
         self.crs.check(frame.metres)?;
         let origin = frame.origin;
         let window = match frame.window {

@@ -74,7 +74,7 @@ proptest! {
         let text = asc(columns, corner.map(f64::from), f64::from(cell), &rows);
         let frame = Frame { origin: &ORIGIN, metres: true, window: None };
         let raster = asc::parse(&text, Crs::Unsaid).unwrap();
-        let grid = raster.laid_out(&frame).unwrap();
+        let grid = raster.resampled(&frame).unwrap();
         prop_assert_eq!(grid.size(), [columns, count]);
         prop_assert_eq!(grid.cell_m(), cell);
         for (row, heights) in rows.iter().rev().enumerate() {
@@ -119,7 +119,7 @@ proptest! {
         let [lon_deg, lat_deg] = system.to_degrees(corner).unwrap();
         // A frame that begins there, as missions are near their origin.
         let origin = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };
-        let grid = raster.laid_out(&anywhere(&origin)).unwrap();
+        let grid = raster.resampled(&anywhere(&origin)).unwrap();
         let unit_m = if code == 2225 { 0.3048 } else { 1.0 };
         for row in 0..17 {
             for column in 0..24 {
@@ -193,7 +193,8 @@ fn geotiff_of(values: &[i16], model: u16, code: u16, corner: [f64; 2], cell: f64
 fn what_cannot_be_honoured_is_refused_by_name() {
     let refused = |keys: &[u16]| {
         let bytes = tiff([2, 2], &[1, 2, 3, 4], keys, [500_000.0, 4_800_000.0], 10.0);
-        let read = geotiff::decode(Cursor::new(bytes)).and_then(|raster| raster.laid_out(&anywhere(&ORIGIN)));
+        let read =
+            geotiff::decode(Cursor::new(bytes)).and_then(|raster| raster.resampled(&anywhere(&ORIGIN)));
         read.map(|grid| grid.count()).unwrap_err().to_string()
     };
     for (keys, text) in [

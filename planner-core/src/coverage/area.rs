@@ -30,7 +30,7 @@ pub enum RingKind {
 /// One ring: its vertices end before `end`, and begin where the ring before it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ring {
-    /// Index after the last vertex.
+    /// Index of the last vertex plus one.
     pub end: u16,
     /// Kind of the region that the ring encloses.
     pub kind: RingKind,

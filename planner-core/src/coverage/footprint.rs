@@ -9,14 +9,14 @@ use super::CoverageError;
 /// A camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Camera {
-    /// A camera stated by its field of view.
+    /// A camera given by its diagonal field of view.
     Diagonal {
         /// Across the picture's diagonal, degrees, below 180.
         fov_deg: f32,
         /// Long side by short side.
         aspect: f32,
     },
-    /// A camera stated by its sensor.
+    /// A camera given by its sensor and focal length.
     Sensor {
         /// Sides of the sensor, millimetres.
         sides_mm: [f32; 2],

@@ -133,7 +133,7 @@ impl From<PlanError> for Error {
 /// # Errors
 /// Those of [`divide::left`], [`pack::binpat`] and [`flights::plan`]; [`CoverageError::Vehicles`] where fates, routes and
 /// vehicles do not belong together; [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
-pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+pub fn redivide<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
     pack: &mut PackWorkspace<K>,

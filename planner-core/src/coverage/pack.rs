@@ -27,9 +27,9 @@ pub struct Vehicle {
     pub home: Flat,
     /// Speed over ground, metres a second.
     pub cruise_mps: f32,
-    /// V_a, metres a second.
+    /// Speed of climb (V_a in the paper), metres a second.
     pub climb_mps: f32,
-    /// V_d, metres a second.
+    /// Speed of descent (V_d in the paper), metres a second.
     pub descend_mps: f32,
     /// W_k: its share of the work is this by the sum of all.
     pub weight: f32,

@@ -111,10 +111,10 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Adds every `u` at which these rings hold a place between two `v`: those of the places on the lines at both
+    /// Projects these rings on the strip between two `v`: adds every `u` at which they hold a place there, those of the places on the lines at both
     /// borders, and those of the rings' own edges between them. A place inside that is not on a border line crosses
     /// an edge before it.
-    fn shadow<const V: usize>(
+    fn project_rings<const V: usize>(
         &self,
         edges: impl Iterator<Item = (Flat, Flat)> + Clone,
         [low, high]: Span,
@@ -144,7 +144,7 @@ impl<'a> Strips<'a> {
         // An area that only touches the border of a strip is its neighbour's.
         let inset = self.wide * 1e-4;
         let span = [span[0] + inset, span[1] - inset];
-        self.shadow(self.area.edges(), span, 0.0, &mut ws.crossings, &mut ws.need)
+        self.project_rings(self.area.edges(), span, 0.0, &mut ws.crossings, &mut ws.need)
     }
 
     /// Takes from `ws.need` every `u` at which one no-fly zone holds all between two `v`: those inside it on both border
@@ -200,7 +200,7 @@ impl<'a> Strips<'a> {
         let clear = ZONE_CLEARANCE_M;
         for (_, ring) in self.area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
             let span = [v - clear, v + clear];
-            self.shadow(edges_of(ring), span, clear, &mut ws.crossings, &mut ws.line)?;
+            self.project_rings(edges_of(ring), span, clear, &mut ws.crossings, &mut ws.line)?;
         }
         for span in ws.line.spans() {
             ws.free.remove(*span)?;

@@ -88,7 +88,7 @@ pub enum PlanError {
     Config(ConfigError),
     /// Height or clearance of the vehicle with this id is negative, NaN or infinite.
     BadTask(u8),
-    /// The height of the goal with this index over its ground is.
+    /// The height of the goal with this index above its ground is negative, NaN or infinite.
     BadDescent(u16),
     /// Two vehicles have this id.
     SameId(u8),

@@ -79,8 +79,8 @@ impl<'g, 'a> Sight<'g, 'a> {
         }
     }
 
-    /// Moves to a node.
-    pub(super) fn stand_at(&mut self, here: [f32; 3]) {
+    /// Moves to a node, and finds the free box around it.
+    pub(super) fn move_to(&mut self, here: [f32; 3]) {
         let shape = self.grid.shape();
         self.here = here;
         self.snapped = snap(shape, &Point::from(here));

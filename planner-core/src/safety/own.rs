@@ -28,7 +28,7 @@ fn root_above(square: f32) -> f32 {
     f32::from_bits((square.to_bits() >> 1) + (127 << 22))
 }
 
-/// A leg, its middle, and no less than half its length.
+/// A leg with its midpoint and an upper bound of half its length.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
     from: Point,

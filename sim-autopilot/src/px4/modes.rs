@@ -5,9 +5,9 @@
 pub enum Mode {
     /// Stick to motors; with nobody at the sticks it only holds.
     Manual,
-    /// Altitude control by sticks; likewise.
+    /// The sticks control the altitude; with nobody at the sticks the vehicle only holds.
     Altitude,
-    /// Position control by sticks; likewise.
+    /// The sticks control the position; with nobody at the sticks the vehicle only holds.
     Position,
     /// AUTO.MISSION.
     Mission,

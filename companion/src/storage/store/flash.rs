@@ -133,7 +133,7 @@ impl File {
 
 /// Result of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answer<'a> {
+pub enum ReadOutcome<'a> {
     /// The bytes asked for by [`Store::read`](super::Store::read).
     Bytes(&'a [u8]),
     /// The running CRC asked for by [`Store::sum`](super::Store::sum).

@@ -3,7 +3,7 @@
 use super::Store;
 use super::area::{self, Area, Condition, Seal};
 use super::flash::{
-    Answer, CRC_START, Erasing, Fault, File, FlashRequest, MAX_PROGRAM, MAX_READ, WORD, crc_step,
+    CRC_START, Erasing, Fault, File, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome, WORD, crc_step,
 };
 use super::job::Job;
 use super::journal;
@@ -165,22 +165,22 @@ impl Store {
     }
 
     /// Takes in how the last request went; `Ok` of an erasure or a program holds no bytes.
-    pub fn handle<'a>(&mut self, outcome: Result<&'a [u8], Fault>) -> Option<Answer<'a>> {
+    pub fn handle<'a>(&mut self, outcome: Result<&'a [u8], Fault>) -> Option<ReadOutcome<'a>> {
         if !core::mem::take(&mut self.asked) {
             return None;
         }
         let job = core::mem::replace(&mut self.job, Job::None);
         match (job, outcome) {
             (Job::None | Job::Ignored, _) => {}
-            (Job::Read { .. }, Ok(bytes)) => return Some(Answer::Bytes(bytes)),
-            (Job::Read { .. } | Job::Sum { .. }, Err(Fault)) => return Some(Answer::Failed),
+            (Job::Read { .. }, Ok(bytes)) => return Some(ReadOutcome::Bytes(bytes)),
+            (Job::Read { .. } | Job::Sum { .. }, Err(Fault)) => return Some(ReadOutcome::Failed),
             (Job::Sum { at, end, sum }, Ok(bytes)) => {
                 let (at, sum) = (at + bytes.len() as u32, crc_step(sum, bytes));
                 if bytes.is_empty() {
-                    return Some(Answer::Failed);
+                    return Some(ReadOutcome::Failed);
                 }
                 if at >= end {
-                    return Some(Answer::Sum(sum));
+                    return Some(ReadOutcome::Sum(sum));
                 }
                 self.job = Job::Sum { at, end, sum };
             }

@@ -252,7 +252,7 @@ fn a_read_goes_first_between_two_sectors() {
         }
         let outcome = obey(&mut flash, request, Erasing::Allowed, &mut read).expect("the power is on");
         if let Some(answer) = store.handle(outcome.map(|len| &read[..len])) {
-            assert_eq!(answer, Answer::Bytes(&road[..100]));
+            assert_eq!(answer, ReadOutcome::Bytes(&road[..100]));
             given += 1;
         }
     }

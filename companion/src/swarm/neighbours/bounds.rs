@@ -43,8 +43,9 @@ pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
 pub(super) const UNHEARD_STRETCH_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
-/// Silence after which an unheard vehicle may come down further than [`UNHEARD_STRETCH_M`] on over an area: its lease, and what row
-/// `Alone` waits. Nobody leaves the plan for that before.
+/// Over an area, a vehicle that has been silent for this long may land further along its path than
+/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle leaves the plan
+/// for that silence earlier.
 pub(super) const LANDS_UNHEARD: Duration = Duration::from_secs(40);
 /// Rounding of the length of a way of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;

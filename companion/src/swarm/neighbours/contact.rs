@@ -217,7 +217,7 @@ impl Contact {
             && self.heard_within(now, HEARD_WITHIN)
     }
 
-    /// Whether it stands and is about to fly around.
+    /// Whether it claims the turn: it is blocked, hovers, and is about to fly a detour.
     pub(super) fn claims(&self, now: Instant) -> bool {
         self.tells(BLOCKED)
             && !self.waits(now)

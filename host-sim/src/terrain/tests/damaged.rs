@@ -55,7 +55,7 @@ fn returns(compressed: bool, format: u8) -> Vec<u8> {
 }
 
 fn decode_tiff(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
-    geotiff::decode(Cursor::new(bytes.to_vec()))?.laid_out(&anywhere(&ORIGIN))
+    geotiff::decode(Cursor::new(bytes.to_vec()))?.resampled(&anywhere(&ORIGIN))
 }
 
 fn decode_cloud(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
@@ -64,7 +64,7 @@ fn decode_cloud(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
 
 fn decode_asc(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
     let text = String::from_utf8_lossy(bytes);
-    asc::parse(&text, Crs::Unsaid)?.laid_out(&Frame { metres: true, ..anywhere(&ORIGIN) })
+    asc::parse(&text, Crs::Unsaid)?.resampled(&Frame { metres: true, ..anywhere(&ORIGIN) })
 }
 
 #[test]
@@ -174,6 +174,6 @@ fn files_that_say_that_they_are_vast_are_refused() {
     let bytes = tiff([2, 2], &values, &keys(1, 32630), [500_000.0, 4_794_000.0], 1.0);
     let window = Some([Flat::repeat(-50_000.0), Flat::repeat(50_000.0)]);
     let raster = geotiff::decode(Cursor::new(bytes)).unwrap();
-    let laid = raster.laid_out(&Frame { window, ..anywhere(&ORIGIN) });
+    let laid = raster.resampled(&Frame { window, ..anywhere(&ORIGIN) });
     assert!(matches!(laid, Err(TerrainError::TooManyCells(_))));
 }
