@@ -223,6 +223,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
+    // Copies of it would take a kilobyte of flash each.
+    #[inline(never)]
     fn fly(&mut self, plan: &VehiclePlan<W, G>) {
         self.plan = Some(plan.clone());
         (self.left_with_all, self.flown_around) = (None, 0);

@@ -400,6 +400,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
+    #[inline(never)]
     pub(crate) fn is_deaf(&self, now: Instant) -> bool {
         self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }

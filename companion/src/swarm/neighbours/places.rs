@@ -21,6 +21,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears nobody has lost its own radio
     /// rather: the others fly on, nobody knows where.
+    #[inline(never)]
     fn upto_m(&self, contact: &Contact, now: Instant) -> f32 {
         let lands = !contact.heard_within(now, LANDS_UNHEARD);
         let far = lands && contact.may_fly_on(now) && !self.is_deaf(now);
