@@ -266,21 +266,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Adds, over an area, the points that it flies along beyond those if nobody hears it any more: as far as its lease takes
     /// it, or to the end where it has left and needs none.
     fn add_unheard(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
-        use State::*;
-        let flies = matches!(
-            self.mission.state(),
-            Streaming
-                | Engaging
-                | Arming
-                | TakeOff
-                | Climb
-                | Follow
-                | Paused
-                | Alone
-                | Blocked
-                | Replanning
-                | Dividing
-        );
+        let flies = self.mission.state().flies_on_lease();
         let descends = self.guidance.along_m() >= 0.0 && self.guidance.descends();
         let Some(plan) = self.mission.plan().filter(|_| flies && !descends) else { return };
         // Full after eight: further is not reported.
@@ -289,12 +275,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let from_m = if on_path { self.guidance.setpoint_m } else { 0.0 };
         let Some(most_m) = self.unheard_m() else { return };
         if self.guidance.returning {
-            return path
-                .waypoints()
-                .iter()
-                .rev()
-                .filter(|w| w.along_m < from_m)
-                .for_each(|w| add(w.position));
+            let back = path.waypoints().iter().rev().filter(|w| w.along_m < from_m);
+            return back.for_each(|w| add(w.position));
         }
         let stops_m = if on_path { self.guidance.stops_at_m.max(from_m) } else { 0.0 };
         let stops_m = if self.guidance.hold.is_on() { from_m } else { stops_m };

@@ -126,6 +126,12 @@ impl State {
         )
     }
 
+    /// Whether a vehicle in this state flies on over an area as long as its lease allows, or is about to take off.
+    pub(crate) fn flies_on_lease(self) -> bool {
+        use State::*;
+        self.holds_place() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
+    }
+
     /// Whether a vehicle that stands in this state stays there until it decides otherwise.
     pub(crate) fn holds_place(self) -> bool {
         use State::*;

@@ -56,10 +56,6 @@ const DETOUR_RETRY_S: u64 = 10;
 /// If a vehicle waits this long while all others stand, it is in a dead end: the vehicle that it
 /// waits for found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(30);
-/// Time from a search that found no landing place aside to the next search, seconds.
-const SIDESTEP_RETRY_S: u64 = 30;
-/// Wait of a landing after which a vehicle that hears no other one seeks a landing place aside.
-const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Searches without a detour after which a vehicle gives up, or one fewer within [`GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 4;
 /// Time after which one search fewer is enough, seconds.
@@ -468,34 +464,6 @@ impl Detours {
         self.is_due(view)
             && self.claimed_since.is_some_and(|at| view.now - at >= TURN_CLAIM)
             && view.neighbours.all_wait(view.now)
-    }
-
-    /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
-    pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
-        &self,
-        view: &View<'_, V, W, G>,
-    ) -> bool {
-        let retries = |at: Instant| view.now - at >= Duration::from_secs(SIDESTEP_RETRY_S);
-        view.mission.plan().is_some_and(|plan| plan.task.flies())
-            && (!view.neighbours.is_deaf(view.now)
-                || view.neighbours.all_rest()
-                || view.guidance.filter.column_blocked_for(view.now) >= UNHEARD_SIDESTEP_AFTER)
-            && self.no_way_aside_at.is_none_or(retries)
-    }
-
-    /// Whether enough ways around were not found, or led nowhere.
-    pub(crate) fn gives_up(&self) -> bool {
-        self.hopeless || self.failed.saturating_add(self.fruitless) >= MAX_DETOUR_SEARCHES
-    }
-
-    /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
-    pub(crate) fn underneath<const V: usize, const W: usize, const G: usize>(
-        &self,
-        view: &View<'_, V, W, G>,
-    ) -> Duration {
-        let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
-        let trapped = view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
-        trapped.map_or(Duration::default(), |at| view.now - at)
     }
 }
 

@@ -437,21 +437,9 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().filter(|c| c.id < id && c.tells(BLOCKED)).count() as u64
     }
 
-    /// A way around what rests now was planned.
-    pub fn avoid(&mut self, now: Instant) {
-        for contact in &mut self.contacts {
-            contact.avoided = if contact.is_out(now) { contact.state.position } else { NO_PLACE };
-        }
-    }
-
     /// Whether a vehicle of this id is heard to follow the shared plan, or is none that is known.
     pub(crate) fn follows_plan(&self, id: u8) -> bool {
         self.contacts.iter().find(|c| c.state.id == id).is_none_or(Contact::on_plan)
-    }
-
-    /// Vehicles that a detour led around count again.
-    pub(crate) fn forget_avoided(&mut self) {
-        self.contacts.iter_mut().for_each(|contact| contact.avoided = NO_PLACE);
     }
 
     /// Number of contacts.

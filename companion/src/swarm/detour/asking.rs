@@ -5,11 +5,17 @@
 use planner_core::detour::{DetourRequest, Goal, KeepOff};
 
 use super::beside::{self, DETOUR_MARGIN_M};
-use super::{Aim, BLOCKED_WITHIN_M, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
+use super::{
+    Aim, BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER,
+};
 use crate::guidance::evade;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
+/// Time from a search that found no landing place aside to the next search, seconds.
+const SIDESTEP_RETRY_S: u64 = 30;
+/// Wait of a landing after which a vehicle that hears no other one seeks a landing place aside.
+const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Two searches from places nearer than this are searches from the same place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
 
@@ -25,6 +31,34 @@ pub(crate) enum Outlook {
 }
 
 impl Detours {
+    /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
+    pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> bool {
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(SIDESTEP_RETRY_S);
+        view.mission.plan().is_some_and(|plan| plan.task.flies())
+            && (!view.neighbours.is_deaf(view.now)
+                || view.neighbours.all_rest()
+                || view.guidance.filter.column_blocked_for(view.now) >= UNHEARD_SIDESTEP_AFTER)
+            && self.no_way_aside_at.is_none_or(retries)
+    }
+
+    /// Whether enough ways around were not found, or led nowhere.
+    pub(crate) fn gives_up(&self) -> bool {
+        self.hopeless || self.failed.saturating_add(self.fruitless) >= MAX_DETOUR_SEARCHES
+    }
+
+    /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
+    pub(crate) fn underneath<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> Duration {
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
+        let trapped = view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
+        trapped.map_or(Duration::default(), |at| view.now - at)
+    }
+
     /// A way around, or just aside, is requested of the shell.
     pub(crate) fn request(&mut self, aim: Aim) {
         self.aside = matches!(aim, Aim::Aside | Aim::Landing);

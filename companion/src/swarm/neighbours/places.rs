@@ -4,7 +4,9 @@ use planner_core::Point;
 use planner_core::detour::{KeepOff, Nature};
 
 use super::contact::{Contact, Field};
-use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, Neighbours, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M};
+use super::{
+    LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M,
+};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
@@ -125,6 +127,18 @@ impl<const V: usize> Neighbours<V> {
     pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
         let under = |p: &Point| p.z < position.z && (p - position).xy().norm() < within_m;
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
+    }
+
+    /// A way around what rests now was planned.
+    pub fn avoid(&mut self, now: Instant) {
+        for contact in &mut self.contacts {
+            contact.avoided = if contact.is_out(now) { contact.state.position } else { NO_PLACE };
+        }
+    }
+
+    /// Vehicles that a detour led around count again.
+    pub(crate) fn forget_avoided(&mut self) {
+        self.contacts.iter_mut().for_each(|contact| contact.avoided = NO_PLACE);
     }
 }
 
