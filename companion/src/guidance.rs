@@ -12,6 +12,7 @@ mod fence;
 pub(crate) mod filter;
 mod follower;
 mod hold;
+mod lag;
 pub(crate) mod limits;
 mod motion;
 mod nearest;
@@ -151,6 +152,8 @@ pub struct Guidance {
     fenced: bool,
     progress_m: f32,
     progress_at: Instant,
+    /// When the vehicle last moved, or was at its setpoint.
+    followed_at: Instant,
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
@@ -213,6 +216,7 @@ impl Guidance {
             fenced: false,
             progress_m: 0.0,
             progress_at: Instant::ZERO,
+            followed_at: Instant::ZERO,
             reported_m: f32::NEG_INFINITY,
             returning: false,
             linked_m: f32::INFINITY,
@@ -396,15 +400,7 @@ impl Guidance {
             self.smoother.rest();
             self.settle();
         }
-        let lead_m = (position - self.smoother.position()).norm();
-        let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
-        let share = match moves {
-            true if flies || state == State::Climb => share.min(self.pace),
-            true => self.pace,
-            // Settled it holds; before the take-off it follows the estimate.
-            false if self.settled => 1.0,
-            false => 0.0,
-        };
+        let share = self.lag_share(scene.telemetry, moves, now);
         let mut blocked = false;
         let dt_s = if self.smoother.resumes() { self.unsent_s } else { dt_s };
         // The place where the vehicle stops stays the same, however many raw points this step

@@ -6,6 +6,7 @@
 
 pub(crate) mod course;
 mod guard;
+mod inputs;
 pub(crate) mod photographed;
 mod row;
 mod state;
@@ -14,9 +15,11 @@ pub(crate) mod task;
 pub(crate) mod waits;
 
 use self::table::TABLE;
+pub(crate) use self::table::UNFOLLOWED_MOST;
 
+pub use self::guard::Guard;
 pub(crate) use self::guard::MAX_POSITION_AGE;
-pub use self::guard::{Guard, Inputs};
+pub use self::inputs::Inputs;
 use self::row::bits;
 pub use self::row::{Action, Row};
 pub use self::state::{Interrupted, State, To};

@@ -86,6 +86,7 @@ const CASES: &[Case] = &[
 ];
 
 const CANCELLED: &str = "Start cancelled as commanded";
+const UNFOLLOWED: &str = "Setpoint not followed for 20 s: landing";
 /// Not solved yet: beside a vehicle whose autopilot is silent for good others may land short of their goals.
 const OTHERS_LAND_SHORT: &str = "duration_s = 600";
 /// States in which the mission of a vehicle struck may rest.
@@ -173,10 +174,13 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
         }
     }
     let did_its_task = |v: &&VehicleResult| v.reached && v.landed && v.end == "Done";
+    // It hangs on an obstacle over others: it can neither leave nor land before its battery is nearly empty.
+    let hangs = said(UNFOLLOWED) && said("Vehicle still below: landing waits");
     for v in result.vehicles.iter().filter(|v| !did_its_task(v)) {
         let state = v.end.split(':').next().unwrap_or_default();
-        let others_short = case.script.contains(OTHERS_LAND_SHORT) && v.landed;
-        if goes_on || !(struck.contains(&v.id) || others_short) || !RESTS.contains(&state) {
+        let others_short = (hangs || case.script.contains(OTHERS_LAND_SHORT)) && v.landed;
+        let rests = RESTS.contains(&state) || (hangs && struck.contains(&v.id) && state == "LandingHeld");
+        if goes_on || !(struck.contains(&v.id) || others_short) || !rests {
             wrong.push(format!("vehicle {} ends in {}", v.id, v.end));
         }
     }

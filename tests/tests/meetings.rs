@@ -1,7 +1,10 @@
 //! Whole companions meet at random; `cargo xtask bench --only meetings --n 10000` flies more, and can replay a seed.
+//! `FLOCKMATE_CATCHES=N` flies N meetings in which something catches a vehicle,
+//! `FLOCKMATE_CATCHES_FROM=SEED` begins at another seed; the first that fails is traced.
 
 use flockmate_tests::meeting::{self, Outcome, scene};
 use flockmate_tests::setpoints::SetpointStats;
+use flockmate_tests::swarms::number;
 use rayon::prelude::*;
 
 /// Random meetings.
@@ -35,6 +38,24 @@ fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
             meeting::line(outcome)
         );
     }
+}
+
+/// Meetings in which something catches a vehicle.
+const CATCHES: u64 = 100;
+
+#[test]
+fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
+    let (first, catches) = (number("FLOCKMATE_CATCHES_FROM", 1), number("FLOCKMATE_CATCHES", CATCHES));
+    let outcomes: Vec<Outcome> = (first..first + catches)
+        .into_par_iter()
+        .map(|seed| meeting::fly(&scene::caught(seed), false))
+        .collect();
+    report(&outcomes);
+    if let Some(bad) = outcomes.iter().find(|outcome| outcome.is_bad()) {
+        meeting::fly(&scene::caught(bad.seed), true).trace.iter().for_each(|line| println!("{line}"));
+    }
+    let sum = meeting::summary(&outcomes);
+    assert_eq!((sum.too_near[0], sum.touches, sum.stuck), (0, [0; 2], [0; 2]), "{sum}");
 }
 
 /// Meetings in which no stop would have kept the distance.

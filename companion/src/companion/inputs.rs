@@ -6,7 +6,7 @@ use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::battery_reported;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
-use crate::mission::{Inputs, MAX_POSITION_AGE, State};
+use crate::mission::{Inputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::Duration;
 
@@ -56,6 +56,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.sought_for(now));
+        let unfollowed = self.guidance.unfollowed_for(now);
+        // What something holds gets nowhere else.
+        let can_leave = unfollowed < UNFOLLOWED_MOST;
         Inputs {
             in_state: self.mission.in_state(now),
             heartbeat_age: t.heartbeat_age(now),
@@ -69,6 +72,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 State::Blocked => (now - self.guidance.progress_at()).max(self.detours.blocked_for(now)),
                 _ => Duration::default(),
             },
+            unfollowed,
             blocked_for: self.detours.blocked_for(now),
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
@@ -156,7 +160,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column_barred: self.guidance.filter.column_barred_for(now),
             column_clear: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
-            can_turn_back: self.guidance.along_m() >= 0.0
+            can_turn_back: can_leave
+                && self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
                 && (self.config.division.is_none() || self.detours.home.seeks())
                 && !self.neighbours.is_deaf(now),
@@ -165,7 +170,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 true => self.guidance.filter.barred_for(now),
                 false => Duration::default(),
             },
-            can_land_aside: self.detours.can_land_aside(&view),
+            can_land_aside: can_leave && self.detours.can_land_aside(&view),
             lands_aside: self.detours.lands(),
             aside_reached: follow
                 && self.detours.is_flying()

@@ -45,6 +45,9 @@ pub(crate) const fn back(
 /// Twice the time by which the armed bit lags behind the ack of arming.
 const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
+/// A vehicle that has stood beside its setpoint for this long is held by something.
+pub(crate) const UNFOLLOWED_MOST: Duration = s(20);
+
 use Action as A;
 use Guard as G;
 use State::*;
@@ -215,6 +218,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Follow],           G::PadTaken,         s(20),  Replanning,      A::RequestLanding, "No room to land: seeking a place aside"),
     info(&[Follow],           G::AsideReached,     AT_ONCE,    Land,            A::AskLand,     "Landing aside"),
     warn(&[Follow],           G::PathBlocked,      AT_ONCE,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),
+    warn(&[Follow, Blocked],  G::Unfollowed,       UNFOLLOWED_MOST, Land,            A::AskLand,     "Setpoint not followed for 20 s: landing"),
     warn(&[Follow],           G::StalledOverField, s(600), Blocked,         A::TurnHome,    "No progress for 10 min: planning the way home"),
     warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),
     info(&[Blocked],          G::PathClear,        AT_ONCE,    Follow,          A::RunPath,     "Path clear again"),

@@ -200,6 +200,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::LiftedOff => i.lifted_off = true,
         G::ClimbDone => i.climb_done = true,
         G::PathDone => i.path_done = true,
+        G::Unfollowed => i.unfollowed = long,
         G::Stalled => i.stalled = long,
         G::PauseCommanded => i.pause = true,
         G::ResumeCommanded => i.resume = true,

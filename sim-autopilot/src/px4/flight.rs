@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::glide::{self, Glide};
 use super::params::Tuning;
-use super::{Commander, Mode, ReturnLeg, SensorReadings};
+use super::{CRAWL_SHARE, Commander, Mode, ReturnLeg, SensorReadings};
 use crate::itinerary::{Leg, on_line};
 use crate::shaping::Ramp;
 use crate::vehicle::Demand;
@@ -22,8 +22,6 @@ const TURN_BEYOND_M: f32 = 2.0;
 /// height, which is also what PX4 controls there; the velocity that it reported meanwhile went up
 /// to 1.6.
 const MAX_LAND_MPS: f32 = 1.3;
-/// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
-const CRAWL_SHARE: f32 = 0.75;
 /// Lag of the measured distance to the ground, seconds: PX4 crawls from 0.85 m on, not from
 /// `MPC_LAND_ALT3`.
 const GROUND_DISTANCE_LAG_S: f32 = 0.2;

@@ -30,18 +30,18 @@ use self::setpoint::Setpoint;
 use super::itinerary::Leg;
 use super::platform::{Integral, Order, SensorReadings};
 use super::shaping::Ramp;
-use super::vehicle::Demand;
 
 /// Delay of the failsafe after `COM_OF_LOSS_T`, seconds: 1.23 s seen at most, and gaps of 1.25 s
 /// trip it.
 const LOSS_REACTION_S: f32 = 0.15;
 /// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3 s seen, before it lifts.
 const IN_AIR_SHARE: f32 = 0.31;
-/// Least demanded sink with which the land detector reports a landing, m/s, whatever flies the vehicle:
-/// at a demand to stay it reports itself in the air, on the ground too. PX4's own
-/// (`MulticopterLandDetector`) reads the velocity of the setpoint alone, and wants 0.275; here the
-/// distance to the setpoint counts too.
-const MIN_LAND_RATE_MPS: f32 = 0.2;
+/// Least commanded sink with which the land detector reports a landing, m/s: 1.1 times the default of
+/// `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). It reads the velocity of the setpoint only, so at a
+/// demand to stay PX4 reports itself in the air, on the ground too, however far below the demand lies.
+const MIN_LAND_RATE_MPS: f32 = 0.275;
+/// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
+const CRAWL_SHARE: f32 = 0.75;
 /// Delay of the land detector's own filters beyond `LNDMC_TRIG_TIME`, seconds.
 const LAND_FILTER_S: f32 = 0.5;
 /// Delay of the automatic disarming beyond `COM_DISARM_LAND`, seconds: 2.2 to 2.4 s after ON_GROUND
@@ -367,8 +367,9 @@ impl Commander {
                 }
             }
             Phase::Flying => {
-                let rate = descent(&demand, sensors, tuning);
-                self.detect_landing(sensors, rate > MIN_LAND_RATE_MPS, tuning);
+                // PX4's own crawl is flown slower here than it commands (`CRAWL_SHARE`).
+                let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_SHARE };
+                self.detect_landing(sensors, -demand.velocity.z >= share * MIN_LAND_RATE_MPS, tuning);
             }
         }
         Order { lift: self.phase != Phase::Ground, integral, demand }
@@ -435,13 +436,6 @@ impl Commander {
             self.phase = Phase::Ground;
         }
     }
-}
-
-/// Rate of sinking that a demand comes to, m/s.
-fn descent(demand: &Demand, sensors: &SensorReadings, tuning: &Tuning) -> f32 {
-    let error = (demand.position.z - sensors.position.z) * tuning.gains.position[1];
-    let feed = demand.velocity.z;
-    -(if error.is_nan() { 0.0 } else { error } + if feed.is_nan() { 0.0 } else { feed })
 }
 
 /// Microseconds of a time in seconds; what is negative or not a number is none.

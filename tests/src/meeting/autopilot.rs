@@ -35,6 +35,15 @@ pub enum Failsafe {
     Return,
 }
 
+/// What a vehicle is caught by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Catch {
+    /// A wall: it goes nowhere but up and down.
+    Wall,
+    /// It rests on something, and moves no more.
+    Ledge,
+}
+
 /// What flies the vehicle at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flown {
@@ -86,6 +95,8 @@ pub struct Autopilot {
     lifted_at: Option<Instant>,
     grounded_since: Option<Instant>,
     armed_at: Instant,
+    /// What it is caught by, and where.
+    caught: Option<(Catch, Point)>,
     guid_timeout_s: f32,
     streams: BTreeSet<u16>,
     sequence: u8,
@@ -129,6 +140,7 @@ impl Autopilot {
             lifted_at: None,
             grounded_since: None,
             armed_at: Instant::ZERO,
+            caught: None,
             guid_timeout_s: 3.0,
             streams: BTreeSet::new(),
             sequence: 0,
@@ -186,6 +198,16 @@ impl Autopilot {
             Failsafe::Return => ardupilot::RTL,
         });
         self.critical = true;
+    }
+
+    /// From now on something keeps it where it is.
+    pub fn catch(&mut self, how: Catch) {
+        self.caught = Some((how, self.position));
+    }
+
+    /// Whether something keeps it where it is.
+    pub fn is_caught(&self) -> bool {
+        self.caught.is_some()
     }
 
     fn enter(&mut self, mode: u32) {

@@ -36,6 +36,8 @@ use crate::setpoints::SetpointStats;
 pub const LIMIT_S: f32 = 180.0;
 /// After everything has happened and all stand, this much is still flown, seconds.
 const AFTERMATH_S: f32 = 3.0;
+/// A landing keeps this much more than the safety distance from what is below, metres.
+const LANDING_DRIFT_M: f32 = 1.0;
 const STEP_MS: u64 = 25;
 
 struct World<'a> {
@@ -52,7 +54,7 @@ pub fn fly(scene: &Scene, traced: bool) -> Outcome {
     let mut oracle = Oracle::new(scene.vehicles.len());
     let mut next = 0;
     let mut rested_s = 0.0;
-    let steps = ((scene::START_S + LIMIT_S) / STEP_S) as usize;
+    let steps = ((scene::START_S + scene.limit_s) / STEP_S) as usize;
     let mut ended_s = 0.0;
     for step in 0..steps {
         let now_s = step as f32 * STEP_S;
@@ -156,6 +158,8 @@ impl<'a> World<'a> {
             What::PilotTakes(_) | What::PilotReturns | What::PilotLands | What::Fails(_) => {}
             What::Dies => member.dead = true,
             What::Cut { sends, hears } => (member.sends, member.hears) = (!sends, !hears),
+            What::Caught(how) if airborne => member.autopilot.catch(how),
+            What::Caught(_) => {}
             What::Healed => (member.sends, member.hears) = (true, true),
         }
     }
@@ -314,6 +318,20 @@ impl<'a> World<'a> {
         }
     }
 
+    /// Whether a vehicle can neither go away nor land: something holds it over another one.
+    fn is_caught_above_another(&self, i: usize) -> bool {
+        let own = &self.members[i];
+        let place = own.autopilot.position;
+        let below = |other: &Member| {
+            let away = place - other.autopilot.position;
+            away.z > 0.0 && away.xy().norm() < scene::SAFETY_M + LANDING_DRIFT_M
+        };
+        let others = self.members.iter().enumerate().filter(|(j, _)| *j != i);
+        own.autopilot.is_caught()
+            && own.companion.state() == State::LandingHeld
+            && others.into_iter().any(|(_, other)| below(other))
+    }
+
     fn outcome(self, oracle: Oracle, ended_s: f32) -> Outcome {
         let scene = self.scene;
         let mut setpoints = SetpointStats::default();
@@ -323,7 +341,8 @@ impl<'a> World<'a> {
         for (i, member) in self.members.iter().enumerate() {
             setpoints.merge(&member.autopilot.check.stats);
             unfit.extend(member.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())));
-            if member.autopilot.armed || member.autopilot.is_airborne() {
+            if (member.autopilot.armed || member.autopilot.is_airborne()) && !self.is_caught_above_another(i)
+            {
                 stuck.push((i, member.companion.state()));
             }
             let goal = landing(&scene.vehicles[i].plan);

@@ -17,11 +17,14 @@ pub use self::types::{
     VEHICLES, Vehicle, WAYPOINTS, What,
 };
 use self::ways::{KINDS, Shape, fits, flight, pads, way};
-use super::autopilot::Failsafe;
+use super::LIMIT_S;
+use super::autopilot::{Catch, Failsafe};
 use super::dice::Dice;
 
 /// No vehicle departs later, seconds.
 const LATEST_S: f32 = 40.0;
+/// A meeting in which something catches a vehicle is over by then, seconds after its start.
+const CAUGHT_LIMIT_S: f32 = 360.0;
 
 /// Height of the ground below a place: a platform under each pad and goal that is not on the floor.
 pub fn floor_z(vehicles: &[Vehicle], place: &Point) -> f32 {
@@ -45,6 +48,22 @@ pub fn landing(plan: &Plan) -> Option<Point> {
 pub fn scene(seed: u64) -> Scene {
     // A draw that leaves one vehicle alone is no meeting.
     (0..).find_map(|draw| drawn(seed, draw)).expect("some draw has room for two")
+}
+
+/// The scene of a seed in which something catches a vehicle, at any time of its flight, and nothing else happens.
+pub fn caught(seed: u64) -> Scene {
+    let mut scene = scene(seed);
+    let mut dice = Dice::new(seed ^ 0xCA06);
+    scene.happenings.retain(|happening| happening.what == What::Start);
+    let vehicle = dice.below(scene.vehicles.len());
+    let at_s = START_S + scene.vehicles[vehicle].plan.depart_s + dice.real(3.0, 20.0);
+    let how = if dice.chance(0.5) { Catch::Wall } else { Catch::Ledge };
+    scene.happenings.push(Happening { at_s, vehicle, what: What::Caught(how) });
+    scene.happenings.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    // Those that waited for it, one after the other, fly around it or land.
+    scene.limit_s = CAUGHT_LIMIT_S;
+    scene.liar = None;
+    scene
 }
 
 fn drawn(seed: u64, draw: u64) -> Option<Scene> {
@@ -102,7 +121,7 @@ fn drawn(seed: u64, draw: u64) -> Option<Scene> {
         };
         (dice.below(vehicles.len()), lie)
     });
-    Some(Scene { seed, kind, on_plan, vehicles, happenings, delay_s, loss, liar })
+    Some(Scene { seed, kind, on_plan, limit_s: LIMIT_S, vehicles, happenings, delay_s, loss, liar })
 }
 
 fn vehicle(

@@ -6,8 +6,10 @@ use companion::autopilot::{ardupilot, px4};
 use nalgebra::Vector3;
 use planner_core::Point;
 
-use super::{ARDUPILOT_LOITER, Autopilot, PX4_POSITION, STEP_S};
+use super::{ARDUPILOT_LOITER, Autopilot, Catch, PX4_POSITION, STEP_S};
 
+/// Slowest setpoint with which PX4 looks for the ground, m/s.
+const MIN_SINK_MPS: f32 = 0.275;
 /// Height over home that a return climbs to, metres.
 const RETURN_M: f32 = 6.0;
 
@@ -72,6 +74,27 @@ impl Autopilot {
         wanted
     }
 
+    /// Keeps a vehicle that is caught where it is; returns the height of what it rests on.
+    fn keep_caught(&mut self) -> Option<f32> {
+        let (how, place) = self.caught?;
+        let ledge = how == Catch::Ledge;
+        (self.position.x, self.position.y) = (place.x, place.y);
+        (self.velocity.x, self.velocity.y) = (0.0, 0.0);
+        if ledge {
+            (self.position.z, self.velocity.z) = (place.z, 0.0);
+        }
+        ledge.then_some(place.z)
+    }
+
+    /// Whether the land detector looks for the ground: PX4's does while the setpoint's velocity sinks, above 1.1 times
+    /// `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
+    fn detects_ground(&self) -> bool {
+        self.kind != Kind::Px4
+            || self.mode != self.kind.setpoint_mode()
+            || self.lifted_at.is_none()
+            || self.target.is_none_or(|target| target.velocity.z < -MIN_SINK_MPS)
+    }
+
     fn landing_mps(&self, floor_z: f32) -> f32 {
         let height = self.position.z - floor_z;
         match self.kind {
@@ -92,6 +115,7 @@ impl Autopilot {
         self.acceleration += (wanted - self.acceleration) * (STEP_S / 0.12);
         self.velocity += self.acceleration * STEP_S;
         self.position += self.velocity * STEP_S;
+        let floor_z = self.keep_caught().unwrap_or(floor_z);
         // A floor is met from above only.
         if self.position.z <= floor_z && self.position.z > floor_z - 0.3 {
             self.position.z = floor_z;
@@ -103,7 +127,7 @@ impl Autopilot {
             self.airborne = true;
             self.lifted_at = Some(now);
         }
-        let rests = (-0.3..0.03).contains(&height) && self.velocity.z < 0.05;
+        let rests = (-0.3..0.03).contains(&height) && self.velocity.z < 0.05 && self.detects_ground();
         self.grounded_since = if rests { self.grounded_since.or(Some(now)) } else { None };
         let rested_s = self.grounded_since.map_or(0.0, |at| (now - at).secs_f32());
         if rested_s > 0.6 {

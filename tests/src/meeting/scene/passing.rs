@@ -5,8 +5,8 @@ use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
 use super::types::{Happening, SCHEDULE, START_S, Scene, WAYPOINTS, What};
-use super::vehicle;
 use super::ways::{Way, at_height, flight};
+use super::{LIMIT_S, vehicle};
 use crate::meeting::dice::Dice;
 
 /// How two vehicles pass in [`passing`].
@@ -63,6 +63,7 @@ pub fn passing(seed: u64) -> Scene {
         seed,
         kind,
         on_plan: true,
+        limit_s: LIMIT_S,
         vehicles,
         happenings: vec![start(0), start(1)],
         delay_s: (0.3, 0.3),

@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::schedule::ScheduleConfig;
 
-use crate::meeting::autopilot::Failsafe;
+use crate::meeting::autopilot::{Catch, Failsafe};
 
 /// Waypoints of a path.
 pub const WAYPOINTS: usize = 16;
@@ -82,6 +82,8 @@ pub enum What {
     },
     /// Its radio works again.
     Healed,
+    /// It touches what is on no map, and can go no further.
+    Caught(Catch),
 }
 
 /// What happens, when, and to which vehicle.
@@ -121,6 +123,8 @@ pub struct Scene {
     pub on_plan: bool,
     /// The vehicles.
     pub vehicles: Vec<Vehicle>,
+    /// It is over by then, seconds after its start.
+    pub limit_s: f32,
     /// What happens, by time.
     pub happenings: Vec<Happening>,
     /// Least and greatest delay of the radio, seconds.

@@ -54,7 +54,7 @@ pub(super) fn takes_over(scenes: &mut Scenes) {
 pub(super) fn does_not_do_as_asked(scenes: &mut Scenes) {
     scenes.play(landing(), |b| b.run(125.0), Land, 1.0);
     scenes.play(to(Climb), |b| stuck(b, 61.0), Aborted, 30.0);
-    scenes.play(flying(), |b| stuck(b, 610.0), Aborted, 30.0);
+    scenes.play(flying(), |b| stuck(b, 25.0), Aborted, 30.0);
     let stays_armed = |b: &mut Bench| {
         b.stays_armed = true;
         b.refused.push(400);

@@ -28,7 +28,7 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
     far.radio_range_m = 5.0;
     let mut gated = plan();
     gated.gates.push(Gate { at_m: 0.5, id: 77, until_m: 6.0 }).unwrap();
-    for (clear_m, end) in [(50.0, Done), (5.0, Aborted)] {
+    let gated_until = |clear_m| {
         let mut bench = Bench::new(far.clone());
         bench.answer_plan = Some(Ok(gated.clone()));
         bench.neighbour = Some((Point::new(8.0, 60.0, 10.0), FLYING | ON_PLAN, 5.0, 5));
@@ -36,12 +36,17 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
         bench.until(Ready, 6.0);
         bench.start();
         bench.until(Follow, 30.0);
+        bench
+    };
+    for (clear_m, end) in [(50.0, Done), (5.0, Aborted)] {
         let out_of_range = |b: &mut Bench| {
             b.neighbour = None;
             b.until(Alone, 10.0);
         };
-        scenes.play(bench, out_of_range, end, 60.0);
+        scenes.play(gated_until(clear_m), out_of_range, end, 60.0);
     }
+    // It is heard, and never passes the place that opens the gate.
+    scenes.play(gated_until(5.0), |b| b.run(605.0), Aborted, 60.0);
     // A third vehicle is never heard: nobody knows that it stands.
     let mut three = two_vehicles();
     three.roster.push(RosterEntry { system_id: 78, ..three.roster[1] }).unwrap();
