@@ -23,7 +23,7 @@ pub const BINARY_BYTES: u64 = 1 << 26;
 /// It cannot be read, is not a regular file, or is longer.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     // Asked before it is opened: opening a FIFO waits for its other end.
-    let length = regular(path)?;
+    let length = regular_file_len(path)?;
     let too_long = || io::Error::other(format!("it is longer than {most} bytes"));
     if length > most {
         return Err(too_long());
@@ -46,21 +46,21 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// There is none, or it is something else.
-pub fn regular(path: &Path) -> io::Result<u64> {
+pub fn regular_file_len(path: &Path) -> io::Result<u64> {
     let metadata = fs::metadata(path)?;
     let kind = if metadata.is_dir() { "it is a directory" } else { "it is not a regular file" };
     if metadata.is_file() { Ok(metadata.len()) } else { Err(io::Error::other(kind)) }
 }
 
 /// Files that a command writes into one directory: all of them, or none.
-pub struct Results {
+pub struct ResultFiles {
     dir: PathBuf,
     /// Directories made for them, the innermost first.
     made: Vec<PathBuf>,
     files: Vec<(NamedTempFile, PathBuf)>,
 }
 
-impl Results {
+impl ResultFiles {
     /// Makes the directory and tries whether it takes files of these names. It is gone again if nothing is kept in it.
     ///
     /// # Errors
@@ -95,7 +95,7 @@ impl Results {
         let cannot = || format!("cannot write: {}", quoted_path(&path));
         match fs::canonicalize(&path) {
             Ok(real) => {
-                regular(&real).with_context(cannot)?;
+                regular_file_len(&real).with_context(cannot)?;
                 let writable = fs::OpenOptions::new().append(true).open(&real);
                 writable.map(|_| real).with_context(cannot)
             }
@@ -141,7 +141,7 @@ impl Results {
     ///
     /// # Errors
     /// One of them cannot be renamed.
-    pub fn keep(mut self) -> anyhow::Result<()> {
+    pub fn commit(mut self) -> anyhow::Result<()> {
         let files = std::mem::take(&mut self.files);
         let mut replaced = Vec::new();
         for (file, target) in files {
@@ -180,7 +180,7 @@ fn put_back(target: &Path, before: Option<TempPath>) {
     };
 }
 
-impl Drop for Results {
+impl Drop for ResultFiles {
     fn drop(&mut self) {
         self.files.clear();
         for dir in &self.made {
@@ -211,34 +211,34 @@ mod tests {
     fn results_are_written_all_or_none() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("a/b");
-        let mut results = Results::open(&out, &["one", "two"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "two"]).unwrap();
         results.add("one", b"1").unwrap();
         drop(results);
         assert!(!folder.path().join("a").exists(), "nothing is left of what was not kept");
 
-        let mut results = Results::open(&out, &["one", "two"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "two"]).unwrap();
         results.add("one", b"1").unwrap();
         assert!(!out.join("one").exists());
         results.add("two", b"2").unwrap();
-        results.keep().unwrap();
+        results.commit().unwrap();
         let names: Vec<_> = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!((names.len(), fs::read(out.join("two")).unwrap()), (2, b"2".to_vec()));
 
         // A file that cannot have its name, here since a folder has it by now, leaves all that was
         // there before.
-        let mut results = Results::open(&out, &["one", "three", "last"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "three", "last"]).unwrap();
         for name in ["one", "three", "last"] {
             results.add(name, b"new").unwrap();
         }
         fs::create_dir_all(out.join("last/full")).unwrap();
-        assert!(results.keep().is_err());
+        assert!(results.commit().is_err());
         assert_eq!(fs::read(out.join("one")).unwrap(), b"1");
         assert!(!out.join("three").exists() && out.join("last/full").is_dir());
         assert_eq!(fs::read_dir(&out).unwrap().count(), 3, "one, two, and the folder");
         fs::remove_dir_all(out.join("last")).unwrap();
 
         // Another run that fails leaves the results of the first.
-        let mut results = Results::open(&out, &["one", "two"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "two"]).unwrap();
         results.add("one", b"other").unwrap();
         drop(results);
         assert_eq!(fs::read(out.join("one")).unwrap(), b"1");
@@ -250,10 +250,10 @@ mod tests {
         fs::write(folder.path().join("file"), b"").unwrap();
         fs::create_dir_all(folder.path().join("out/result.json")).unwrap();
         for (dir, name) in [("file", "result.json"), ("file/x", "result.json"), ("out", "result.json")] {
-            assert!(Results::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
+            assert!(ResultFiles::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
         }
         for path in ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y", "/tmp/x/"] {
-            assert!(Results::file(Path::new(path)).is_err(), "{path}");
+            assert!(ResultFiles::file(Path::new(path)).is_err(), "{path}");
         }
         assert!(!folder.path().join("file/x").exists());
     }
@@ -265,9 +265,9 @@ mod tests {
         let (real, link) = (folder.path().join("real"), folder.path().join("link"));
         fs::write(&real, b"old").unwrap();
         std::os::unix::fs::symlink(&real, &link).unwrap();
-        let mut results = Results::file(&link).unwrap();
+        let mut results = ResultFiles::file(&link).unwrap();
         results.add_file(&link, b"new").unwrap();
-        results.keep().unwrap();
+        results.commit().unwrap();
         assert_eq!(fs::read(&real).unwrap(), b"new");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
     }

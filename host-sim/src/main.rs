@@ -48,7 +48,7 @@ const BAD_INPUT: u8 = 2;
 fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(cli) => run(cli.command),
-        Err(error) => refused(&error),
+        Err(error) => print_argument_error(&error),
     };
     // Results that nobody could read are none.
     let done = done.and_then(|code| progress::printed().map(|()| code));
@@ -76,7 +76,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
 }
 
 /// A command line that is no command: help that was asked for, or one line that says what is wrong, and a hint.
-fn refused(error: &clap::Error) -> anyhow::Result<ExitCode> {
+fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
     if asked {
         let text = error.render();

@@ -8,7 +8,7 @@ pub const MAX_QUOTE_CHARS: usize = 200;
 const MAX_ERROR_CHARS: usize = 600;
 
 /// A character that changes how a terminal shows what stands around it.
-fn is_code(c: char) -> bool {
+fn is_control_code(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
 }
@@ -27,7 +27,7 @@ pub fn quoted_path(path: &Path) -> String {
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        if is_code(c) {
+        if is_control_code(c) {
             out.extend(c.escape_default());
         } else {
             out.push(c);
@@ -95,8 +95,8 @@ mod tests {
         #[test]
         fn whatever_is_quoted_is_short_and_without_codes(text in "(?s).{0,700}") {
             let short = quoted(&text);
-            prop_assert!(short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_code), "{short:?}");
-            prop_assert!(message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_code)));
+            prop_assert!(short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_control_code), "{short:?}");
+            prop_assert!(message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_control_code)));
         }
     }
 }

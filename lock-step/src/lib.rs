@@ -93,9 +93,9 @@ pub enum FromBoard {
 }
 
 /// Kind, port, length, address, time.
-type Fields = (u8, u8, u16, u32, u64);
+type HeaderFields = (u8, u8, u16, u32, u64);
 
-fn to_bytes((kind, port, len, address, time): Fields) -> [u8; HEAD] {
+fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEAD] {
     let mut head = [0; HEAD];
     (head[0], head[1]) = (kind, port);
     head[2..4].copy_from_slice(&len.to_le_bytes());
@@ -104,7 +104,7 @@ fn to_bytes((kind, port, len, address, time): Fields) -> [u8; HEAD] {
     head
 }
 
-fn from_bytes(head: &[u8; HEAD]) -> Fields {
+fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
     let [kind, port, l0, l1, a0, a1, a2, a3, time @ ..] = *head;
     (kind, port, u16::from_le_bytes([l0, l1]), u32::from_le_bytes([a0, a1, a2, a3]), u64::from_le_bytes(time))
 }
@@ -135,7 +135,7 @@ impl ToBoard {
     }
 
     /// Bytes that follow.
-    pub fn follows(self) -> usize {
+    pub fn payload_len(self) -> usize {
         match self {
             Self::Bytes { len, .. } | Self::Poke { len, .. } => len.into(),
             Self::Run { .. } | Self::Peek { .. } | Self::Call { .. } => 0,
@@ -167,7 +167,7 @@ impl FromBoard {
     }
 
     /// Bytes that follow.
-    pub fn follows(self) -> usize {
+    pub fn payload_len(self) -> usize {
         match self {
             Self::Sent { len, .. } | Self::Memory { len } => len.into(),
             Self::Started | Self::Waits { .. } => 0,

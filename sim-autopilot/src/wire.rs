@@ -7,9 +7,9 @@
 use super::frame::Frame;
 
 /// A payload with its cut zeros put back.
-pub struct Fields<'a>(&'a [u8; 255]);
+pub struct PayloadReader<'a>(&'a [u8; 255]);
 
-impl<'a> Fields<'a> {
+impl<'a> PayloadReader<'a> {
     /// Fields of a frame.
     pub fn new(frame: &'a Frame) -> Self {
         Self(frame.padded())

@@ -51,7 +51,7 @@ pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Res
     let mut flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
     pictures.iter_mut().for_each(|picture| picture.t_s = 0.0);
     pictures.append(&mut flight.pictures);
-    let judged = flown::judge(&mission.scenario, &plan, pictures.clone())?;
+    let judged = flown::judge_pictures(&mission.scenario, &plan, pictures.clone())?;
     flight.result.complete &= judged.complete;
     flight.result.coverage = Some(judged.result);
     Ok(flight)

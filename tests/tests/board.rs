@@ -6,8 +6,8 @@
 
 use std::collections::HashMap;
 
-use firmware::calls::limits::{self, Answers, Listener};
-use firmware::calls::limits_routes::{self, Lent};
+use firmware::calls::limits::{self, CallListener, ResultChecksum};
+use firmware::calls::limits_routes::{self, RouteWorkspaces};
 use firmware::cases::{self, Workspace};
 use flockmate_tests::{board, workspace};
 use host_sim::map::{Unknown, building};
@@ -63,7 +63,7 @@ fn the_board_computes_what_the_desk_computes() {
 /// Counts calls.
 struct Calls(usize);
 
-impl Listener for Calls {
+impl CallListener for Calls {
     fn next(&mut self, _name: &'static str) {
         self.0 += 1;
     }
@@ -73,10 +73,10 @@ impl Listener for Calls {
 fn at_its_limits_the_board_answers_as_the_desk_does() {
     let Some(program) = board::program("limits") else { return };
     let mut calls = Calls(0);
-    let mut answers = Answers::new(&mut calls);
-    limits::places(&mut answers);
+    let mut answers = ResultChecksum::new(&mut calls);
+    limits::call_without_roadmap(&mut answers);
     let places = answers.sum();
-    let routes = limits_routes::routes(&mut answers, &mut Box::new(Lent::new()));
+    let routes = limits_routes::call_all(&mut answers, &mut Box::new(RouteWorkspaces::new()));
     let expected = format!("limits {} {places:08x} {routes:08x?}", calls.0);
     // Neither roadmap nor map is read.
     let lines = board::measure(&program, &[0], &[0]);

@@ -172,7 +172,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             let plan = |nodes| {
                 let mut mission = prepare(start, goal, nodes).ok()?;
                 let plan = mission.plan().ok()?;
-                let lines = shortage::lines(&mission, &plan);
+                let lines = shortage::shortage_lines(&mission, &plan);
                 Some((lines.iter().any(|line| line.contains("the map has one")), mission, plan))
             };
             // More nodes where the map itself has a way that the roadmap has not: as the program suggests.
@@ -181,7 +181,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 missed += 1;
                 continue;
             };
-            if !plan.flights[0].task.flies() {
+            if !plan.flights[0].task.leaves_pad() {
                 walled_off += 1;
                 continue;
             }

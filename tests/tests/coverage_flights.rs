@@ -183,7 +183,9 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
         let scenario = scenario::parse(&text, "area").expect("a scenario");
         let mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let radius_m = mission.scenario.vehicles[0].radius_m;
-        let pace = |bound_m: f32| margins::pace(bound_m, mission.tasks[0].required_clearance_m, radius_m);
+        let pace = |bound_m: f32| {
+            margins::speed_share_for_bound(bound_m, mission.tasks[0].required_clearance_m, radius_m)
+        };
         let room_m = (separation_m - safety_m) / 2.0 - TRACKING_M;
         assert_eq!(pace(room_m - 0.01), 1.0, "{separation_m} m beyond {safety_m} m");
         assert!(pace(room_m + 0.01) < 1.0, "{separation_m} m beyond {safety_m} m");

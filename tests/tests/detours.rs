@@ -10,7 +10,7 @@ use host_sim::capacity::BOARDS;
 use host_sim::map::{self, Unknown, VoxelMap, building};
 use host_sim::roadmap::{self, Roadmap};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{Config, Sampling};
@@ -49,7 +49,7 @@ fn files(map: &VoxelMap, clearance_m: f32) -> Files {
         sampling: Sampling::Uniform,
     };
     let (roadmap, _) = roadmap::build(map, &[], &config).expect("there is free space");
-    let roadmap = roadmap.fit(&BOARDS[0]).expect("it can be cut down");
+    let roadmap = roadmap.fit_to_board(&BOARDS[0]).expect("it can be cut down");
     let header = roadmap::header(&config, Geodetic::default(), 0, GOALS);
     let Roadmap { nodes, edges, .. } = &roadmap;
     let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
@@ -78,7 +78,7 @@ fn grounds(name: &str, map: &VoxelMap, view: &RoadmapView<'_>, dice: &mut Dice) 
     for _ in 0..PLACES {
         let place = on_edge(view, dice);
         let truth_m = map.ground_below(&place).unwrap_or(f32::NEG_INFINITY);
-        match view.ground_around(&place) {
+        match view.ground_range_near(&place) {
             None => unknown += 1,
             Some((low_m, high_m)) => {
                 deeper += usize::from(truth_m < low_m - 0.5);
@@ -104,11 +104,11 @@ type Planned = Result<Vec<Point>, DetourError>;
 fn planned<const N: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
-    thing: KeepOff,
+    thing: KeepOutZone,
     ws: &mut SearchWorkspace<N>,
 ) -> Planned {
     let (mut nodes, mut path) = (Few::<u16, 64>::new(), Path::<64>::new());
-    detour::plan(view, request, &mut [thing], ws, &mut nodes, &mut path)?;
+    detour::plan_detour(view, request, &mut [thing], ws, &mut nodes, &mut path)?;
     Ok(path.waypoints().iter().map(|w| w.position).collect())
 }
 
@@ -151,8 +151,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
             fence: None,
         };
         let deep = Point::new(silent.x, silent.y, silent.z - 60.0);
-        let column = KeepOff { from: silent, to: deep, radius_m: KEPT_M, nature: Nature::Lying };
-        let exact = KeepOff { from: lies, to: lies, ..column };
+        let column = KeepOutZone { from: silent, to: deep, radius_m: KEPT_M, kind: ZoneKind::Grounded };
+        let exact = KeepOutZone { from: lies, to: lies, ..column };
         let by_desk = planned(&new, &request, column, &mut desk);
         let by_board = planned(&new, &request, column, &mut board);
         assert_eq!(by_desk, by_board, "desk and board fly other ways");

@@ -256,7 +256,7 @@ impl Short {
         let mut rng = Random::new(seed);
         let swarm = Swarm::small(count, &mut rng);
         let plan = if swarm.tasks.len() == count { swarm.plan().ok()? } else { return None };
-        if plan.flights.iter().any(|f| !f.task.flies() || end_m(f) + f.climb_m > LONGEST_M) {
+        if plan.flights.iter().any(|f| !f.task.leaves_pad() || end_m(f) + f.climb_m > LONGEST_M) {
             return None;
         }
         let owns = swarm.owns(&plan).expect("an Ok plan has all parts");

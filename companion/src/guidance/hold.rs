@@ -24,8 +24,8 @@ pub(crate) struct Hold {
     since: Option<Instant>,
     on: bool,
     /// When that was last sent to others, and how late they hear it.
-    told_at: Option<Instant>,
-    late: Duration,
+    reported_at: Option<Instant>,
+    message_delay: Duration,
 }
 
 impl Hold {
@@ -33,7 +33,7 @@ impl Hold {
     /// goes first. Messages are `late_s` late. Returns whether the vehicle begins or ends to hold.
     pub(super) fn step(&mut self, stands: bool, yields: bool, late_s: f32, now: Instant) -> bool {
         if stands {
-            self.late = Duration::from_micros((late_s * 1e6) as u64);
+            self.message_delay = Duration::from_micros((late_s * 1e6) as u64);
         }
         self.since = self.since.or(Some(now)).filter(|_| stands);
         let patience = if yields { YIELDING_STANDSTILL } else { FIRST_STANDSTILL };
@@ -47,12 +47,12 @@ impl Hold {
     }
 
     /// Notes that the hold was reported.
-    pub(crate) fn note(&mut self, now: Instant) {
-        self.told_at = Some(now);
+    pub(crate) fn note_reported(&mut self, now: Instant) {
+        self.reported_at = Some(now);
     }
 
     /// Whether others may still count on it.
-    pub(super) fn binds(&self, now: Instant) -> bool {
-        self.told_at.is_some_and(|at| now < (at + HOLD_REPORT_LIFETIME) + self.late)
+    pub(super) fn is_binding(&self, now: Instant) -> bool {
+        self.reported_at.is_some_and(|at| now < (at + HOLD_REPORT_LIFETIME) + self.message_delay)
     }
 }

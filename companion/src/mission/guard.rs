@@ -4,7 +4,7 @@ use crate::time::Duration;
 
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500); // Age up to which a position is known.
 
-/// Condition of a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
+/// Condition of a row. Every guard is a field, or a comparison of fields, of [`GuardInputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
     /// HEARTBEAT was heard within the last second and a half.
@@ -209,9 +209,9 @@ pub enum Guard {
 
 /// Inputs of the guards: a snapshot of the vehicle, the commands and the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Inputs {
+pub struct GuardInputs {
     /// Time in the state.
-    pub in_state: Duration,
+    pub time_in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
     pub heartbeat_age: Duration,
     /// Time since the last usable position.
@@ -219,7 +219,7 @@ pub struct Inputs {
     /// The position jumped lately.
     pub jumped: bool,
     /// Time without progress along the path.
-    pub stalled: Duration,
+    pub stalled_for: Duration,
     /// Time since its path was first blocked, short of where it has come no further; clear in between or not.
     pub blocked_for: Duration,
     /// Time in the state without any neighbour heard; zero when all have landed.
@@ -257,7 +257,7 @@ pub struct Inputs {
     /// On the pad: the estimate's bound does not fit into the margin at cruise speed.
     pub imprecise: bool,
     /// Time for which it has not even fitted at a crawl.
-    pub vague: Duration,
+    pub imprecise_for: Duration,
     /// The EKF origin moved while armed.
     pub origin_moved: bool,
     /// MISSION_START holds.
@@ -285,7 +285,7 @@ pub struct Inputs {
     /// The vehicle is to fly home, or does.
     pub homeward: bool,
     /// Time for which the vehicle has sought its way home, if it does.
-    pub sought_home: Option<Duration>,
+    pub seeking_home_for: Option<Duration>,
     /// The vehicle stands, and may request its way home.
     pub stands_to_return: bool,
     /// The climb is not done: it goes on after the interruption.
@@ -299,7 +299,7 @@ pub struct Inputs {
     /// Disarming was refused.
     pub disarm_refused: bool,
     /// The setpoint mode was entered for this mission and not left since.
-    pub ours: bool,
+    pub in_own_mode: bool,
     /// The mode is the one that lands.
     pub landing: bool,
     /// The mode is Offboard or Guided.
@@ -311,7 +311,7 @@ pub struct Inputs {
     /// The landing detector says ground.
     pub on_ground: bool,
     /// The landing detector said air since the motors were armed.
-    pub flown: bool,
+    pub has_flown: bool,
     /// Moves up or down.
     pub vertical: bool,
     /// Motors on, and the landing detector says air.
@@ -329,11 +329,11 @@ pub struct Inputs {
     /// The way back to the path is free.
     pub near_path: bool,
     /// Time for which another vehicle has been in the column to the ground, or before take-off in the column to its top.
-    pub column_blocked: Duration,
+    pub column_blocked_for: Duration,
     /// Time for which a vehicle that stands for good, or is lost, has been in that column.
-    pub column_barred: Duration,
+    pub column_blocked_for_good_for: Duration,
     /// Time for which that column has been free.
-    pub column_clear: Duration,
+    pub column_clear_for: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
     /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way by a vehicle that stands for good.
@@ -347,9 +347,9 @@ pub struct Inputs {
     /// The vehicle must land: the battery is nearly empty, or the place to hold at is unknown.
     pub must_land: bool,
     /// Time for which the safety filter has made it yield.
-    pub yielded: Duration,
+    pub yielded_for: Duration,
     /// Time for which the safety filter has kept it from going on.
-    pub hindered: Duration,
+    pub hindered_for: Duration,
     /// Battery charge below the configured limit.
     pub battery_low: bool,
     /// Battery charge below half of it.
@@ -367,7 +367,7 @@ pub struct Inputs {
     /// No way around was found, often enough.
     pub no_way_around: bool,
     /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
-    pub underneath: Duration,
+    pub time_below_landing: Duration,
     /// The vehicle moves more slowly than a hovering vehicle sways.
     pub standing: bool,
 }
@@ -375,15 +375,15 @@ pub struct Inputs {
 /// Longest wait above a vehicle that rests: a vehicle that rests makes no room.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
-impl Inputs {
+impl GuardInputs {
     /// Whether it may turn home over a field, and has not yet.
-    fn turns_home(&self) -> bool {
-        self.over_field && self.sought_home.is_none()
+    fn may_turn_home(&self) -> bool {
+        self.over_field && self.seeking_home_for.is_none()
     }
 
     /// Whether the column has not been free for `limit`, or a vehicle stands in it for good.
-    fn no_room_for(&self, limit: Duration) -> bool {
-        self.column_blocked >= limit || self.column_barred >= MAX_WAIT_ABOVE_RESTING
+    fn is_landing_blocked_for(&self, limit: Duration) -> bool {
+        self.column_blocked_for >= limit || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
     }
 }
 
@@ -392,7 +392,7 @@ pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
     /// Whether it holds, and has held for `limit`.
-    pub fn holds(self, i: &Inputs, limit: Duration) -> bool {
+    pub fn is_met(self, i: &GuardInputs, limit: Duration) -> bool {
         match self {
             Self::AutopilotHeard => i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::NoHeartbeat => i.heartbeat_age > limit,
@@ -418,68 +418,76 @@ impl Guard {
             Self::AwayFromStart => i.position_age < MAX_POSITION_AGE && !i.at_start,
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
-            Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
-            Self::EstimateVague => i.vague > limit,
+            Self::StartVague => i.start && i.imprecise && i.time_in_state >= limit,
+            Self::EstimateVague => i.imprecise_for > limit,
             Self::OriginMoved => i.origin_moved,
             Self::GatesOpen => i.gates_open,
-            Self::Elapsed => i.in_state >= limit,
+            Self::Elapsed => i.time_in_state >= limit,
             Self::Offboard => i.offboard,
             Self::ModeTaken => i.mode_foreign && !i.critical,
             Self::FailsafeActs => i.mode_foreign && i.critical,
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
             Self::DisarmedAtGoal => !i.armed && i.at_goal,
-            Self::StaysArmed => i.armed && i.in_state >= limit,
-            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE,
+            Self::StaysArmed => i.armed && i.time_in_state >= limit,
+            Self::StaysDisarmed => {
+                !i.armed && i.time_in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE
+            }
             Self::StaysDisarmedPaused => {
-                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start && i.pause
+                !i.armed
+                    && i.time_in_state >= limit
+                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
+                    && i.start
+                    && i.pause
             }
             Self::ArmedUnseen => i.armed_unseen,
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
-            Self::Unattended => i.airborne && i.offboard && i.ours && i.heartbeat_age < MAX_HEARTBEAT_AGE,
+            Self::Unattended => {
+                i.airborne && i.offboard && i.in_own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE
+            }
             Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
             Self::PathDone => i.path_done,
-            Self::Stalled => i.stalled >= limit,
+            Self::Stalled => i.stalled_for >= limit,
             Self::PauseCommanded => i.pause,
             Self::ResumeCommanded => i.resume,
             Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,
             Self::BackOffPath => i.position_age < MAX_POSITION_AGE && !i.near_path,
             Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
-            Self::PausedOnPad => i.pause && i.in_state >= limit,
+            Self::PausedOnPad => i.pause && i.time_in_state >= limit,
             Self::LandCommanded => i.land,
             Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::ReturnOverField => i.turn_back && i.over_field,
-            Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.turns_home(),
-            Self::YieldedOverField => i.yielded >= limit && i.turns_home(),
-            Self::HinderedOverField => i.hindered >= limit && i.turns_home(),
-            Self::StalledOverField => i.stalled >= limit && i.turns_home(),
+            Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.may_turn_home(),
+            Self::YieldedOverField => i.yielded_for >= limit && i.may_turn_home(),
+            Self::HinderedOverField => i.hindered_for >= limit && i.may_turn_home(),
+            Self::StalledOverField => i.stalled_for >= limit && i.may_turn_home(),
             Self::StandsToReturn => i.stands_to_return,
             Self::WayHomeReady => i.detour_ready && i.homeward,
-            Self::NoWayHome => i.sought_home.is_some_and(|sought| sought >= limit) && i.can_turn_back,
-            Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
-            Self::NoRoomToLand => i.no_room_for(limit) && i.offboard && i.can_turn_back,
-            Self::NoRoomHere => i.no_room_for(limit) && i.offboard && i.can_land_aside,
+            Self::NoWayHome => i.seeking_home_for.is_some_and(|sought| sought >= limit) && i.can_turn_back,
+            Self::LandingBlocked => i.column_blocked_for > Duration::default() && !i.must_land,
+            Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
+            Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.pad_blocked_for >= limit && i.can_land_aside,
             Self::NoPlaceAside => i.plan_failed && i.lands_aside,
             Self::AsideReached => i.aside_reached,
-            Self::LandingClear => i.column_clear >= limit,
-            Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
-            Self::Yielded => i.yielded >= limit && i.sought_home.is_none(),
-            Self::Hindered => i.hindered >= limit && i.sought_home.is_none(),
+            Self::LandingClear => i.column_clear_for >= limit,
+            Self::ColumnBlocked => i.column_blocked_for.min(i.time_in_state) >= limit,
+            Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
+            Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::WayFree => i.way_free,
-            Self::OutOfRange => i.out_of_range && i.in_state >= limit,
+            Self::OutOfRange => i.out_of_range && i.time_in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
-            Self::OnGround => i.on_ground && !i.vertical && (i.flown || i.landing),
+            Self::OnGround => i.on_ground && !i.vertical && (i.has_flown || i.landing),
             Self::PathBlocked => i.blocked,
             Self::PathClear => !i.blocked,
             Self::OurTurn => i.our_turn,
@@ -487,11 +495,11 @@ impl Guard {
             Self::DetourFailed => i.plan_failed,
             Self::NoWayAround => i.no_way_around && i.room_below,
             Self::NoWayOn => i.no_way_around && i.can_turn_back,
-            Self::Underneath => i.underneath > limit,
+            Self::Underneath => i.time_below_landing > limit,
             Self::Standing => i.standing,
             Self::Excluded => i.excluded,
             Self::MoreIsDone => i.more_is_done,
-            Self::PlansDiffer => i.plans_differ && i.in_state >= limit,
+            Self::PlansDiffer => i.plans_differ && i.time_in_state >= limit,
             Self::HoldsToDivide => i.holds_to_divide,
             Self::DivisionReady => i.division_ready,
             Self::NothingToDivide => i.undivided,

@@ -8,8 +8,8 @@ mod camera;
 
 use planner_core::flight::{Path, Task};
 
-pub(crate) use self::along::{Along, Place};
-use self::camera::Camera;
+pub(crate) use self::along::{PathProgress, PathRelation};
+use self::camera::CameraControl;
 use crate::autopilot::telemetry::Ack;
 use crate::link::Links;
 use crate::time::Instant;
@@ -17,7 +17,7 @@ use crate::time::Instant;
 /// Memory of the tasks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tasks {
-    camera: Camera,
+    camera: CameraControl,
 }
 
 impl Tasks {
@@ -31,7 +31,7 @@ impl Tasks {
         &mut self,
         task: &Task,
         path: &Path<W>,
-        along: Along,
+        along: PathProgress,
         now: Instant,
         links: &mut Links,
     ) {

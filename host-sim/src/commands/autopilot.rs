@@ -31,7 +31,7 @@ pub struct AutopilotArgs {
     #[arg(long, value_name = "URL", required = true)]
     pub listen: Vec<LinkUrl>,
     /// Which autopilot to be
-    #[arg(long, value_name = "NAME", default_value = "px4", value_parser = personality())]
+    #[arg(long, value_name = "NAME", default_value = "px4", value_parser = autopilot_kind_parser())]
     pub personality: AutopilotKind,
     /// MAVLink system id
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
@@ -52,7 +52,7 @@ pub struct AutopilotArgs {
     pub origin: Option<Place>,
 }
 
-fn personality() -> impl TypedValueParser<Value = AutopilotKind> {
+fn autopilot_kind_parser() -> impl TypedValueParser<Value = AutopilotKind> {
     let names = PossibleValuesParser::new(["px4", "ardupilot"]);
     names.map(|name| if name == "px4" { AutopilotKind::Px4 } else { AutopilotKind::Ardupilot })
 }
@@ -91,21 +91,21 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     let home = args.home.0;
     let config = Config {
         system_id: args.sysid,
-        personality: args.personality,
+        autopilot: args.personality,
         world_origin: home,
         ekf_origin: args.origin.map_or(home, |place| place.0),
         start: Point::zeros(),
         estimator_ready_s: args.ready_after,
         boot_unix_us: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_micros() as u64),
         ports: args.listen.len(),
-        routes: true,
+        forwards: true,
         ..Config::default()
     };
     let mut autopilot = Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
     let mut links = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
-        say!("listening {}", url.opened(&*link));
+        say!("listening {}", url.with_bound_port(&*link));
         links.push((url, link));
     }
     // Whoever waits for these lines would wait for ever.

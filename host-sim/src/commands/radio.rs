@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut links: Vec<(&LinkUrl, Box<dyn Link>, Framer)> = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
-        say!("listening {}", url.opened(&*link));
+        say!("listening {}", url.with_bound_port(&*link));
         links.push((url, link, Framer::new()));
     }
     printed()?;

@@ -34,7 +34,7 @@ pub trait Link: Send {
 }
 
 /// Whether an error only means that nothing is there now.
-pub(super) fn is_quiet(error: &io::Error) -> bool {
+pub(super) fn is_would_block(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, Interrupted, WouldBlock};
     matches!(error.kind(), WouldBlock | Interrupted | ConnectionRefused)
 }

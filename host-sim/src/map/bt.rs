@@ -23,7 +23,7 @@ const MAX_LINE: usize = 1024;
 
 /// Reads a `.bt` file.
 pub fn read(path: &Path) -> Result<Octree, MapError> {
-    let bytes = files::read(path, MAX_BYTES).map_err(|source| MapError::io("read", path, source))?;
+    let bytes = files::read(path, MAX_BYTES).map_err(|source| MapError::from_io("read", path, source))?;
     parse(&bytes, path)
 }
 
@@ -200,7 +200,7 @@ fn push_node(tree: &Octree, node: Inner, bytes: &mut Vec<u8>) {
 
 /// Writes a `.bt` file.
 pub fn write(tree: &Octree, path: &Path) -> Result<(), MapError> {
-    std::fs::write(path, to_bytes(tree)).map_err(|source| MapError::io("write", path, source))
+    std::fs::write(path, to_bytes(tree)).map_err(|source| MapError::from_io("write", path, source))
 }
 
 #[cfg(test)]

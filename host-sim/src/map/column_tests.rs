@@ -107,7 +107,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                         .component_mul(&size);
                 let radius_m = 0.05 + 0.2 * uniform(&mut rng);
                 let required_m = radius_m + 0.3 * uniform(&mut rng);
-                let ours = column(&voxels, &p, radius_m, required_m);
+                let ours = ground_below_column(&voxels, &p, radius_m, required_m);
                 let expected = brute_force(&map, unknown, &p, radius_m, required_m);
                 assert_eq!(ours.is_ok(), expected.is_some(), "{p} {radius_m} {required_m}: {ours:?}");
                 match (ours, expected) {
@@ -145,7 +145,7 @@ fn what_is_wrong_with_a_column_is_named() {
     map.set([8, 8, 0], Occupancy::Unknown);
     map.set([30, 30, 0], Occupancy::Free);
     let voxels = map.voxel_map(Unknown::Blocked);
-    let look = |x: f32, y: f32, z: f32| column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
+    let look = |x: f32, y: f32, z: f32| ground_below_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
     assert_eq!(look(5.0, 2.0, 4.0), Ok(0.25));
     let bar = ColumnError::TooNear { place: Point::new(5.5, 5.1, 2.25), distance_m: 0.5, unknown: false };
     assert_eq!(look(5.0, 5.1, 4.0), Err(bar));

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::occupancy::OccupancyMap;
 use super::octree::Octree;
 use super::{MapError, RESOLUTION_RANGE_M, Source, bt, building};
-use crate::files::Results;
+use crate::files::ResultFiles;
 use crate::say;
 
 /// Planning resolution where none is given, metres.
@@ -49,7 +49,7 @@ enum Action {
 
 /// What `map info` prints.
 #[derive(Debug, Serialize)]
-pub struct Info {
+pub struct MapInfo {
     /// `"octomap"` or `"builtin"`.
     pub kind: &'static str,
     /// Edge of the smallest cell, metres.
@@ -74,7 +74,7 @@ pub struct Info {
     pub unknown_m3: f64,
 }
 
-impl Info {
+impl MapInfo {
     /// Sums up a tree that lies `shift_m` beside its keys.
     pub fn of(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
         let counts = tree.counts();
@@ -131,13 +131,13 @@ pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
                 let expected = "a file to write that ends in `.bt`";
                 return Err(MapError::UnknownKind { file: out.display().to_string(), expected }.into());
             }
-            let mut results = Results::file(out)?;
+            let mut results = ResultFiles::file(out)?;
             let tree = match read(file, *resolution)?.1 {
                 Map::Grid(grid) => grid.to_octree(file)?,
                 Map::Tree(tree) => tree,
             };
             results.add_file(out, &bt::to_bytes(&tree))?;
-            results.keep()?;
+            results.commit()?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -163,14 +163,14 @@ fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), Ma
     }
 }
 
-fn info(file: &str, resolution_m: Option<f32>) -> Result<Info, MapError> {
+fn info(file: &str, resolution_m: Option<f32>) -> Result<MapInfo, MapError> {
     let (kind, map) = read(file, resolution_m)?;
     let (tree, shift) = match map {
         Map::Tree(tree) => (Some(tree), [0.0; 3]),
         Map::Grid(grid) => grid.to_shifted_octree(),
     };
     let refuse = || MapError::Grid { file: file.into(), why: "all its cells are alike".into() };
-    Ok(Info::of(kind, &tree.ok_or_else(refuse)?, shift))
+    Ok(MapInfo::of(kind, &tree.ok_or_else(refuse)?, shift))
 }
 
 /// Edge of a planning cell as scenarios take it.

@@ -48,7 +48,7 @@ pub enum MapError {
 }
 
 impl MapError {
-    pub(super) fn io(action: &'static str, file: &Path, source: std::io::Error) -> Self {
+    pub(super) fn from_io(action: &'static str, file: &Path, source: std::io::Error) -> Self {
         Self::Io { action, file: file.into(), source }
     }
 }

@@ -18,7 +18,7 @@ use std::path::Path;
 pub use boxes::BoxTree;
 pub use edt::ClearanceField;
 pub use error::MapError;
-pub use ground::level;
+pub use ground::level_ground_map;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 

@@ -127,7 +127,7 @@ impl Octree {
 
     fn walk(&self, node: Inner, min: [u32; 3], size: u32, visit: &mut impl FnMut(Leaf)) {
         for index in 0..8 {
-            let child_min = octant(min, size, index);
+            let child_min = octant_corner(min, size, index);
             match node.child(index) {
                 UNKNOWN => {}
                 INNER => self.walk(self.inner[node.inner_index(index)], child_min, size / 2, visit),
@@ -203,7 +203,7 @@ impl Octree {
 }
 
 /// Lowest corner of the octant `index` (x in bit 0, y in bit 1, z in bit 2) with edge `size`.
-fn octant(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
+fn octant_corner(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
     [0, 1, 2].map(|axis| min[axis] + (index >> axis & 1) * size)
 }
 
@@ -236,7 +236,7 @@ impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
         let mut children = 0;
         let mut inner = heapless::Vec::<Inner, 8>::new();
         for index in 0..8 {
-            let code = match self.build(octant(corner, size / 2, index), size / 2) {
+            let code = match self.build(octant_corner(corner, size / 2, index), size / 2) {
                 Child::Leaf(kind) => kind,
                 Child::Inner(node) => {
                     inner.push(node).expect("a node has eight children");

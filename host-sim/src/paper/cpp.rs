@@ -13,8 +13,8 @@ use super::cpp_figures;
 use super::cpp_rows::{Row, Summary};
 use crate::commands::cover;
 use crate::coverage::check::check_plan;
-use crate::coverage::{Planned, page};
-use crate::files::Results;
+use crate::coverage::{CoveragePlan, page};
+use crate::files::ResultFiles;
 use crate::report::Figure;
 use crate::result::{self, Timing, rounded};
 use crate::say;
@@ -69,9 +69,9 @@ struct Tables {
 impl Tables {
     /// Plans, checks, and gives each vehicle's cost: 0 for one that stays on the ground.
     fn costs(&mut self, scenario: &Scenario, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
-        let planned = Planned::new(scenario, method)?;
+        let planned = CoveragePlan::new(scenario, method)?;
         let findings = check_plan(&planned);
-        let result = cover::described(&planned, &findings);
+        let result = cover::cover_result(&planned, &findings);
         self.complete &= findings.is_clean();
         let rank = f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
         if self.worst.as_ref().is_none_or(|(worst, _)| rank > *worst) {
@@ -116,7 +116,7 @@ impl Tables {
 /// Results that cannot be written.
 pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let mut results = Results::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
+    let mut results = ResultFiles::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
     let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
     table_2(&mut tables)?;
     let planning = table_3()?;
@@ -135,20 +135,20 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
     // Fig. 8 d: Table 2's plan by POWELL-BINPAT.
     let scenario = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
-    let planned = Planned::new(&scenario, Method::PowellBinpat)?;
+    let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)?;
     let findings = check_plan(&planned);
-    let result = serde_json::to_value(cover::described(&planned, &findings))?;
-    let mut page = page::page(&planned, &planned.flights(), &findings, result);
-    page.figures = figures(&tables)?;
+    let result = serde_json::to_value(cover::cover_result(&planned, &findings))?;
+    let mut page = page::report_data(&planned, &planned.flights(), &findings, result);
+    page.figures = paper_figures(&tables)?;
     results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
-    results.keep()?;
+    results.commit()?;
     say!();
     say!("{}", if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" });
     Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// The paper's drawings of our plans.
-fn figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
+fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
     let convex = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let compared = [
         scenario(COMPARED_AREAS[0], &in_a_row(3), 10.0, 35.0)?,
@@ -177,7 +177,7 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
             let scenario = scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
             let mut times = Vec::with_capacity(TIMED_RUNS);
             for _ in 0..TIMED_RUNS {
-                times.push(Planned::new(&scenario, method)?.seconds.iter().sum::<f64>());
+                times.push(CoveragePlan::new(&scenario, method)?.seconds.iter().sum::<f64>());
             }
             times.sort_by(f64::total_cmp);
             *slot = times[TIMED_RUNS / 2];

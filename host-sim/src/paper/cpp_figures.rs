@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::coverage::area::RingKind;
 
 use super::cpp_rows::{Row, Summary};
-use crate::coverage::Planned;
+use crate::coverage::CoveragePlan;
 use crate::report::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 use crate::result::rounded;
 use crate::scenario::Scenario;
@@ -31,19 +31,20 @@ pub(super) fn routes(
         (Method::Binpat, "BINPAT"),
         (Method::PowellBinpat, "POWELL-BINPAT"),
     ];
-    let mut fig_8 = vec![map("(a) area and UAVs".to_owned(), &Planned::new(convex, Method::Binpat)?, false)];
+    let mut fig_8 =
+        vec![map("(a) area and UAVs".to_owned(), &CoveragePlan::new(convex, Method::Binpat)?, false)];
     for ((method, name), letter) in three.iter().zip('b'..) {
-        fig_8.push(map(format!("({letter}) {name}"), &Planned::new(convex, *method)?, true));
+        fig_8.push(map(format!("({letter}) {name}"), &CoveragePlan::new(convex, *method)?, true));
     }
     let mut fig_9 = Vec::new();
     for ((method, name), letters) in three.iter().zip([['c', 'd'], ['e', 'f'], ['g', 'h']]) {
         for (scenario, letter) in others.iter().zip(letters) {
-            fig_9.push(map(format!("({letter}) {name}"), &Planned::new(scenario, *method)?, true));
+            fig_9.push(map(format!("({letter}) {name}"), &CoveragePlan::new(scenario, *method)?, true));
         }
     }
     let mut fig_10 = Vec::new();
     for ((method, name), letter) in three[1..].iter().zip('a'..) {
-        fig_10.push(map(format!("({letter}) {name}"), &Planned::new(small, *method)?, true));
+        fig_10.push(map(format!("({letter}) {name}"), &CoveragePlan::new(small, *method)?, true));
     }
     let figure = |name: &str, caption: &str, panels| Figure {
         name: name.to_owned(),
@@ -70,7 +71,7 @@ pub(super) fn routes(
 }
 
 /// A plan from above; without its routes, area and UAVs alone.
-fn map(title: String, planned: &Planned<'_>, shown: bool) -> Panel {
+fn map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
     let corners = planned.wanted.rings_of(RingKind::Outer).flatten();
     let flights = planned.flights();
     let (mut costs, mut most_s) = (Vec::new(), 0.0f32);

@@ -23,7 +23,7 @@ pub use planner_core::prm::Sampling;
 pub use sim_autopilot::{AutopilotKind, Estimator};
 pub use types::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode, Objective,
-    Roadmap, Scenario, Simulation, Terminals, Unbuilt, Vehicle,
+    Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
 };
 
 /// Reads a scenario file; paths in it are relative to its folder.

@@ -90,7 +90,7 @@ impl<'a> Value<'a> {
     }
 
     /// A whole number inside a range.
-    pub(super) fn whole(&self, range: RangeInclusive<u64>) -> Result<u64> {
+    pub(super) fn integer_in_range(&self, range: RangeInclusive<u64>) -> Result<u64> {
         if !self.value.is_integer() {
             return Err(self.expected("a whole number"));
         }
@@ -111,14 +111,14 @@ impl<'a> Value<'a> {
     }
 
     /// One of several words; each stands beside its meaning.
-    pub(super) fn word<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
+    pub(super) fn one_of<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
         let given = self.str()?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == given) {
             return Ok(*meaning);
         }
         let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
         let error = self.error(&format!("must be one of {}", all.join(", ")));
-        Err(ScenarioError { hint: nearest(given, words.iter().map(|(word, _)| *word)), ..error })
+        Err(ScenarioError { hint: nearest_word(given, words.iter().map(|(word, _)| *word)), ..error })
     }
 
     pub(super) fn items(&self) -> Result<Vec<Value<'a>>> {
@@ -201,7 +201,7 @@ impl<'a> Table<'a> {
     }
 
     /// Names keys that will be asked for later.
-    pub(super) fn expect(&self, keys: &[&'static str]) {
+    pub(super) fn declare_keys(&self, keys: &[&'static str]) {
         self.known.borrow_mut().extend(keys);
     }
 
@@ -213,16 +213,21 @@ impl<'a> Table<'a> {
         self.get(key).map(|v| v.f64(&range).map(|n| n as f32)).transpose()
     }
 
-    pub(super) fn whole(&self, key: &'static str, default: u64, range: RangeInclusive<u64>) -> Result<u64> {
-        self.get(key).map_or(Ok(default), |v| v.whole(range))
+    pub(super) fn integer_in_range(
+        &self,
+        key: &'static str,
+        default: u64,
+        range: RangeInclusive<u64>,
+    ) -> Result<u64> {
+        self.get(key).map_or(Ok(default), |v| v.integer_in_range(range))
     }
 
     pub(super) fn boolean(&self, key: &'static str) -> Result<bool> {
         self.get(key).map_or(Ok(false), |v| v.boolean())
     }
 
-    pub(super) fn word<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
-        self.get(key).map_or(Ok(default), |v| v.word(words))
+    pub(super) fn one_of<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
+        self.get(key).map_or(Ok(default), |v| v.one_of(words))
     }
 
     /// Refuses the first key in the file that was never asked for.
@@ -230,12 +235,12 @@ impl<'a> Table<'a> {
         let known = self.known.borrow();
         let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let Some((key, _)) = unknown.min_by_key(|(key, _)| key.span().start) else { return Ok(()) };
-        Err(self.unknown(key, nearest(key.get_ref(), known.iter().copied())))
+        Err(self.unknown(key, nearest_word(key.get_ref(), known.iter().copied())))
     }
 }
 
 /// The nearest word, or all of them where none is near.
-fn nearest<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
+fn nearest_word<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
     let given = given.to_lowercase();
     let score = |word: &&str| strsim::jaro_winkler(&given, word);
     let best = words.clone().max_by(|a, b| score(a).total_cmp(&score(b)))?;

@@ -23,7 +23,7 @@ use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::types::{
     Companion, Deconfliction, Fault, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario, Simulation,
-    Terminals, Unbuilt, Vehicle,
+    Terminals, UnsupportedTable, Vehicle,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
@@ -49,7 +49,7 @@ pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>
         ScenarioError { hint: hint.map(str::to_owned), ..error }
     })?;
     let root = Table::new(text, "", 0..0, root.get_ref());
-    root.expect(&[
+    root.declare_keys(&[
         "seed",
         "map",
         "roadmap",
@@ -136,7 +136,7 @@ struct Common {
 /// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the stray of two
 /// vehicles, metres, and the time limit of a flight, seconds.
 fn common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
-    let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
+    let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = deconfliction.unwrap_or_else(|| empty(text, "deconfliction"));
     let deconfliction = self::deconfliction(&deconfliction, stray_m)?;
@@ -181,14 +181,14 @@ fn unbuilt(
     root: &Table<'_>,
     key: &'static str,
     unsupported: &mut Vec<ScenarioError>,
-) -> Result<Option<Unbuilt>> {
+) -> Result<Option<UnsupportedTable>> {
     let Some(value) = root.get(key) else { return Ok(None) };
     value.table()?;
     unsupported.push(not_yet(root.text, &value.span, &format!("[{key}]")));
     let whole: toml::Table = toml::from_str(root.text.text)
         .map_err(|error| root.text.error(&value.span, format!("not TOML: {}", error.message())))?;
     let table = whole.get(key).and_then(toml::Value::as_table).cloned().unwrap_or_default();
-    Ok(Some(Unbuilt { table }))
+    Ok(Some(UnsupportedTable { table }))
 }
 
 fn geodetic(value: &Value<'_>) -> Result<Geodetic> {
@@ -214,7 +214,7 @@ fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     let map = Map {
         file,
         resolution_m: table.f32("resolution_m", 0.25, RESOLUTION_RANGE_M)?,
-        unknown: table.word(
+        unknown: table.one_of(
             "unknown",
             Unknown::Blocked,
             &[("blocked", Unknown::Blocked), ("free", Unknown::Free)],
@@ -234,18 +234,18 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
         }
     }
     let roadmap = Roadmap {
-        nodes: table.whole("nodes", 2300, 0..=1_000_000)? as u32,
+        nodes: table.integer_in_range("nodes", 2300, 0..=1_000_000)? as u32,
         edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=MAX_EDGE_M.into())?,
         edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=MAX_EDGE_M.into())?,
         edge_min_share: table.optional_f32("edge_min_share", 0.0..=1.0)?,
         edge_max_share: table.optional_f32("edge_max_share", 0.0001..=1.0)?,
-        terminals: table.word(
+        terminals: table.one_of(
             "terminals",
             Terminals::Joined,
             &[("joined", Terminals::Joined), ("apart", Terminals::Apart)],
         )?,
         safety_margin_m: table.f32("safety_margin_m", 0.5, 0.0..=100.0)?,
-        sampling: table.word(
+        sampling: table.one_of(
             "sampling",
             Sampling::Uniform,
             &[("uniform", Sampling::Uniform), ("halton", Sampling::Halton), ("bridge", Sampling::Bridge)],
@@ -271,7 +271,7 @@ fn mission(
     vehicles: &[(Vehicle, VehicleSpans)],
 ) -> Result<(Mission, Option<Span>)> {
     let mode_span = table.get("mode").map(|v| v.span);
-    let mode = table.word(
+    let mode = table.one_of(
         "mode",
         Mode::Unlabelled,
         &[
@@ -284,7 +284,7 @@ fn mission(
             ("labeled", Mode::Labelled),
         ],
     )?;
-    let objective = table.word(
+    let objective = table.one_of(
         "objective",
         Objective::Total,
         &[("total", Objective::Total), ("makespan", Objective::Makespan)],
@@ -348,7 +348,7 @@ fn ground_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> R
     }
     let mut ids = [0; GROUND_STATIONS];
     for (id, given) in ids.iter_mut().zip(given) {
-        *id = given.whole(1..=255)? as u8;
+        *id = given.integer_in_range(1..=255)? as u8;
         if vehicles.iter().any(|(vehicle, _)| vehicle.id == *id) {
             return Err(given.error("is a vehicle's id: a ground station has one of its own"));
         }
@@ -423,7 +423,7 @@ fn vehicles(
     for item in value.items()? {
         let table = item.table()?;
         let id_value = table.required("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
-        let id = id_value.whole(1..=MAX_ID)? as u8;
+        let id = id_value.integer_in_range(1..=MAX_ID)? as u8;
         if vehicles.iter().any(|(v, _)| v.id == id) {
             return Err(id_value.error(&format!("is {id}, which another vehicle already has")));
         }
@@ -446,7 +446,7 @@ fn vehicle(
         "where its path begins: [east, north, up] in metres, or { lat_deg, lon_deg, alt_m }",
     )?;
     let goal = table.get("goal");
-    let personality = table.word(
+    let personality = table.one_of(
         "personality",
         AutopilotKind::Px4,
         &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::Ardupilot)],
@@ -464,7 +464,7 @@ fn vehicle(
     let vehicle = Vehicle {
         id,
         start: place(&start, origin)?,
-        goal: goal.as_ref().map(|v| v.whole(0..=1_000_000).map(|g| g as usize)).transpose()?,
+        goal: goal.as_ref().map(|v| v.integer_in_range(0..=1_000_000).map(|g| g as usize)).transpose()?,
         radius_m: table.f32("radius_m", 0.3, 0.001..=100.0)?,
         altitude_m: table.optional_f32("altitude_m", -1000.0..=20_000.0)?,
         speed_max_mps: table.f32("speed_max_mps", 5.0, 0.01..=100.0)?,

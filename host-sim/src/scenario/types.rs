@@ -42,14 +42,14 @@ pub struct Scenario {
     /// `[area]`: what a coverage mission photographs.
     pub area: Option<Area>,
     /// `[formation]`
-    pub formation: Option<Unbuilt>,
+    pub formation: Option<UnsupportedTable>,
     /// Settings that are requested and not built yet, in the file's order.
     pub(super) unsupported: Vec<ScenarioError>,
 }
 
 /// A table that is read by a part not built yet.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Unbuilt {
+pub struct UnsupportedTable {
     /// The table as TOML values.
     pub table: toml::Table,
 }
@@ -154,7 +154,7 @@ pub struct Geofence {
 
 impl Geofence {
     /// Whether a place is inside the box or on one of its faces.
-    pub fn holds(&self, place: &Point) -> bool {
+    pub fn contains(&self, place: &Point) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&place[axis]))
     }
 }

@@ -11,9 +11,9 @@ const MAX_CHUNKS: u32 = 1 << 22;
 const COMPRESSOR_RECORD: u64 = 22204;
 
 /// Whether no size that a reader would take memory for is beyond the file. It reads from the beginning again.
-pub(super) fn check<R: Read + Seek>(file: &mut R) -> io::Result<Result<(), &'static str>> {
+pub(super) fn check_declared_sizes<R: Read + Seek>(file: &mut R) -> io::Result<Result<(), &'static str>> {
     let length = file.seek(SeekFrom::End(0))?;
-    let outcome = sizes(file, length)?;
+    let outcome = check_sizes(file, length)?;
     file.seek(SeekFrom::Start(0))?;
     Ok(outcome)
 }
@@ -65,7 +65,7 @@ impl<R: Read + Seek> Numbers<'_, R> {
     }
 }
 
-fn sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'static str>> {
+fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'static str>> {
     let mut numbers = Numbers { file, length };
     let (minor, returns_at, format) = (numbers.at(25, 1)?, numbers.at(96, 4)?, numbers.at(104, 1)?);
     if returns_at > length {

@@ -129,7 +129,7 @@ impl HeightGrid {
     }
 
     /// The heights above another zero.
-    pub fn above(mut self, zero_m: f64) -> Self {
+    pub fn relative_to(mut self, zero_m: f64) -> Self {
         for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;
         }
@@ -143,7 +143,7 @@ impl HeightGrid {
     }
 
     /// Raises the cell of a place to a height; whether the place is in the grid.
-    pub(super) fn raise(&mut self, place: &Flat, height_m: f32) -> bool {
+    pub(super) fn raise_cell(&mut self, place: &Flat, height_m: f32) -> bool {
         let Some([column, row]) = self.cell_of(place) else { return false };
         let own = &mut self.heights_m[row * self.size[0] + column];
         // The greater, and a hole takes any.
@@ -152,7 +152,7 @@ impl HeightGrid {
     }
 
     /// Gives holes that lie between cells with heights, at most `reach` away on both sides, the greatest height so near.
-    pub(super) fn bridge(&mut self, reach: usize) {
+    pub(super) fn fill_holes(&mut self, reach: usize) {
         let before = self.clone();
         let [columns, rows] = self.size;
         for row in 0..rows {

@@ -9,7 +9,7 @@ use planner_core::frames::Geodetic;
 
 use super::crs::Crs;
 use super::error::TerrainError;
-use super::frame::{Frame, beside};
+use super::frame::{Frame, widened_window};
 use super::grid::HeightGrid;
 
 /// Heights as a file has them.
@@ -48,23 +48,23 @@ impl Raster {
             }
         };
         let nothing = |window: [Flat; 2]| HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
-        let Some(touched) = self.touched(origin, window) else { return nothing(window) };
+        let Some(touched) = self.touched_cells(origin, window) else { return nothing(window) };
         let middle = touched.map(|(from, to)| (from + to) as f64 / 2.0);
         let cell_m = self
             .cell_m(origin, middle)
             .ok_or_else(|| TerrainError::system("a system that ends before it"))?;
         let window = match frame.window {
-            Some(window) => self.aligned(origin, beside(window, cell_m), cell_m),
+            Some(window) => self.align_box(origin, widened_window(window, cell_m), cell_m),
             None => window,
         };
-        let Some([columns, rows]) = self.touched(origin, window) else { return nothing(window) };
+        let Some([columns, rows]) = self.touched_cells(origin, window) else { return nothing(window) };
         let mut grid = HeightGrid::new(window, cell_m)?;
         let [across, up] = grid.size();
         for row in 0..up {
             for column in 0..across {
                 let place = grid.middle([column, row]);
                 if let Some(height_m) = self.height_at(origin, &place) {
-                    grid.raise(&place, height_m);
+                    grid.raise_cell(&place, height_m);
                 }
             }
         }
@@ -74,7 +74,7 @@ impl Raster {
                 let height_m = self.heights_m[row * self.columns + column];
                 let place = self.place(column as f64 + 0.5, row as f64 + 0.5);
                 if let Some(place) = self.crs.to_mission(origin, place).filter(|_| !height_m.is_nan()) {
-                    grid.raise(&place, height_m);
+                    grid.raise_cell(&place, height_m);
                 }
             }
         }
@@ -90,7 +90,7 @@ impl Raster {
     }
 
     /// A box that begins at the corner of one of the file's cells: where both grids lie alike their cells are the same.
-    fn aligned(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
+    fn align_box(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
         let corner = self.crs.to_mission(origin, self.place(0.0, self.rows as f64));
         let Some(corner) = corner.filter(|corner| corner.amax() < 1e6) else { return [low, high] };
         let down = |axis: usize| {
@@ -111,7 +111,7 @@ impl Raster {
     }
 
     /// Columns and rows that a box may touch, from and to; none where it touches none.
-    fn touched(&self, origin: &Geodetic, [low, high]: [Flat; 2]) -> Option<[(usize, usize); 2]> {
+    fn touched_cells(&self, origin: &Geodetic, [low, high]: [Flat; 2]) -> Option<[(usize, usize); 2]> {
         let shares = || (0..=8).map(|k| k as f32 / 8.0);
         let places =
             shares().flat_map(|s| shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t))));

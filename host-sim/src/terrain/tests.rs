@@ -152,11 +152,11 @@ proptest! {
         let mut grid = HeightGrid::new([Flat::zeros(), Flat::repeat(10.0)], 1.0).unwrap();
         for (index, height) in known.iter().enumerate() {
             if let Some(height) = height {
-                grid.raise(&Flat::new((index % 10) as f32 + 0.5, (index / 10) as f32 + 0.5), f32::from(*height));
+                grid.raise_cell(&Flat::new((index % 10) as f32 + 0.5, (index / 10) as f32 + 0.5), f32::from(*height));
             }
         }
         let before = grid.clone();
-        grid.bridge(2);
+        grid.fill_holes(2);
         for row in 0..10usize {
             for column in 0..10usize {
                 let (own, was) = (grid.height([column, row]), before.height([column, row]));

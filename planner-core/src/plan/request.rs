@@ -49,7 +49,7 @@ pub struct PlanRequest<'a> {
     /// Separation and nominal speeds.
     pub schedule: ScheduleConfig,
     /// Most gates of one vehicle: the least `G` that [`super::vehicle_plan`] is to be called with.
-    pub gates_most: usize,
+    pub max_gates: usize,
 }
 
 impl PlanRequest<'_> {

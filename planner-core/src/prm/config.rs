@@ -108,7 +108,7 @@ impl LengthRange {
     }
 
     #[inline(always)]
-    pub(super) fn holds(self, square: f32) -> bool {
+    pub(super) fn contains(self, square: f32) -> bool {
         square >= self.min && square <= self.max
     }
 }

@@ -105,14 +105,14 @@ impl Member {
 
     /// A stop by the filter lasts until nobody is waited for, or the vehicle flies.
     pub(super) fn note_stops(&mut self, now: Instant) {
-        let stops = self.companion.filter_stops();
+        let stops = self.companion.filter_stop_count();
         if core::mem::replace(&mut self.stops, stops) != stops {
             self.stopped_since.get_or_insert(now);
         } else if self.companion.waiting_for() == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
             self.stopped_since = None;
         }
         if let Some(since) = self.stopped_since {
-            self.longest_stop_s = self.longest_stop_s.max((now - since).secs_f32());
+            self.longest_stop_s = self.longest_stop_s.max((now - since).as_secs_f32());
         }
     }
 

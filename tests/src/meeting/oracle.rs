@@ -109,7 +109,7 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
         set.segments.push((position, position + velocity * (left_m / speed)));
         set.radius_m = 0.5 * ACCEL * age_s * age_s;
     }
-    if velocity.z < -0.2 || intent.is_some_and(|i| i.column) {
+    if velocity.z < -0.2 || intent.is_some_and(|i| i.may_come_down) {
         set.segments.push((position, Point::new(position.x, position.y, floor_z.min(position.z))));
     }
     Some(set)

@@ -307,7 +307,7 @@ proptest! {
                 return Ok(());
             }
         }
-        let due = now + Duration::from_micros(PARTIAL_LIFETIME.micros() + ARRIVAL_STEP_US);
+        let due = now + Duration::from_micros(PARTIAL_LIFETIME.as_micros() + ARRIVAL_STEP_US);
         let mut given = false;
         while !given && now <= due {
             now = now + Duration::from_millis(7);

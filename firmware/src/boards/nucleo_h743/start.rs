@@ -22,7 +22,7 @@ pub fn reset_cause() -> ResetCause {
     // By the errata of all peripheral clocks: read the register, then the memory is there.
     pac::RCC.ahb2enr().read();
     cortex_m::asm::dsb();
-    if Revision::of(pac::DBGMCU.idc().read().0) == Revision::Old {
+    if Revision::from_idcode(pac::DBGMCU.idc().read().0) == Revision::Old {
         // SAFETY: a register of the bus matrix, as ST's own start code sets it.
         unsafe { (h743::AXI_TARG7_FN_MOD as *mut u32).write_volatile(h743::READ_ISS_OVERRIDE) };
     }
@@ -39,7 +39,7 @@ pub fn reset() -> ! {
 
 /// Starts the watchdog with its registers' first values, 512 ms: should a clock not come, it bites.
 /// It stands still while a debugger has the processor halted.
-pub(super) fn wake_watchdog() {
+pub(super) fn start_watchdog() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
     pac::IWDG1.kr().write(|w| w.set_key(Key::START));
 }
@@ -52,12 +52,12 @@ pub(super) fn try_hse() -> bool {
 }
 
 /// Clocks as fast as the silicon may run, from the board's oscillator or the chip's own.
-pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
+pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
     let hse = rcc::Hse { freq: Hertz::mhz(h743::HSE_MHZ), mode: HseMode::Bypass };
     config.rcc.hse = has_hse.then_some(hse);
-    let (divider, factor) = revision.pll(has_hse);
+    let (divider, factor) = revision.pll_divider_and_factor(has_hse);
     config.rcc.pll1 = Some(rcc::Pll {
         source: if has_hse { rcc::PllSource::HSE } else { rcc::PllSource::HSI },
         prediv: PllPreDiv::from_bits(divider as u8),
@@ -82,7 +82,7 @@ pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config
 }
 
 /// Sets which memory may be cached and touched, then starts the caches.
-pub(super) fn guards() {
+pub(super) fn configure_mpu_and_caches() {
     // The place of the roadmap, `super::ROADMAP_REGION`, is free until there is one.
     let regions = [
         Some(h743::EXTERNAL),

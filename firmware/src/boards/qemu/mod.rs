@@ -35,7 +35,7 @@ pub fn reset() -> ! {
 }
 
 /// The parts of this board, ready.
-pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
@@ -52,6 +52,6 @@ pub fn start() -> Parts {
         watchdog,
         warnings: Vec::new(),
     };
-    grants::start(|port, bytes| uart::of_port(port).take(bytes));
+    grants::start(|port, bytes| uart::of_port(port).receive_in_lock_step(bytes));
     parts
 }

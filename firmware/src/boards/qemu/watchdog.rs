@@ -31,7 +31,7 @@ static LAST_FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
 /// Counts by which time may be skipped: the device counts none of them, so the rest is counted
 /// here.
-pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
+pub fn counts_until_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     let bites = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
     if now >= bites {
         SCB::sys_reset();

@@ -15,11 +15,11 @@ use super::{
     vehicles,
 };
 use crate::area::overlap::{self, Overlap};
-use crate::area::{self, Format, MAX_VERTICES, Polygons, RingXy};
+use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
 use crate::quote::quoted_path;
-use crate::scenario::coverage::{Area, Heading, Method, ORIGIN_HINT, Trigger};
+use crate::scenario::coverage::{Area, HeadingRule, Method, ORIGIN_HINT, Trigger};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
@@ -68,13 +68,14 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     }
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
-    let apart_m = margins::pads_m(&simulation, deconfliction.safety_distance_m, &vehicles);
+    let apart_m = margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
     check_pads(text, &vehicles, &spans, apart_m)?;
     check_heights(text, &vehicles, &spans, area.heights.mission_m)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    area.usable = margins::usable(&area.spacing, area.height_m, mission.cruise_mps, &simulation, &vehicles);
+    area.usable =
+        margins::usable_footprint(&area.spacing, area.height_m, mission.cruise_mps, &simulation, &vehicles);
     Ok(Scenario {
         path: text.file.to_owned(),
         text: text.text.to_owned(),
@@ -133,8 +134,8 @@ fn check_heights(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], h
 
 /// `[mission]` of a coverage mission: it has no goals.
 fn mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mission> {
-    table.word("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
-    table.expect(&["objective", "goals", "goals_file"]);
+    table.one_of("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
+    table.declare_keys(&["objective", "goals", "goals_file"]);
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
     let mission = Mission {
         mode: Mode::Coverage,
@@ -166,7 +167,7 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)>
     let camera = table.get("camera").map(|v| camera(&v)).transpose()?;
     let (height_m, spacing) = spacing(table, camera.as_ref())?;
     let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
-    let method = table.get("method").map(|v| v.word(&Method::NAMES)).transpose()?;
+    let method = table.get("method").map(|v| v.one_of(&Method::NAMES)).transpose()?;
     let area = Area {
         place: table.text.line(&source),
         vertices,
@@ -182,12 +183,12 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)>
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
         batteries: table.boolean("batteries")?,
         method: method.unwrap_or(Method::PowellBinpat),
-        heading: table.word(
+        heading: table.one_of(
             "heading",
-            Heading::Sweep,
-            &[("sweep", Heading::Sweep), ("lane", Heading::Lane)],
+            HeadingRule::Sweep,
+            &[("sweep", HeadingRule::Sweep), ("lane", HeadingRule::Lane)],
         )?,
-        trigger: table.word(
+        trigger: table.one_of(
             "trigger",
             Trigger::Distance,
             &[("distance", Trigger::Distance), ("waypoint", Trigger::Waypoint), ("none", Trigger::None)],
@@ -202,7 +203,7 @@ fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, 
     let (file, polygon) = (table.get("file"), table.get("polygon"));
     let words =
         [("wgs84", Coordinates::Wgs84), ("metres", Coordinates::Metres), ("meters", Coordinates::Metres)];
-    let said = table.get("coordinates").map(|v| v.word(&words)).transpose()?;
+    let said = table.get("coordinates").map(|v| v.one_of(&words)).transpose()?;
     let (mut polygons, usual, span) = match (&file, &polygon) {
         (Some(_), Some(polygon)) => {
             return Err(polygon.error("cannot stand beside area.file: give one of them"));
@@ -215,7 +216,7 @@ fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, 
             let path = folder.join(file.str()?);
             let polygons = area::read(&path)
                 .map_err(|error| file.error(&format!("is no area: {}: {error}", quoted_path(&path))))?;
-            let metres = Format::of(&path) == Some(Format::Wkt);
+            let metres = AreaFormat::from_path(&path) == Some(AreaFormat::Wkt);
             let usual = if metres { Coordinates::Metres } else { Coordinates::Wgs84 };
             (polygons, usual, file.span.clone())
         }
@@ -258,7 +259,7 @@ fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
                 let hint = "a place is { lat_deg = …, lon_deg = … }";
                 let lat = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
                 let lon = table.required("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
-                table.expect(&["alt_m"]);
+                table.declare_keys(&["alt_m"]);
                 table.finish()?;
                 [lon, lat]
             }
@@ -270,7 +271,7 @@ fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
             }
         });
     }
-    area::open(&mut ring);
+    area::open_ring(&mut ring);
     if ring.len() < 3 {
         return Err(value.error("must have at least three places that differ"));
     }
@@ -348,7 +349,7 @@ fn overlapping(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
         let indices = 0..area.rings().len();
         indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
     };
-    Some(match overlap::find(&of(RingKind::Outer), &of(RingKind::Hole))? {
+    Some(match overlap::find_overlap(&of(RingKind::Outer), &of(RingKind::Hole))? {
         Overlap::Outers(i, j) => (format!("polygon {i} and polygon {j} overlap"), "draw them as one"),
         Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
         Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
@@ -402,7 +403,7 @@ fn camera(value: &Value<'_>) -> Result<Camera> {
             let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
             let focal_mm = table.required("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
             let pixels = match table.get("pixels") {
-                Some(pixels) => pair(&pixels, |v| v.whole(1..=1_000_000).map(|n| n as u32))?,
+                Some(pixels) => pair(&pixels, |v| v.integer_in_range(1..=1_000_000).map(|n| n as u32))?,
                 None => return Err(value.error("needs pixels beside sensor_mm")),
             };
             Camera::Sensor { sides_mm, focal_mm, pixels }

@@ -96,10 +96,10 @@ impl TerrainFile {
             climb_mps.min(descend_mps) / mission.cruise_mps.min(vehicle.speed_max_mps)
         });
         let slope = slope.fold(f32::INFINITY, f32::min);
-        let reach_m = margins::needed(simulation, 0.0, &own).margin_m;
+        let reach_m = margins::required_distances(simulation, 0.0, &own).margin_m;
         let config = FieldConfig { area: [low - beyond, high + beyond], reach_m, slope };
-        let grid = self.read(text, &area.origin, config.window())?.above(area.origin.alt_m);
-        let field = terrain::field(&grid, &config).map_err(|error| {
+        let grid = self.read(text, &area.origin, config.window())?.relative_to(area.origin.alt_m);
+        let field = terrain::encode_field(&grid, &config).map_err(|error| {
             let why = format!("area.terrain: {}: {error}", quoted_path(&self.path));
             let hint = match error {
                 FieldError::High(_) => "area.origin needs an alt_m near the ground",
