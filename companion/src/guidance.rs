@@ -134,8 +134,7 @@ pub struct Guidance {
     lead_m: f32,
     /// Place of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
-    /// Place along the path where the vehicle will stop for now, whatever the safety filter does,
-    /// metres.
+    /// Place along the path where the vehicle will stop for now, whatever the safety filter does, metres.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
     pub(crate) filter: SafetyFilter,
@@ -154,8 +153,7 @@ pub struct Guidance {
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
-    /// Place along the path that others at least heard of, metres; ∞ where no vehicle has heard of
-    /// any.
+    /// Place along the path that others at least heard of, metres; ∞ where no vehicle has heard of any.
     heard_by_others_m: f32,
     evade_search: EvadeSearch,
     /// Whether it keeps out from under a vehicle that comes down.

@@ -57,7 +57,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
         GuardInputs {
-            time_in_state: self.mission.time_in_state(now),
+            in_state: self.mission.time_in_state(now),
             heartbeat_age: t.heartbeat_age(now),
             position_age: t.position_age(now),
             jumped: t.is_settling(now),
@@ -122,7 +122,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             armed_unseen: handshake.is_armed_bit_overdue(now),
             arming_unanswered: handshake.is_arming_unanswered(now),
             disarm_refused: handshake.is_disarm_refused(),
-            in_own_mode: handshake.is_in_own_mode(),
+            own_mode: handshake.is_in_own_mode(),
             landing: t.custom_mode == kind.land_mode(),
             offboard,
             mode_foreign,

@@ -211,7 +211,7 @@ pub enum Guard {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuardInputs {
     /// Time in the state.
-    pub time_in_state: Duration,
+    pub in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
     pub heartbeat_age: Duration,
     /// Time since the last usable position.
@@ -299,7 +299,7 @@ pub struct GuardInputs {
     /// Disarming was refused.
     pub disarm_refused: bool,
     /// The setpoint mode was entered for this mission and not left since.
-    pub in_own_mode: bool,
+    pub own_mode: bool,
     /// The mode is the one that lands.
     pub landing: bool,
     /// The mode is Offboard or Guided.
@@ -418,34 +418,26 @@ impl Guard {
             Self::AwayFromStart => i.position_age < MAX_POSITION_AGE && !i.at_start,
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
-            Self::StartVague => i.start && i.imprecise && i.time_in_state >= limit,
+            Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
             Self::EstimateVague => i.imprecise_for > limit,
             Self::OriginMoved => i.origin_moved,
             Self::GatesOpen => i.gates_open,
-            Self::Elapsed => i.time_in_state >= limit,
+            Self::Elapsed => i.in_state >= limit,
             Self::Offboard => i.offboard,
             Self::ModeTaken => i.mode_foreign && !i.critical,
             Self::FailsafeActs => i.mode_foreign && i.critical,
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
             Self::DisarmedAtGoal => !i.armed && i.at_goal,
-            Self::StaysArmed => i.armed && i.time_in_state >= limit,
-            Self::StaysDisarmed => {
-                !i.armed && i.time_in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE
-            }
+            Self::StaysArmed => i.armed && i.in_state >= limit,
+            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::StaysDisarmedPaused => {
-                !i.armed
-                    && i.time_in_state >= limit
-                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
-                    && i.start
-                    && i.pause
+                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start && i.pause
             }
             Self::ArmedUnseen => i.armed_unseen,
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
-            Self::Unattended => {
-                i.airborne && i.offboard && i.in_own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE
-            }
+            Self::Unattended => i.airborne && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
@@ -457,7 +449,7 @@ impl Guard {
             Self::BackOffPath => i.position_age < MAX_POSITION_AGE && !i.near_path,
             Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
-            Self::PausedOnPad => i.pause && i.time_in_state >= limit,
+            Self::PausedOnPad => i.pause && i.in_state >= limit,
             Self::LandCommanded => i.land,
             Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
@@ -477,7 +469,7 @@ impl Guard {
             Self::NoPlaceAside => i.plan_failed && i.lands_aside,
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear_for >= limit,
-            Self::ColumnBlocked => i.column_blocked_for.min(i.time_in_state) >= limit,
+            Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,
             Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
             Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
@@ -485,7 +477,7 @@ impl Guard {
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::WayFree => i.way_free,
-            Self::OutOfRange => i.out_of_range && i.time_in_state >= limit,
+            Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => i.on_ground && !i.vertical && (i.has_flown || i.landing),
             Self::PathBlocked => i.blocked,
@@ -499,7 +491,7 @@ impl Guard {
             Self::Standing => i.standing,
             Self::Excluded => i.excluded,
             Self::MoreIsDone => i.more_is_done,
-            Self::PlansDiffer => i.plans_differ && i.time_in_state >= limit,
+            Self::PlansDiffer => i.plans_differ && i.in_state >= limit,
             Self::HoldsToDivide => i.holds_to_divide,
             Self::DivisionReady => i.division_ready,
             Self::NothingToDivide => i.undivided,

@@ -63,7 +63,7 @@ pub(crate) fn quiet(state: State) -> GuardInputs {
         WAITING_ON_GROUND.contains(&state) || ON_PAD.contains(&state) || matches!(state, Done | Aborted);
     let mut i =
         GuardInputs { armed: !on_ground, airborne: !on_ground, at_start: true, ..GuardInputs::default() };
-    (i.has_goal, i.has_flown, i.in_own_mode) = (true, !on_ground, !on_ground);
+    (i.has_goal, i.has_flown, i.own_mode) = (true, !on_ground, !on_ground);
     match state {
         WaitAutopilot => i.heartbeat_age = MAX_HEARTBEAT_AGE,
         WaitPosition => i.position_age = MAX_POSITION_AGE,
@@ -168,7 +168,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
         G::StartVague => {
             (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false);
-            (i.imprecise, i.time_in_state) = (true, long);
+            (i.imprecise, i.in_state) = (true, long);
         }
         G::EstimateVague => i.imprecise_for = long,
         G::OriginMoved => i.origin_moved = true,
@@ -183,18 +183,18 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::ChargeLow => (i.armed, i.battery_low) = (false, true),
         G::Outside => (i.armed, i.outside) = (false, true),
         G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
-        G::StaysArmed => i.time_in_state = long,
-        G::StaysDisarmed => (i.armed, i.time_in_state) = (false, long),
-        G::StaysDisarmedPaused => (i.armed, i.time_in_state, i.start, i.pause) = (false, long, true, true),
+        G::StaysArmed => i.in_state = long,
+        G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
+        G::StaysDisarmedPaused => (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true),
         G::ArmedUnseen => i.armed_unseen = true,
         G::ArmingUnanswered => i.arming_unanswered = true,
         G::InAir => i.airborne = true,
-        G::Unattended => (i.airborne, i.offboard, i.in_own_mode) = (true, true, true),
+        G::Unattended => (i.airborne, i.offboard, i.own_mode) = (true, true, true),
         G::DisarmRefused => i.disarm_refused = true,
-        G::PausedOnPad => (i.pause, i.time_in_state) = (true, long),
+        G::PausedOnPad => (i.pause, i.in_state) = (true, long),
         G::LandUnattended => (i.land, i.airborne, i.offboard) = (true, true, true),
         G::ReturnInClimb => (i.turn_back, i.in_climb) = (true, true),
-        G::Elapsed => i.time_in_state = long,
+        G::Elapsed => i.in_state = long,
         G::Offboard => i.offboard = true,
         G::ModeTaken => i.mode_foreign = true,
         G::FailsafeActs => (i.mode_foreign, i.critical) = (true, true),
@@ -231,10 +231,10 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::PadTaken => (i.pad_blocked_for, i.can_land_aside) = (long, true),
         G::NoPlaceAside => (i.plan_failed, i.lands_aside) = (true, true),
         G::AsideReached => i.aside_reached = true,
-        G::ColumnBlocked => (i.column_blocked_for, i.time_in_state) = (long, long),
+        G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),
         G::Yielded => (i.yielded_for, i.hindered_for) = (long, long),
         G::WayFree => i.way_free = true,
-        G::OutOfRange => (i.out_of_range, i.time_in_state) = (true, long),
+        G::OutOfRange => (i.out_of_range, i.in_state) = (true, long),
         G::Hindered => i.hindered_for = long,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
         G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
@@ -253,7 +253,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::Standing => i.standing = true,
         G::Excluded => i.excluded = true,
         G::MoreIsDone => i.more_is_done = true,
-        G::PlansDiffer => (i.plans_differ, i.time_in_state) = (true, long),
+        G::PlansDiffer => (i.plans_differ, i.in_state) = (true, long),
         G::HoldsToDivide => i.holds_to_divide = true,
         G::DivisionReady => i.division_ready = true,
         G::NothingToDivide => i.undivided = true,
@@ -303,7 +303,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
 #[test]
 fn the_pilot_outranks_everything_in_the_air() {
     let everything = GuardInputs {
-        time_in_state: secs(9999),
+        in_state: secs(9999),
         blocked_for: secs(9999),
         stalled_for: secs(9999),
         mode_foreign: true,

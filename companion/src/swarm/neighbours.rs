@@ -112,7 +112,7 @@ impl<const V: usize> Neighbours<V> {
     /// radio has failed.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
-            c.near_radio_range || c.position_at.is_none() || c.has_flag(LANDED | OUT_OF_PLAN)
+            c.at_range_edge || c.position_at.is_none() || c.has_flag(LANDED | OUT_OF_PLAN)
         };
         self.range_edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
     }
@@ -147,14 +147,14 @@ impl<const V: usize> Neighbours<V> {
             position_at: None,
             boot_ms: 0,
             flags: 0,
-            out_of_plan_since: None,
+            out_since: None,
             hears_us_at: None,
             heard_bits: 0,
             relayed_m: None,
             relayed_at: None,
             intent_sequence: 0,
             message_delay: MessageDelay::default(),
-            intent_of_mission_at: None,
+            intent_at: None,
             points: Vec::new(),
             first_unheard_point: 0,
             place_on_points: PlaceOnPoints::Unknown,
@@ -163,7 +163,7 @@ impl<const V: usize> Neighbours<V> {
             may_come_down: false,
             gates_open_up_to_m: f32::NEG_INFINITY,
             gates_open_in_s: 0,
-            near_radio_range: false,
+            at_range_edge: false,
             assumed_speed_mps: self.assumed_speed_mps,
             ground_m: f32::NAN,
             speed_mps: 0.0,
@@ -182,10 +182,7 @@ impl<const V: usize> Neighbours<V> {
     /// Rank in the roster of a vehicle whose intents are of our mission.
     fn roster_rank(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.roster_index(id)?;
-        self.contacts[at]
-            .intent_of_mission_at
-            .is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME)
-            .then_some(at)
+        self.contacts[at].intent_at.is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME).then_some(at)
     }
 
     fn roster_index(&self, id: u8) -> Option<usize> {
@@ -262,7 +259,7 @@ impl<const V: usize> Neighbours<V> {
         contact.position_at = Some(now);
         contact.state.position = frames::geodetic_to_enu(origin, &place);
         contact.update_place_on_points();
-        contact.near_radio_range = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
+        contact.at_range_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
         contact.speed_mps = contact.state.velocity.norm();
@@ -293,7 +290,7 @@ impl<const V: usize> Neighbours<V> {
         let shared = on_plan && contact.shares_plan;
         let follows = on_plan && intent.flags & LANDED == 0 && intent.plan_crc != 0;
         contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
-        (contact.heard_at, contact.intent_of_mission_at) = (Some(now), Some(now));
+        (contact.heard_at, contact.intent_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
         if contact.has_flag(GROUNDED)
             && !contact.has_flag(LANDED | OUT_OF_PLAN)
@@ -302,7 +299,7 @@ impl<const V: usize> Neighbours<V> {
             contact.pad = Some(contact.state.position);
         }
         let out = contact.has_flag(OUT_OF_PLAN) && contact.position_at.is_some();
-        contact.out_of_plan_since = contact.out_of_plan_since.or(Some(now)).filter(|_| out);
+        contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
         // Ranks beyond the bitmap are not reported.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
@@ -343,7 +340,7 @@ impl<const V: usize> Neighbours<V> {
                 rank: contact.rank,
                 progress_m,
                 grounded: contact.state.grounded || dead,
-                out_of_plan: contact.out_of_plan_since.is_some_and(|since| since <= self.clear_at) || dead,
+                out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
                 detours: contact.has_flag(ON_DETOUR),
                 ..contact.state
             };
@@ -358,9 +355,7 @@ impl<const V: usize> Neighbours<V> {
         let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
         contact.is_some_and(|c| {
             let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
-            passed
-                || c.out_of_plan_since.is_some_and(|since| since <= self.clear_at)
-                || c.is_dead(self.clear_at)
+            passed || c.out_since.is_some_and(|since| since <= self.clear_at) || c.is_dead(self.clear_at)
         })
     }
 
@@ -421,7 +416,7 @@ impl<const V: usize> Neighbours<V> {
     /// The echo of one neighbour's last intent, of each in turn.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
         let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
-        IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_of_mission_at?)
+        IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
     }
 
     /// Whom we heard lately, a bit for each rank.

@@ -6,7 +6,7 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
-use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, WaypointRange, WaypointSet};
+use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, WaypointRange};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
 use planner_core::safety::{Braking, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet};
@@ -336,7 +336,6 @@ fn call_paths(to: &mut ResultChecksum<'_, impl CallListener>) {
             track::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
         }
         call_tasks(to, &path);
-        call_waypoint_sets(to);
         to.add_count(push_until_full(&path));
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
@@ -351,30 +350,27 @@ fn call_tasks(to: &mut ResultChecksum<'_, impl CallListener>, path: &Path<4>) {
         WaypointRange { first: PicturePlan::MAX_AREA_WAYPOINTS - 1, end: PicturePlan::MAX_AREA_WAYPOINTS };
     for spacing_m in HARD_NUMBERS {
         let new = || PicturePlan::new(spacing_m, HeadingMode::Ahead, Trigger::Distance);
-        let mut photographs = to.call("photographs::PicturePlan::new", new);
+        let mut plan = to.call("photographs::PicturePlan::new", new);
         for (from, until) in [(0, last), (last, last), (1, 0), (0, PicturePlan::MAX_PATH_WAYPOINTS), (62, 63)]
         {
-            let marked = to.call("photographs::PicturePlan::add_stretch", || {
-                photographs.add_stretch(from, until, waypoints)
-            });
+            let marked =
+                to.call("photographs::PicturePlan::add_stretch", || plan.add_stretch(from, until, waypoints));
             assert_eq!(marked.is_ok(), from <= until && until < PicturePlan::MAX_PATH_WAYPOINTS);
         }
-        let photographs = to
-            .call("photographs::PicturePlan::with_area", || photographs.with_area(u32::MAX, spacing_m > 0.0));
-        assert_eq!(to.call("photographs::PicturePlan::area", || photographs.area()), u32::MAX);
-        let all = to.call("photographs::PicturePlan::count", || photographs.count(path));
-        let end_m = to.call("photographs::PicturePlan::last_picture_m", || photographs.last_picture_m(path));
+        let plan =
+            to.call("photographs::PicturePlan::with_area", || plan.with_area(u32::MAX, spacing_m > 0.0));
+        assert_eq!(to.call("photographs::PicturePlan::area", || plan.area()), u32::MAX);
+        let all = to.call("photographs::PicturePlan::count", || plan.count(path));
+        let end_m = to.call("photographs::PicturePlan::last_picture_m", || plan.last_picture_m(path));
         assert!(end_m.is_none_or(|end_m| end_m <= path.length_m()));
-        let stretches =
-            to.call("photographs::PicturePlan::stretches", || photographs.stretches(path).count());
+        let stretches = to.call("photographs::PicturePlan::stretches", || plan.stretches(path).count());
         for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {
-            let taken =
-                to.call("photographs::PicturePlan::taken_count", || photographs.taken_count(path, along_m));
+            let taken = to.call("photographs::PicturePlan::taken_count", || plan.taken_count(path, along_m));
             let passed =
-                to.call("photographs::PicturePlan::passed_count", || photographs.passed_count(path, along_m));
+                to.call("photographs::PicturePlan::passed_count", || plan.passed_count(path, along_m));
             assert!(passed <= taken || spacing_m <= 0.0, "{along_m}: {passed} of {taken}");
             let at_m = to.call("photographs::PicturePlan::last_picture_before_m", || {
-                photographs.last_picture_before_m(path, along_m)
+                plan.last_picture_before_m(path, along_m)
             });
             assert!(
                 taken <= all && at_m.is_none_or(|at_m| at_m <= path.length_m() + 1.0),
@@ -385,36 +381,18 @@ fn call_tasks(to: &mut ResultChecksum<'_, impl CallListener>, path: &Path<4>) {
         for count in [0, 1, all, u32::MAX] {
             let pictures = WaypointRange { first: 0, end: count };
             let shown = to.call("photographs::PicturePlan::shown_waypoints", || {
-                photographs.shown_waypoints(path, pictures).count()
+                plan.shown_waypoints(path, pictures).count()
             });
             assert!(shown <= stretches, "{count}: {shown} of {stretches}");
         }
-        for shots in photographs.stretches(path) {
+        for shots in plan.stretches(path) {
             let place_m =
                 to.call("photographs::PictureStretch::picture_at_m", || shots.picture_at_m(shots.count));
             to.add(place_m);
         }
-        let task = Task::Photograph(photographs);
+        let task = Task::Photograph(plan);
         assert!(to.call("flight::Task::leaves_pad", || task.leaves_pad()));
         assert_eq!(to.call("flight::Task::goal", || task.goal()), None);
-    }
-}
-
-/// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
-fn call_waypoint_sets(to: &mut ResultChecksum<'_, impl CallListener>) {
-    let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
-    let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);
-    for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {
-        let before = to.call("done::WaypointSet::count", || done.count());
-        let inserted = to.call("done::WaypointSet::insert", || done.insert(WaypointRange { first, end }));
-        let after = done.count();
-        assert_eq!(inserted == Ok(true), after > before, "{first} to {end}: {before}, {after}");
-        let ranges = to.call("done::WaypointSet::ranges", || done.ranges().len());
-        assert_eq!(to.call("done::WaypointSet::is_empty", || done.is_empty()), ranges == 0);
-        to.add_count(after as usize);
-        if after == u32::MAX || inserted.is_err() {
-            to.call("done::WaypointSet::clear", || done.clear());
-        }
     }
 }
 

@@ -10,7 +10,7 @@ use planner_core::coverage::powell::{self, powell};
 use planner_core::coverage::tracks::{self, Lane, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
-use planner_core::flight::WaypointRange;
+use planner_core::flight::{WaypointRange, WaypointSet};
 
 use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum};
 
@@ -84,6 +84,7 @@ fn is_good(number: f32) -> bool {
 
 /// Makes all of them. Lent are afterwards the lanes and the routes of [`area`].
 pub(super) fn call_coverage(to: &mut ResultChecksum<'_, impl CallListener>, lent: &mut CoverageWorkspaces) {
+    call_waypoint_sets(to);
     call_cameras(to);
     call_areas(to);
     let area = area();
@@ -442,4 +443,22 @@ fn call_share_searches(
         Err(CoverageError::WorkspaceTooSmall)
     );
     assert_eq!(powell(&good, &powell::PowellConfig { evaluations: 50 }, ws, plan), Ok(()));
+}
+
+/// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
+fn call_waypoint_sets(to: &mut ResultChecksum<'_, impl CallListener>) {
+    let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
+    let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);
+    for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {
+        let before = to.call("done::WaypointSet::count", || done.count());
+        let inserted = to.call("done::WaypointSet::insert", || done.insert(WaypointRange { first, end }));
+        let after = done.count();
+        assert_eq!(inserted == Ok(true), after > before, "{first} to {end}: {before}, {after}");
+        let ranges = to.call("done::WaypointSet::ranges", || done.ranges().len());
+        assert_eq!(to.call("done::WaypointSet::is_empty", || done.is_empty()), ranges == 0);
+        to.add_count(after as usize);
+        if after == u32::MAX || inserted.is_err() {
+            to.call("done::WaypointSet::clear", || done.clear());
+        }
+    }
 }

@@ -325,7 +325,9 @@ fn call_detours(
             let blocked = to.call("detour::is_path_blocked", || {
                 detour::is_path_blocked(path, hard..f32::INFINITY, p.x, p.y, &p, &thing)
             });
-            to.call("detour::is_path_blocked", || detour::is_path_blocked(path, -1.0..hard, p.x, p.y, &p, &thing));
+            to.call("detour::is_path_blocked", || {
+                detour::is_path_blocked(path, -1.0..hard, p.x, p.y, &p, &thing)
+            });
             to.add_bool(blocked);
             let count = to.call("detour::count_segments_ahead", || detour::count_segments_ahead(path, hard));
             assert!(count <= path.waypoints().len() + 2);

@@ -35,7 +35,7 @@ pub(crate) struct NeighbourEntry {
     pub(super) boot_ms: u32,
     pub(super) flags: u8,
     /// Since when it has reported that it is out, with its place known.
-    pub(super) out_of_plan_since: Option<Instant>,
+    pub(super) out_since: Option<Instant>,
     pub(super) hears_us_at: Option<Instant>,
     /// Whom it hears, a bit for each rank.
     pub(super) heard_bits: u32,
@@ -47,7 +47,7 @@ pub(crate) struct NeighbourEntry {
     pub(super) intent_sequence: u8,
     pub(super) message_delay: MessageDelay,
     /// When an intent of our mission was last heard from it.
-    pub(super) intent_of_mission_at: Option<Instant>,
+    pub(super) intent_at: Option<Instant>,
     pub(super) points: Vec<Point, MAX_POINTS>,
     /// Number of the last of them that the vehicle flies to only where nobody hears it.
     pub(super) first_unheard_point: u8,
@@ -67,7 +67,7 @@ pub(crate) struct NeighbourEntry {
     /// Seconds until the last of those is open.
     pub(super) gates_open_in_s: u8,
     /// Whether it was last heard where the radio may not reach.
-    pub(super) near_radio_range: bool,
+    pub(super) at_range_edge: bool,
     /// Progress that an unheard vehicle makes at least, m/s.
     pub(super) assumed_speed_mps: f32,
     /// How fast it was when its position was heard, m/s.
@@ -147,7 +147,7 @@ impl NeighbourEntry {
     #[inline(never)]
     pub(super) fn flies_plan_unheard(&self) -> bool {
         self.state.progress_m.is_some_and(|progress_m| {
-            self.near_radio_range && self.on_plan() && self.gates_open_up_to_m > progress_m + 0.5
+            self.at_range_edge && self.on_plan() && self.gates_open_up_to_m > progress_m + 0.5
         })
     }
 
@@ -155,10 +155,10 @@ impl NeighbourEntry {
     /// as far as its gates were open.
     pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now)?;
-        let Some(known_at) = self.intent_of_mission_at.max(self.relayed_at) else { return Some(known_m) };
+        let Some(known_at) = self.intent_at.max(self.relayed_at) else { return Some(known_m) };
         let after_s = RECKONED_AFTER_S + f32::from(self.gates_open_in_s);
         let silent_s = (now - known_at).as_secs_f32() - after_s;
-        let beyond = self.near_radio_range || self.position_at.is_none();
+        let beyond = self.at_range_edge || self.position_at.is_none();
         if silent_s <= 0.0 || !beyond || self.has_flag(ON_DETOUR | OUT_OF_PLAN) {
             return Some(known_m);
         }
@@ -169,7 +169,7 @@ impl NeighbourEntry {
     /// Seconds until it has come past `until_m` for sure; none where that is open.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now).filter(|_| !self.has_flag(ON_DETOUR | OUT_OF_PLAN))?;
-        let known_at = self.intent_of_mission_at.max(self.relayed_at)?;
+        let known_at = self.intent_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.assumed_speed_mps;
         let after_s = RECKONED_AFTER_S + f32::from(self.gates_open_in_s) - (now - known_at).as_secs_f32();
         (until_m <= self.gates_open_up_to_m - PROGRESS_ERROR_M).then(|| libm::fmaxf(fly_s + after_s, 0.0))

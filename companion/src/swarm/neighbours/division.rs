@@ -33,8 +33,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn step_fleet(&mut self, own: &OwnReport, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
         let roster = &self.contacts[..self.roster];
-        let lately =
-            |c: &&NeighbourEntry| c.intent_of_mission_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
+        let lately = |c: &&NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
         let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.heard_bits);
         let own_rank = usize::from(self.own_rank);
         fleet.step(now, own, |rank| {
@@ -42,7 +41,7 @@ impl<const V: usize> Neighbours<V> {
             let bit = 1u32.checked_shl(rank as u32).unwrap_or(0);
             contact.filter(|_| rank != own_rank).map_or(MemberReception::default(), |contact| {
                 MemberReception {
-                    heard_at: contact.intent_of_mission_at,
+                    heard_at: contact.intent_at,
                     hears_us: contact.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
                     heard_by_others: by_others & bit != 0,
                 }
@@ -52,8 +51,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether one that follows another plan of this mission was heard lately.
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
-        let lately =
-            |c: &NeighbourEntry| c.intent_of_mission_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
+        let lately = |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 

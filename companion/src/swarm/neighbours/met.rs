@@ -109,7 +109,7 @@ impl NeighbourEntry {
             reaches(self.rest_radius_m(reach));
         }
         let mut away_sq = across_sq;
-        let told = self.intent_of_mission_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
+        let told = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| told) {
             away_sq = away_sq.min((first - reach.place).xy().norm_squared());
             reaches(if self.is_leased() { self.unheard_distance_m() } else { self.extent_m });
@@ -164,7 +164,7 @@ impl NeighbourEntry {
     /// Whether it follows the plan out of range, as others report or as it was heard last.
     fn is_out_of_range(&self, now: Instant) -> bool {
         let silent = !self.has_flag(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
-        let unheard = silent && self.near_radio_range && self.on_plan();
+        let unheard = silent && self.at_range_edge && self.on_plan();
         let flies_on = || self.flies_plan_unheard() || self.heard_within(now, UNHEARD_WAIT);
         self.is_reported_out_of_range(now) || (unheard && flies_on())
     }
@@ -203,9 +203,8 @@ impl<const V: usize> Neighbours<V> {
         // Most are heard: then nothing of what follows is so.
         let silent = placed_for >= MAX_HEIGHT_AGE;
         // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
-        let told_at = contact
-            .intent_of_mission_at
-            .filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
+        let told_at =
+            contact.intent_at.filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
         let told_s = told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.

@@ -115,9 +115,7 @@ impl NeighbourEntry {
     /// it is not heard. None if it was last heard off the plan.
     pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
-        if self.heard_within(now, HEARD_DIRECTLY_WITHIN)
-            || (own_m.is_none() && self.intent_of_mission_at.is_some())
-        {
+        if self.heard_within(now, HEARD_DIRECTLY_WITHIN) || (own_m.is_none() && self.intent_at.is_some()) {
             return own_m;
         }
         match (own_m, self.relayed_m) {
@@ -142,7 +140,7 @@ impl NeighbourEntry {
     /// The relayed report of this vehicle: none off the plan.
     fn relayed_progress(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.progress_m(now)?;
-        let age = (now - self.intent_of_mission_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
+        let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
         // The difference is not below zero, and 0 where it is no number.
         let clear = (self.gates_open_up_to_m - progress_m) as u8;
         let age = age.min(u64::from(u8::MAX)) as u8;

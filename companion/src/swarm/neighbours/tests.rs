@@ -131,11 +131,7 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
     table.handle_intent(at(0), 1, &intent(OUT_OF_PLAN | BLOCKED, 7, 8), 1, None);
     table.handle_position(at(0), &ORIGIN, 9, &place(0, 0));
     assert_eq!(table.states_at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
-    assert_eq!(
-        (table.heard_bits(at(0)), table.blocked_count_before(200)),
-        (0, 0),
-        "and its flags do not count"
-    );
+    assert_eq!((table.heard_bits(at(0)), table.blocked_count_before(200)), (0, 0), "nor do its flags");
     table.handle_intent(at(100), 1, &intent(0, 1, 2), 1, None);
     assert!(table.states_at(at(100)).is_empty(), "it is no stranger any more");
     table.handle_position(at(200), &ORIGIN, 9, &place(200, 0));
@@ -185,11 +181,7 @@ fn silence_is_that_of_those_who_fly() {
     let at = Instant::from_millis;
     assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "never heard");
     table.handle_intent(at(5000), 1, &Intent { heard_bits: 0, ..intent(0, 1, 2) }, 1, None);
-    assert_eq!(
-        table.silence_duration(at(9000), at(2000)),
-        Duration::from_millis(7000),
-        "it does not hear us"
-    );
+    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "unheard");
     table.handle_intent(at(5000), 1, &intent(0, 1, 2), 1, None);
     assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(4000));
     assert!(table.linked_within(at(5500), Duration::from_millis(1000)));
@@ -321,8 +313,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         };
         let placed_at = age(rng);
         contact.position_at = Some(placed_at);
-        contact.intent_of_mission_at = Some(age(rng));
-        contact.heard_at = contact.position_at.max(contact.intent_of_mission_at);
+        contact.intent_at = Some(age(rng));
+        contact.heard_at = contact.position_at.max(contact.intent_at);
         contact.relayed_at = Some(age(rng)).filter(|_| seed % 3 == 0);
         contact.moved_at = age(rng);
         let lands = seed % 2 == 0;

@@ -49,7 +49,7 @@ const FLASH_LEN: usize = 4 << 20;
 const STORE_OFFSET: u32 = 1 << 20;
 /// Address of our store.
 const STORE_ADDRESS: usize = 0x1010_0000;
-/// FlashLayout of the store, which lies after the program.
+/// Layout of the store, which lies after the program.
 pub const LAYOUT: FlashLayout = FlashLayout::PICO2;
 
 /// Receives by interrupt into a ring.
