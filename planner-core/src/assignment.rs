@@ -50,7 +50,7 @@ pub struct AssignmentWorkspace<const N: usize> {
 }
 
 impl<const N: usize> AssignmentWorkspace<N> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         assert!(N < UNASSIGNED as usize, "indices are 16 bits");
         Self {

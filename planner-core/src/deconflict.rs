@@ -10,7 +10,7 @@ use libm::{fmaxf, fminf, sqrtf};
 use crate::flight::{Gate, Path};
 use crate::{ConfigError, Point, all_positive};
 
-/// Which rule keeps vehicles apart.
+/// Rule by which vehicles keep apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// None.
@@ -60,7 +60,7 @@ pub struct Neighbour {
     pub age_s: f32,
     /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it flies another plan.
     pub progress_m: Option<f32>,
-    /// Whether it stands on the ground, or lies there for all one knows.
+    /// Whether it is on the ground, or has to be assumed there.
     pub grounded: bool,
     /// Whether it has left the plan for good: its gates are open, and it is an obstacle.
     pub out_of_plan: bool,
@@ -189,13 +189,13 @@ fn advise_by_priority<const W: usize>(
     advice
 }
 
-/// The neighbour of an id: most come sorted by it.
+/// The neighbour with this id. Neighbours are usually sorted by id.
 fn find_neighbour(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
     let sorted = neighbours.binary_search_by_key(&id, |n| n.id).ok();
     sorted.map(|at| &neighbours[at]).or_else(|| neighbours.iter().find(|n| n.id == id))
 }
 
-/// The own path ahead, as far as it is looked at: the points where this vehicle will be, one after each look.
+/// Samples of the own path ahead: the points where this vehicle will be, at equal distances.
 struct PathAhead {
     points: Vec<Point, MAX_PATH_SAMPLES>,
     step_m: f32,

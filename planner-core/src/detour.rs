@@ -1,13 +1,13 @@
-//! One vehicle's way around what left the plan: a vehicle that lies, stands or hovers where the schedule did not put it. Over a
+//! One vehicle's detour around a vehicle that left the plan and lies, stands or hovers off its schedule. Over a
 //! field, where there is no roadmap, [`crate::coverage::around`] plans it.
 //!
 //! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so there is no time in it: the
-//! shortest path on the roadmap from where the vehicle hovers to its goal that keeps off every [`KeepOutZone`]. It begins with
-//! the rest of the leg at hand, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
+//! shortest path on the roadmap from where the vehicle hovers to its goal that keeps clear of every [`KeepOutZone`]. It begins with
+//! the rest of the current leg, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
 //! something already than it should be, it only comes no nearer. A column ends at the ground, as far as the roadmap says where
 //! that is.
 //!
-//! ENU metres. Cost: two A*, each edge looked at against every [`KeepOutZone`]; each of these against every node.
+//! ENU metres. Cost: two A*, each edge checked against every [`KeepOutZone`]; each of these against every node.
 
 use core::ops::Range;
 
@@ -26,7 +26,7 @@ const HOVER_SWAY_M: f32 = 0.05;
 /// safety filter allows no more.
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
-/// A stretch to stay away from.
+/// A capsule or column that a detour keeps clear of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOutZone {
     /// One end of the zone's axis.
@@ -46,7 +46,7 @@ pub enum ZoneKind {
     Static,
     /// A vehicle at `from` that descends to `to`: not to be rested below, nor flown up to.
     Descending,
-    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is kept off.
+    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is kept clear.
     Grounded,
 }
 
@@ -58,7 +58,7 @@ impl KeepOutZone {
         check_not_negative("radius_m", self.radius_m)
     }
 
-    /// The zone with no more distance than `here` has: a vehicle that is too near already may fly
+    /// The zone, shrunk so that `here` is not inside it: a vehicle that is too near already may fly
     /// off.
     fn shrunk_to(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
@@ -100,7 +100,7 @@ impl KeepOutZone {
         }
     }
 
-    /// Whether a place is too near.
+    /// Whether a place is inside the zone.
     pub fn contains(&self, place: &Point) -> bool {
         self.intersects(place, place)
     }
@@ -121,7 +121,7 @@ impl KeepOutZone {
     }
 }
 
-/// The box around what is too near, for many legs in a row: most are beside it.
+/// Bounding box of a zone, for a quick check of many legs: most legs are outside it.
 struct BoundingBox {
     low: Point,
     high: Point,
@@ -197,7 +197,7 @@ pub fn count_segments_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usi
     path.waypoints().len() - count_legs_begun(path, along_m) + 2
 }
 
-/// The waypoints that are not ahead of an arc length.
+/// Number of waypoints up to an arc length.
 fn count_legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
@@ -266,7 +266,7 @@ fn check_not_negative(name: &'static str, number: f32) -> Result<(), ConfigError
     if number >= 0.0 && number.is_finite() { Ok(()) } else { Err(ConfigError(name)) }
 }
 
-/// Why there is no way around.
+/// Reason why no detour was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DetourError {
     /// The request, or something to keep off, holds a number that it may not.
@@ -282,8 +282,8 @@ pub enum DetourError {
 /// Greatest length of a path to a landing place aside, and greatest distance of that place, metres.
 const MAX_SIDESTEP_M: f32 = 20.0;
 
-/// The shortest path to the goal, or aside, that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer
-/// already the distance is shortened; `nodes` is scratch.
+/// The shortest path to the goal, or aside, that keeps clear of all `obstacles`, written to `out`. Of an obstacle that
+/// is nearer already the distance is shortened; `nodes` is scratch.
 pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -350,7 +350,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
     failed
 }
 
-/// A zone that is nearer already than it should be keeps no more distance than there is.
+/// Shrinks each zone that already contains the vehicle, so that the vehicle is on its border.
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
         *obstacle = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);

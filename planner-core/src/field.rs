@@ -131,7 +131,7 @@ impl<'a> FieldView<'a> {
     }
 }
 
-/// The length that a file's header tells, of a file that this version can read.
+/// The file length that a header states. The file's version has to be one that this code reads.
 ///
 /// # Errors
 /// It is no field, of another version, or has nodes where none may be.

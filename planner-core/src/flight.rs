@@ -28,7 +28,7 @@ pub struct Waypoint {
     pub leave_s: f32,
 }
 
-/// Why a path was refused.
+/// Reason why a path was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathError {
     /// The path has more than `W` waypoints.
@@ -53,7 +53,7 @@ impl<const W: usize> Path<W> {
         Self { waypoints: Vec::new() }
     }
 
-    /// Index of its last waypoint; none of an empty path.
+    /// Index of the path's last waypoint; `None` if the path is empty.
     pub fn last(&self) -> Option<usize> {
         self.waypoints.len().checked_sub(1)
     }
@@ -199,7 +199,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// Whether it leaves its pad.
+    /// Whether the vehicle leaves its pad.
     pub fn leaves_pad(&self) -> bool {
         *self != Self::Stay
     }
@@ -247,7 +247,7 @@ pub struct Flight<const W: usize> {
 /// - It reports no more than the reference that it follows has come to, and at most [`PROGRESS_ERROR_M`] less once it stands.
 /// - It reports more than the path's length and the descent only when it stands on the ground, disarmed.
 ///
-/// A vehicle that waits where it is sent reports enough to open every gate that waits for what lies behind it.
+/// A vehicle that waits at its assigned place reports enough progress to open every gate for the part behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
     /// Place of the gate, metres along the own path; −climb is the pad.

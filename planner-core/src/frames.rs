@@ -3,7 +3,7 @@
 //! The mission frame is ENU metres on the plane tangent to the WGS84 ellipsoid at the mission origin. An autopilot's
 //! local frame is NED metres about its own EKF origin, but *not* a tangent plane: PX4 projects azimuthally on a sphere,
 //! ArduPilot scales degrees. Two kilometres from the origin they differ from WGS84 by metres, so every conversion goes
-//! through latitude and longitude with the projection of the autopilot at hand. f64 throughout: degrees at 1e-9.
+//! through latitude and longitude with the projection of the current autopilot. f64 throughout: degrees at 1e-9.
 
 use libm::{asin, atan2, cos, fabs, sin, sqrt};
 use nalgebra::Vector3;

@@ -93,7 +93,7 @@ fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Po
         .all(|end| grid.shape().cell_of(end).is_some() && !keeps_clear(grid, config, end))
 }
 
-/// Points of the unit cube, [0, 1) on each axis.
+/// Sequence of random points of the unit cube, [0, 1) on each axis.
 struct SampleSequence {
     rng: Pcg32,
     sampling: Sampling,

@@ -40,7 +40,7 @@ pub const HEADER_LEN: usize = 72;
 pub const MAX_NODES: usize = u16::MAX as usize;
 /// Largest coordinate magnitude, metres: up to there f32 distinguishes places a millimetre apart.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
-/// Longest edge a roadmap may have, metres. The schedule looks at each metre of an edge, so this bounds its work.
+/// Longest edge a roadmap may have, metres. The schedule checks each metre of an edge, so this bounds its work.
 pub const MAX_EDGE_M: f32 = 100.0;
 /// Longest path from a node to a landmark, metres: up to this length a sum of edges is right to 4
 /// mm an edge.
@@ -56,7 +56,7 @@ const LANDMARKS_LEN: usize = 4 * LANDMARKS;
 const HEIGHT_LEN: usize = 4;
 const WORD_LEN: usize = 4;
 
-/// Why a roadmap was refused, on reading or writing.
+/// Reason why a roadmap was refused, on reading or writing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RoadmapError {
     /// The bytes are no whole file.
@@ -149,7 +149,7 @@ impl RoadmapHeader {
         Ok(())
     }
 
-    /// Whether an edge may be as long as from `a` to `b`; the builder's own rule, to the bit.
+    /// Whether an edge from `a` to `b` has a valid length, by exactly the rule of the builder.
     fn is_edge_length_valid(&self, a: &Point, b: &Point) -> bool {
         let square = squared_length((*a).into(), (*b).into());
         square >= self.edge_min_m * self.edge_min_m && square <= self.edge_max_m * self.edge_max_m
@@ -370,7 +370,7 @@ impl<'a> RoadmapView<'a> {
     }
 }
 
-/// The length that a file's header tells, of a file that this version can read.
+/// The file length that a header states. The file's version has to be one that this code reads.
 ///
 /// # Errors
 /// It is no roadmap, of another version, or its counts are not those of such a length.

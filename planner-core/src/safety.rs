@@ -28,7 +28,7 @@ pub const MAX_LAG_S: f32 = 0.25;
 /// A neighbour heard within this time counts as heard, seconds.
 pub const FRESH_S: f32 = 1.0;
 /// A vehicle further than this from the path points that it reports does not fly along them,
-/// metres: real vehicles lag by up to 0.5 m and stray by 0.4 m.
+/// metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
 pub const OFF_REPORTED_PATH_M: f32 = 0.9;
 /// Most points of the set that a vehicle may occupy: its place and the eight path points that it
 /// reports.
@@ -73,7 +73,7 @@ impl ReachableSet {
         Self { points, foot: None, widened_by_m: 0.0 }
     }
 
-    /// Goes on straight to a point; whether there is room for it.
+    /// Appends a straight leg to a point. Returns false if the set is full.
     fn push(&mut self, to: Point) -> bool {
         self.points.push(to).is_ok()
     }
@@ -97,7 +97,7 @@ impl ReachableSet {
             let leg_m = sqrtf(leg.norm_squared());
             let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
             if !self.push(end) {
-                // More corners than there is room for: anywhere within what is left.
+                // The set has no memory for more corners: assume any place within the remaining length.
                 self.widened_by_m = left_m.max(0.0);
                 return;
             }
@@ -153,7 +153,7 @@ pub struct NeighbourMotion<'a> {
     pub age_s: f32,
     /// How late messages are when they are heard, seconds.
     pub delay_s: f32,
-    /// Points that it flies along next; empty if somebody else flies it.
+    /// Points that it flies along next; empty while a pilot or a failsafe flies it.
     pub points: &'a [Point],
     /// Place of the neighbour on its points.
     pub place_on_points: PlaceOnPoints,
@@ -250,7 +250,7 @@ pub struct MotionBounds {
     pub braking: Braking,
     /// Fastest flight, m/s.
     pub speed_max_mps: f32,
-    /// A vehicle that nobody hears has stopped by then, seconds.
+    /// Time after which a vehicle that no other vehicle hears has stopped, seconds.
     pub silent_s: f32,
 }
 
@@ -295,7 +295,7 @@ impl NeighbourMotion<'_> {
         along_m + more_m + self.lateral_reach_m(bounds) + OFF_REPORTED_PATH_M
     }
 
-    /// How old what it says is, seconds.
+    /// Age of the neighbour's last report, seconds.
     #[inline]
     fn data_age_s(&self) -> f32 {
         self.age_s + self.delay_s
@@ -331,7 +331,7 @@ impl NeighbourMotion<'_> {
     pub fn reachable_set(&self, bounds: &MotionBounds, ahead_s: f32) -> ReachableSet {
         let mut set = ReachableSet::at(self.position);
         if self.grounded {
-            // How high it lies may be unknown.
+            // Its height on the ground may be unknown.
             set.add_column(self.column_to_m);
             return set;
         }

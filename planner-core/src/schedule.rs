@@ -49,7 +49,7 @@ pub struct ScheduleWorkspace {
 }
 
 impl ScheduleWorkspace {
-    /// Empty.
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self { own: Vec::new(), other: Vec::new(), blocks: Blocks::new(), forbidden: Vec::new() }
     }
@@ -205,7 +205,7 @@ pub fn gates<const W: usize, const G: usize>(
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
-/// Distance within which gates of flight `index` have to be merged for no more than `most`, metres.
+/// Distance within which gates of flight `index` have to be merged so that at most `most` remain, metres.
 pub(crate) fn gate_merge_distance_m<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],

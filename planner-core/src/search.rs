@@ -17,7 +17,7 @@ use crate::roadmap::{HalfEdge, RoadmapView, target_of};
 pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
-/// Half-edges compared together; a node seldom has more.
+/// Half-edges compared together; a node rarely has more.
 const HALF_EDGE_CHUNK: usize = 64;
 /// Places in a chunk; as long as a `u8` can count, so that no index needs a check.
 type Improvements = [u8; 256];
@@ -25,7 +25,7 @@ type Improvements = [u8; 256];
 /// Most targets for which the search is guided (A*) to each target in turn: a board's 32 vehicles.
 const MAX_GUIDED_TARGETS: usize = 32;
 
-/// Why a search gave no answer.
+/// Reason why a search has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchError {
     /// No passable way joins the two nodes.
@@ -48,7 +48,7 @@ pub struct SearchWorkspace<const N: usize> {
 }
 
 impl<const N: usize> SearchWorkspace<N> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         assert!(N <= u16::MAX as usize, "node indices are 16 bits");
         Self { distance: [0.0; N], parent: [0; N], heap: Heap::new() }

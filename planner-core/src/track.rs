@@ -120,7 +120,7 @@ fn allowed_deviation_m(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
 }
 
-/// The way from one waypoint to the next, as a unit vector.
+/// Unit vector from one waypoint to the next.
 fn unit_direction(from: &Waypoint, to: &Waypoint) -> Point {
     (to.position - from.position) / (to.along_m - from.along_m)
 }
@@ -146,7 +146,7 @@ fn corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &
     fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
 }
 
-/// The speed from which a way of `2 · accel · way = room` is enough to brake, if braking begins after `later_s`.
+/// Greatest speed that can be braked to rest within `room / (2 · accel)` metres if braking begins after `later_s`.
 fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
     let lost = accel * later_s;
     sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
@@ -160,9 +160,9 @@ struct PathAhead<'a> {
     along_m: f32,
     /// Distance within which to stop, metres.
     stop_m: f32,
-    /// Direction of the leg at hand.
+    /// Direction of the current leg.
     direction: Point,
-    /// Acceleration of the leg at hand, m/s².
+    /// Acceleration of the current leg, m/s².
     accel: f32,
 }
 

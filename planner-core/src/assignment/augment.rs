@@ -6,7 +6,7 @@
 use super::costs::CostMatrix;
 use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 
-/// Serves the free row number `k`. False if no path leads to a free column.
+/// Augments the matching from free row `k`. Returns false if no path leads to a free column.
 pub(super) fn augment_from_row(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -19,7 +19,7 @@ pub(super) fn augment_from_row(
     augment_shortest_path(costs, state, paths, least)
 }
 
-/// Adds one pair, from whichever free row is cheapest. False if no path is left.
+/// Augments the matching by the cheapest path from any free row. Returns false if there is no path.
 pub(super) fn augment_from_free_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -149,7 +149,7 @@ fn nearest_columns(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u1
     }
 }
 
-/// Gives each column on the path to the row it was reached from.
+/// Assigns each column on the path to the row from which the search reached it.
 fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u16) {
     let mut col = end;
     while col != UNASSIGNED {

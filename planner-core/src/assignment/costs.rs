@@ -1,6 +1,6 @@
 //! The cost matrix, checked.
 
-/// Why an assignment was refused.
+/// Reason why an assignment was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignmentError {
     /// The matrix has no rows or no columns.
@@ -66,7 +66,7 @@ impl<'a> CostMatrix<'a> {
         if cost <= self.limit { cost } else { f32::INFINITY }
     }
 
-    /// One row, in place where it lies so in memory, else copied into `buffer`.
+    /// The costs of one row: a slice of the matrix if it is stored by rows, else a copy in `buffer`.
     #[inline]
     pub(super) fn row_costs<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
         let row = usize::from(row);

@@ -38,7 +38,7 @@ fn reduce_columns(
     paths: &mut AugmentingPaths<'_>,
 ) -> Option<usize> {
     // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a large matrix, the fewer
-    // cache misses. A small one has no room for so many.
+    // cache misses. A small matrix has fewer columns than that.
     match costs.cols {
         0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
         SIMD_LANES..BLOCK_COLUMNS => cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous),

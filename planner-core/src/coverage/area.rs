@@ -1,4 +1,4 @@
-//! The area: polygons to photograph, holes in them, and zones that nobody enters; checked before anything is computed.
+//! The area: polygons to photograph, holes in them, and zones that no vehicle may enter; checked before anything is computed.
 //!
 //! Vertices of all rings lie in one slice, ring after ring, the first vertex of a ring not repeated. Which way a ring
 //! turns does not matter: a place is in the area if it is inside an odd number of outer rings and holes. Cost: O(n²) in
@@ -36,7 +36,7 @@ pub struct Ring {
     pub kind: RingKind,
 }
 
-/// Why rings are no area. Numbers are indices of rings and of vertices, from 0.
+/// Reason why rings do not form an area. Numbers are indices of rings and of vertices, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AreaError {
     /// The area has no outer ring.
@@ -134,7 +134,7 @@ impl<'a> Area<'a> {
         self.rings.iter().any(|ring| ring.kind == RingKind::NoFly)
     }
 
-    /// Vertices of one ring; none of one that there is not.
+    /// Vertices of one ring; empty for an index beyond the last ring.
     pub fn ring(&self, index: usize) -> &'a [Flat] {
         let Some(ring) = self.rings.get(index) else { return &[] };
         let start = index.checked_sub(1).map_or(0, |before| usize::from(self.rings[before].end));

@@ -38,7 +38,7 @@ const MAX_SIDESTEP_RINGS: usize = 20;
 /// Directions on each ring in which a landing place aside is sought.
 const SIDESTEP_DIRECTIONS: usize = 16;
 
-/// Zones, ground and things that no leg meets.
+/// No-fly zones, ground and obstacles that legs keep clear of.
 struct FreeSpace<'a, 't, const N: usize> {
     transit: &'a Transit<'t, N>,
     field: Option<FieldView<'a>>,
@@ -50,7 +50,7 @@ struct FreeSpace<'a, 't, const N: usize> {
 impl<const N: usize> FreeSpace<'_, '_, N> {
     fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
         let touches = |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
-        // A box holds what is between two places in it; where the vehicle is it may have strayed beyond.
+        // A box holds what is between two places in it; where the vehicle is it may have deviated beyond.
         self.is_inside(b)
             && self.transit.is_line_clear(&a.xy(), &b.xy())
             && self.is_above_field(a, b)
@@ -61,7 +61,7 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
         self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
-    /// Whether a leg keeps above the field, looked at half a node apart.
+    /// Whether a leg stays above the height field, checked at samples half a node apart.
     fn is_above_field(&self, a: &Point, b: &Point) -> bool {
         let (Some(field), step) = (&self.field, b - a) else { return true };
         let length_m = step.xy().norm();
@@ -76,11 +76,11 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
     }
 }
 
-/// The way to the goal ([`Goal::Home`]), or aside, that keeps off all `obstacles`, above the field and out of the zones that `transit` knows, written to `out`. Of an
-/// obstacle that is nearer already the distance is shortened.
+/// The way to the goal ([`Goal::Home`]), or aside, that keeps clear of all `obstacles`, above the field and out of the
+/// zones that `transit` knows, written to `out`. Of an obstacle that is nearer already the distance is shortened.
 ///
 /// # Errors
-/// Why there is none.
+/// Reason why there is none.
 pub fn plan_detour<const N: usize, const W: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
@@ -124,7 +124,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
 /// counts; the plan has no gates.
 ///
 /// # Errors
-/// Why there is none.
+/// Reason why there is none.
 pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
@@ -140,7 +140,7 @@ pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
-/// The nearest place to rest at that is reached straight.
+/// The nearest free place that a straight leg reaches.
 fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Option<Point> {
     let here = clear.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
@@ -157,7 +157,7 @@ fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Opti
         .find(|place| rests(place) && clear.is_leg_free(&here, place))
 }
 
-/// Places at one height, and the shortest ways found to them so far.
+/// Nodes at one height, with the shortest distances found to them so far.
 struct VisibilityGraph {
     places: Vec<Flat, MAX_PLACES>,
     distance_m: [f32; MAX_PLACES],
@@ -221,7 +221,7 @@ impl VisibilityGraph {
         Ok(true)
     }
 
-    /// Both ends, corners of zones, and corners around what reaches this height: as many as there is room for.
+    /// Collects both ends, corners of zones, and corners around obstacles at this height, up to the capacity.
     fn collect_nodes<const N: usize>(&mut self, clear: &FreeSpace<'_, '_, N>, from: &Point, to: &Point) {
         self.places.clear();
         let mut add = |place: Flat| _ = self.places.push(place);

@@ -61,7 +61,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
     Ok(fmaxf(least_s, furthest_s + vertical(1)))
 }
 
-/// The largest of many numbers, falling.
+/// The largest values inserted so far, in falling order.
 struct LargestValues {
     values: [f32; MAX_VEHICLES],
 }

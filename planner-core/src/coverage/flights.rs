@@ -23,7 +23,7 @@ pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
 /// Longest path, metres: vehicles report their progress to each other in 16 bits, in decimetres.
 pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 
-/// A vehicle of the mission, beside what it is packed by.
+/// A vehicle's pad and vertical profile, beside the data that packing uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pad {
     /// Id of the vehicle, unique in the swarm.
@@ -40,7 +40,7 @@ pub struct Pad {
     pub airborne: bool,
 }
 
-/// How pictures are taken.
+/// Settings of the camera during a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CaptureSettings {
     /// Greatest distance from one picture to the next, metres.
@@ -56,7 +56,7 @@ pub struct CaptureSettings {
 pub struct FlightInputs<'a> {
     /// The vehicles, in the order of [`Work::vehicles`].
     pub pads: &'a [Pad],
-    /// How pictures are taken.
+    /// Settings of the camera during a flight.
     pub capture: CaptureSettings,
     /// Clearance that every leg is taken to have, metres: there are no walls.
     pub clearance_m: f32,
@@ -75,7 +75,7 @@ pub struct FlightInputs<'a> {
 
 /// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there. Of a route
 /// with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`], a flight is the first stretch ([`PicturePlan::goes_on`]): as many lanes as leave
-/// room for the way home. What is left is for the next division ([`super::losses`]).
+/// room for the path home. What is left is for the next division ([`super::losses`]).
 ///
 /// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a vehicle that cannot be kept
@@ -113,7 +113,7 @@ pub fn plan_flights<const L: usize, const N: usize, const K: usize, const V: usi
     Ok(())
 }
 
-/// Whether every number is one that can be planned with, and all belong together.
+/// Checks that every number is valid and that the inputs are consistent.
 fn check_inputs<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     routes: &[Route],
@@ -213,7 +213,7 @@ fn point_at_height(place: &Flat, height_m: f32) -> Point {
     Point::new(place.x, place.y, height_m)
 }
 
-/// A vehicle that stays on its pad.
+/// The flight of a vehicle that stays on its pad.
 fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
     path.push(pad.start, 0.0)?;
@@ -253,7 +253,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         Ok(draft)
     }
 
-    /// Flies straight to a place; the index of its waypoint.
+    /// Appends a straight leg to a place. Returns the index of its waypoint.
     fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
         self.path.push(place, self.clearance_m)?;
         self.here = place;
@@ -270,13 +270,13 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         corners.into_iter().chain([*to])
     }
 
-    /// Flies there around no-fly zones, all at one height.
+    /// Appends legs around no-fly zones, all at one height.
     fn add_legs_around_zones(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
         self.corners_around_zones(to)
             .try_for_each(|corner| self.add_straight_leg(point_at_height(&corner, height_m)).map(|_| ()))
     }
 
-    /// Comes down to where the first lane begins, which leads to `end`; the index of that waypoint.
+    /// Appends the descent to the start of the first lane, which leads to `end`. Returns the index of that waypoint.
     fn descend_to_lane(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
         let here = self.here.xy();
         let begin = self
@@ -285,7 +285,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.add_straight_leg(begin)
     }
 
-    /// Flies there straight as low as pictures are taken; the index of its waypoint.
+    /// Appends a straight leg at the height of pictures. Returns the index of its waypoint.
     fn add_picture_leg(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
         let Some(following) = self.following else {
             return self.add_straight_leg(point_at_height(to, mission_m));
@@ -339,7 +339,7 @@ fn heading_mode<const L: usize, const N: usize>(
     }
 }
 
-/// The flight of one route, or of its first stretch.
+/// The flight of one route, or of its first part if the whole route does not fit.
 fn route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -365,7 +365,7 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
     }
 }
 
-/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the way home.
+/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the path home.
 fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -423,7 +423,7 @@ fn flight_home<const L: usize, const N: usize, const W: usize>(
     finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
 }
 
-/// A vehicle's way home.
+/// A vehicle's path home.
 struct ReturnInputs<'a> {
     /// Layer of the flight.
     layer_m: f32,

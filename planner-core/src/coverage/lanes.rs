@@ -26,7 +26,7 @@ pub struct LanePattern {
 /// One lane. Waypoint `k` lies `k / (count − 1)` of the way from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
-    /// Begin of the lane.
+    /// Start of the lane.
     pub from: Flat,
     /// End of the lane.
     pub to: Flat,
@@ -55,7 +55,7 @@ impl Lane {
         if self.count < 2 { 0.0 } else { k.min(self.count - 1) as f32 / (self.count - 1) as f32 }
     }
 
-    /// Turns the lane round.
+    /// Reverses the direction of the lane.
     pub(super) fn reverse(&mut self) {
         core::mem::swap(&mut self.from, &mut self.to);
     }
@@ -112,7 +112,7 @@ impl<const L: usize> Tracks<L> {
         lane.start_m + lane.length_m() * lane.fraction_at(number - lane.first)
     }
 
-    /// Numbers the waypoints and measures the way.
+    /// Numbers the waypoints and computes the lengths along the path.
     pub(super) fn number_waypoints<const N: usize>(
         &mut self,
         spacing: &Spacing,
@@ -129,7 +129,7 @@ impl<const L: usize> Tracks<L> {
         self.measure_lengths(transit)
     }
 
-    /// Numbers waypoints that each lane has already, and measures the way.
+    /// Numbers the waypoints that each lane already has, and computes the lengths along the path.
     pub(super) fn measure_lengths<const N: usize>(
         &mut self,
         transit: &Transit<'_, N>,

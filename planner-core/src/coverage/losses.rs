@@ -19,7 +19,7 @@ use crate::schedule::ScheduleWorkspace;
 /// Most separate ranges of waypoints that are done.
 const MAX_DONE_RANGES: usize = 128;
 
-/// State of one vehicle that all agree on before the area is divided again.
+/// State of one vehicle. All vehicles agree on it before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleStatus {
     /// Whether it flies on.
@@ -43,7 +43,7 @@ pub struct Workspace<const L: usize, const K: usize> {
 }
 
 impl<const L: usize, const K: usize> Workspace<L, K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             done: WaypointSet::new(),
@@ -107,7 +107,7 @@ pub struct Loss<'a, const L: usize, const N: usize> {
     pub fates: &'a [VehicleStatus],
 }
 
-/// Why there is no division.
+/// Reason why there is no division.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Error {
     /// The area.
@@ -179,7 +179,7 @@ const fn layer_bit(layer: u8) -> u64 {
     1u64.wrapping_shl(layer as u32)
 }
 
-/// Adds what each vehicle has done, or keeps, to what was done before.
+/// Adds the waypoints that each vehicle has photographed, or keeps as its commitment, to the earlier ones.
 fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: usize>(
     fates: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
@@ -197,7 +197,7 @@ fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: u
     Ok(())
 }
 
-/// Place from which each vehicle goes on.
+/// Sets the place from which each vehicle continues.
 fn set_start_places<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
@@ -222,7 +222,7 @@ fn set_start_places<const L: usize, const N: usize, const K: usize, const V: usi
     Ok(())
 }
 
-/// Gives what is left to those that live.
+/// Divides the remaining work among the vehicles that are alive.
 fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     fates: &[VehicleStatus],

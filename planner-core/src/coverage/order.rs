@@ -68,14 +68,14 @@ struct LaneOrderSearch<'t, 'a, const N: usize> {
 }
 
 impl<const N: usize> LaneOrderSearch<'_, '_, N> {
-    /// Whether another look may be taken.
+    /// Uses up one search step. Returns false if none is left.
     fn take_search_step(&mut self) -> bool {
         let left = self.steps_left > 0;
         self.steps_left = self.steps_left.saturating_sub(1);
         left
     }
 
-    /// The way between two ends, none where the path begins or ends.
+    /// Length between two lane ends; zero where the path begins or ends.
     fn transit_length_m(&self, from: Option<Flat>, to: Option<Flat>) -> f32 {
         match (from, to) {
             (Some(from), Some(to)) => self.transit.distance_m(&from, &to),
@@ -83,7 +83,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         }
     }
 
-    /// 2-opt: turns parts round where that shortens the way.
+    /// 2-opt: reverses parts of the order where that shortens the path.
     fn two_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         for i in 0..lanes.len() {

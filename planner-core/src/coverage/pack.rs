@@ -21,15 +21,15 @@ use crate::assignment::{AssignmentWorkspace, assign};
 /// One vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
-    /// Begin of the vehicle's transit to the first waypoint.
+    /// Start of the vehicle's transit to the first waypoint.
     pub place: Flat,
     /// End of the vehicle's transit home.
     pub home: Flat,
-    /// Speed over ground, metres a second.
+    /// Speed over ground, m/s.
     pub cruise_mps: f32,
-    /// Speed of climb (V_a in the paper), metres a second.
+    /// Speed of climb (V_a in the paper), m/s.
     pub climb_mps: f32,
-    /// Speed of descent (V_d in the paper), metres a second.
+    /// Speed of descent (V_d in the paper), m/s.
     pub descend_mps: f32,
     /// W_k: its share of the work is this by the sum of all.
     pub weight: f32,
@@ -53,7 +53,7 @@ pub enum TrackUnit {
     Waypoint,
 }
 
-/// Which way a route is flown.
+/// Direction in which a route is flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heading {
     /// In rising order of the waypoints' numbers.
@@ -132,7 +132,7 @@ pub struct PackWorkspace<const K: usize> {
 }
 
 impl<const K: usize> PackWorkspace<K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         assert!(K * K <= 1024, "the cost matrix has room for 32 vehicles");
         Self {
@@ -275,7 +275,7 @@ pub fn binpat_with_shares<const L: usize, const N: usize, const K: usize>(
     pack_routes(work, BinEligibility::Anyone, ws, out)
 }
 
-/// Which vehicles a bin may go to.
+/// Vehicles that may receive a bin.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum BinEligibility {
     /// Any.
@@ -284,7 +284,7 @@ pub(super) enum BinEligibility {
     SameWeight,
 }
 
-/// Cuts, assigns, layers, by `ws.shares`.
+/// Cuts the path into bins by `ws.shares`, assigns the bins to vehicles, and sets the layers.
 pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     bins: BinEligibility,

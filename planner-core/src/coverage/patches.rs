@@ -19,7 +19,7 @@ const STRIP_HALVINGS: u32 = 3;
 /// Parts into which a strip is cut.
 const STRIP_PARTS: u32 = 1 << STRIP_HALVINGS;
 
-/// Lays the lanes that are missing.
+/// Adds lanes for the parts that no lane covers yet.
 pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     ws: &mut Workspace<V>,

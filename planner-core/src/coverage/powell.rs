@@ -10,10 +10,10 @@
 use super::CoverageError;
 use super::pack::{BinEligibility, PackWorkspace, Plan, Work, pack_routes};
 
-/// How long POWELL looks.
+/// Settings of POWELL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowellConfig {
-    /// Packings looked at, at most.
+    /// Greatest number of packings that are evaluated.
     pub evaluations: u32,
 }
 
@@ -40,7 +40,7 @@ pub struct Workspace<const K: usize> {
 }
 
 impl<const K: usize> Workspace<K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             pack: PackWorkspace::new(),

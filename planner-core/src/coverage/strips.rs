@@ -22,7 +22,7 @@ pub struct Workspace<const V: usize> {
 }
 
 impl<const V: usize> Workspace<V> {
-    /// Empty.
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self {
             hull: Vec::new(),
@@ -80,7 +80,7 @@ impl<'a> Strips<'a> {
         })
     }
 
-    /// A strip's borders across.
+    /// Both borders of a strip, across the lanes.
     pub(super) fn strip_borders(&self, strip: usize) -> Span {
         let low = self.low + strip as f32 * self.strip_width_m;
         [low, low + self.strip_width_m]

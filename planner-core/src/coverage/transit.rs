@@ -31,7 +31,7 @@ impl<const N: usize> Transit<'_, N> {
 }
 
 impl<'a, const N: usize> Transit<'a, N> {
-    /// Learns an area's no-fly zones.
+    /// Builds the graph from the area's no-fly zones.
     ///
     /// # Errors
     /// [`CoverageError::NoFlyFull`] where they have more than `N` outward corners.
@@ -96,7 +96,7 @@ impl<'a, const N: usize> Transit<'a, N> {
         self.area.is_in_no_fly_zone(place)
     }
 
-    /// Whether a straight way meets no no-fly zone.
+    /// Whether a straight line stays outside all no-fly zones.
     pub fn is_line_clear(&self, from: &Flat, to: &Flat) -> bool {
         let (low, high) = (from.inf(to), from.sup(to));
         let meets = |(a, b): (Flat, Flat)| {
@@ -112,7 +112,7 @@ impl<'a, const N: usize> Transit<'a, N> {
         !self.area.no_fly_edges().any(meets)
     }
 
-    /// The length of the shortest way; infinite where there is none.
+    /// Length of the shortest path; infinite where there is none.
     pub fn distance_m(&self, from: &Flat, to: &Flat) -> f32 {
         if self.is_line_clear(from, to) {
             return (to - from).norm();

@@ -3,7 +3,7 @@
 //! Method: the cone of slopes that stay between both at each sample so far; where the next sample closes it, a corner
 //! before that one, as high as can be where the ground rises and as low where it falls. Each corner lies in the tunnel,
 //! and the field is nowhere steeper than the path may be: so the next sample can always be reached. Samples are half a
-//! node apart. Cost: one look at the field a sample.
+//! node apart. Cost: one lookup of the field for each sample.
 
 use libm::{ceilf, fmaxf, fminf};
 
@@ -38,7 +38,7 @@ impl TerrainFollowing<'_> {
         self.field.highest_m() + self.height_m + self.tolerance_m
     }
 
-    /// Begin of a path to `corners_to` with the fewest corners, and of those the lowest.
+    /// Start of a path to `corners_to` with the fewest corners, and of those the lowest.
     pub fn start_point(&self, from: &Flat, to: &Flat) -> Point {
         let low_m = self.lowest_m(from);
         let mut best = (usize::MAX, low_m);

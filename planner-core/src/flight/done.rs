@@ -33,7 +33,7 @@ impl<const N: usize> WaypointSet<N> {
         self.ranges.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add)
     }
 
-    /// Whether there are none.
+    /// Whether it is empty.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty()
     }

@@ -165,7 +165,7 @@ fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: 
     Ok(())
 }
 
-/// Takes one element out and puts it in again.
+/// Moves one element to another index.
 fn move_element(order: &mut [u16], from: usize, to: usize) {
     if from < to {
         order[from..=to].rotate_left(1);

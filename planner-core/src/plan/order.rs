@@ -61,7 +61,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     failed
 }
 
-/// Which vehicle is scheduled first before any reordering.
+/// Order in which vehicles are scheduled before any reordering.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum InitialOrder {
     Longest,
@@ -106,7 +106,7 @@ const MAX_HEAD_STARTS: usize = 8;
 /// Time that two vehicles head-on need to clear a side room, seconds.
 const HEAD_START_S: f32 = 3.0;
 
-/// The last `count` in the order may leave at once, all others only after a head start.
+/// Head start: the last `count` vehicles in the order may leave at once, all others later.
 struct HeadStart {
     count: usize,
     head_start_s: f32,
@@ -114,7 +114,7 @@ struct HeadStart {
     handover_s: f32,
 }
 
-/// One vehicle's turn among the others.
+/// State of one vehicle's turn to be scheduled.
 struct SchedulingTurn<'a> {
     /// Index of the vehicle in the request.
     index: usize,

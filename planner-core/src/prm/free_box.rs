@@ -30,7 +30,7 @@ struct FreeBox {
     high: [i32; 3],
 }
 
-/// The view from one node.
+/// Line-of-sight checks from one node.
 pub(super) struct NodeVisibility<'g, 'a> {
     grid: &'g VoxelGrid<'a>,
     clearance_m: f32,
@@ -216,7 +216,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     }
 }
 
-/// Judgement of a ray by the box alone.
+/// Classification of a ray by the free box alone.
 enum RayClass {
     /// The ray ends inside, so many cells from the nearest face, but for rounding.
     Clear(f32),

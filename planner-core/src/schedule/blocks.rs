@@ -32,7 +32,7 @@ const _: () = assert!(
     "a bit for each block"
 );
 
-/// Some timed segments in a row.
+/// A block of consecutive timed segments, with its bounding volumes.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     bounding_box: BoundingBox,
@@ -98,7 +98,7 @@ impl Blocks {
         Self { blocks: Vec::new(), groups: Vec::new() }
     }
 
-    /// Makes those of a flight.
+    /// Rebuilds the blocks from the timed segments of a flight.
     pub(super) fn rebuild(&mut self, pieces: &[TimedSegment]) {
         self.blocks.clear();
         // Cannot overflow: there are no more pieces than blocks have room for.
@@ -172,7 +172,7 @@ fn conflict_distance_m(cfg: &ScheduleConfig) -> f32 {
     fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M
 }
 
-/// Which bits are set, in order.
+/// Indices of the set bits, in rising order.
 pub(super) fn set_bit_indices(mut bits: Bits) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;

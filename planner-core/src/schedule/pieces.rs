@@ -134,7 +134,7 @@ pub(super) fn cut_into_segments<const W: usize>(
     push(TimedSegment { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
 }
 
-/// Places where a vehicle may wait on a leg.
+/// Part of a leg on which a vehicle may wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WaitingPlaces {
     /// Before each of its timed segments.
@@ -155,7 +155,7 @@ pub(super) struct Leg {
 }
 
 impl Leg {
-    /// A vertical one from time 0.
+    /// A vertical leg that begins at time 0.
     pub(super) fn climb(from: Point, to: Point, to_s: f32) -> Self {
         Self {
             from,
@@ -194,12 +194,12 @@ impl Leg {
     }
 }
 
-/// Timed segments of a stretch of this length; none of one without length.
+/// Timed segments of a stretch of this length; none for zero length.
 pub(super) fn segment_count(length_m: f32, piece_m: f32) -> u32 {
     libm::ceilf(length_m / piece_m) as u32
 }
 
-/// Whether two pieces come nearer than may be at the same time.
+/// Whether two timed segments come nearer than the separation at the same time.
 pub(super) fn is_conflict(cfg: &ScheduleConfig, p: &TimedSegment, q: &TimedSegment) -> bool {
     if p.parked && q.parked && p.from_s.is_infinite() == q.from_s.is_infinite() {
         // Two pads, or two landing places: their distance is the mission's, not the schedule's.

@@ -38,7 +38,7 @@ struct SippState {
     arrive_s: f32,
     /// End of the safe interval, seconds.
     until_s: f32,
-    /// Begin of the safe interval, seconds.
+    /// Start of the safe interval, seconds.
     from_s: f32,
 }
 
@@ -62,7 +62,7 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
 }
 
 impl<const N: usize, const P: usize> SippWorkspace<N, P> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             pieces: Vec::new(),
@@ -257,7 +257,7 @@ fn conflicting_segments<'s>(
     cells.candidates_near(pieces, own, apart_m).filter(|q| is_conflict(cfg, own, q))
 }
 
-/// A vehicle at one place; the times are for the caller.
+/// Timed segment of a vehicle that stays at one place; the caller sets the times.
 fn stationary_segment(at: Point, parked: bool) -> TimedSegment {
     TimedSegment { from: at, to: at, from_m: 0.0, to_m: 0.0, from_s: 0.0, to_s: 0.0, parked }
 }
@@ -313,7 +313,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         needed_s - off_pad_s
     }
 
-    /// The descent below a goal; an error where another vehicle stands there for ever.
+    /// The descent below a goal. Fails where another vehicle is parked on that place for good.
     fn plan_landing(
         &self,
         cfg: &ScheduleConfig,
