@@ -161,7 +161,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.smoother.is_in_urgent_stop()
     }
 
-    /// Way made along the own path, metres.
+    /// Progress along the own path, metres.
     pub fn progress_m(&self) -> f32 {
         // The length of a detour comes on top of the place where the vehicle left the plan.
         let left_at_m = if self.detours.is_on_detour() { self.detours.left_at_m() } else { 0.0 };
@@ -223,7 +223,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Takes the planner's answer in. Ignored unless it was asked for.
+    /// Handles the planner's answer. An answer that was not requested is ignored.
     pub fn handle_plan(
         &mut self,
         now: Instant,

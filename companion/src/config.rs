@@ -89,7 +89,7 @@ pub struct CheckedConfig<const V: usize> {
     pub(crate) start: Point,
 }
 
-/// Why a configuration was refused.
+/// Reason why a configuration was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
     /// The vehicle's own system id is not in the roster, or 0.
@@ -165,7 +165,7 @@ pub struct Ground {
     pub high_m: f32,
 }
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFailure {
     /// The roadmap is absent or damaged.

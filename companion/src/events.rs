@@ -16,7 +16,7 @@ pub enum Link {
 pub enum PlanKind {
     /// The mission's plan.
     Mission,
-    /// A way around, or aside: [`crate::Companion::detour_request`] says from where and around what.
+    /// A detour, or aside: [`crate::Companion::detour_request`] says from where and around what.
     Detour,
     /// The mission's plan after losses: [`crate::Companion::losses`] says which.
     Division,

@@ -2,9 +2,9 @@
 //! makes the setpoint of it.
 //!
 //! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's start, the path, the
-//! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it goes on
+//! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it continues
 //! where it was. A stop slows the smoother's clock, so the raw point stays where it is. Once the setpoint stands, the raw point
-//! is taken back to it, and going on begins with a straight way back to where the phase was left.
+//! is taken back to it, and continuing begins with a straight way back to where the phase was left.
 
 mod brakes;
 pub(crate) mod evade;
@@ -86,7 +86,7 @@ const SETTLE_WINDOW_M: f32 = 3.0;
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Least movement along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
-/// Distance that the raw point keeps from the geofence, metres: the setpoint may stray by this much
+/// Distance that the raw point keeps from the geofence, metres: the setpoint may deviate by this much
 /// from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Greatest height over the ground, however wide the margin, at which a guided descent becomes
@@ -97,7 +97,7 @@ const TOUCHDOWN_MPS: f32 = 0.5;
 /// Shortest leg that is flown, metres.
 const MIN_LEG_M: f32 = 1e-3;
 
-/// Advice before the neighbours were looked at: wait.
+/// Advice before the neighbours are evaluated: wait.
 const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// The raw point's course, and the smoother that makes setpoints of it.
@@ -228,14 +228,14 @@ impl Guidance {
         }
     }
 
-    /// Takes other limits.
+    /// Sets other limits.
     pub fn set_limits<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
         let Self { track, leg_track, deconflict, .. } = Self::new(config, autopilot);
         (self.track, self.leg_track, self.deconflict) = (track, leg_track, deconflict);
         self.smoother.set_limits(MotionLimits::new(config, autopilot), config.geofence);
     }
 
-    /// Forgets a former flight.
+    /// Clears the state of an earlier flight.
     pub fn reset(&mut self) {
         self.tracker = Tracker::default();
         self.phase = Phase::Hold;
@@ -260,7 +260,7 @@ impl Guidance {
         }
     }
 
-    /// Holds where the setpoint followed the pilot's vehicle to, until that is resumed; where the flight was interrupted is kept.
+    /// Holds at the place to which the pilot flew, until the mission resumes; the place of interruption is kept.
     pub fn hold_after_pilot(&mut self, point: Point) {
         self.hold_at(point);
         self.forget_leg();
@@ -323,7 +323,7 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // The safety filter goes on checking the neighbour that stopped the vehicle.
+                // The safety filter continues checking the neighbour that stopped the vehicle.
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }

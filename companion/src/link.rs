@@ -1,4 +1,4 @@
-//! The two links, to the autopilot and to the swarm: what comes in as frames, what waits to go out, and who is answered how often.
+//! The two links, to the autopilot and to the swarm: incoming frames, outgoing queues, and rate limits of answers.
 
 pub(crate) mod answer_limits;
 pub mod commands;
@@ -87,7 +87,7 @@ impl Links {
         *bits = if due { *bits | bit } else { *bits & !bit };
     }
 
-    /// Whether it is to be made; it is no longer.
+    /// Clears the due flag of a message. Returns whether it was set.
     pub(crate) fn take_due(&mut self, link: Link, what: OnDemandMessage) -> bool {
         let due = self.due[link as usize] & 1 << what as u8 != 0;
         self.set_due(link, what, false);
@@ -139,7 +139,7 @@ impl Links {
         }
     }
 
-    /// Says on both links what a sender did: each `#` of the text stands for a number.
+    /// Sends on both links a text about a sender's action; each `#` of the text stands for a number.
     pub(crate) fn send_sender_text(
         &mut self,
         now: Instant,
@@ -159,7 +159,7 @@ impl Links {
         }
     }
 
-    /// Says who did something.
+    /// Sends a text that names the sender of a message.
     pub(crate) fn log_sender(
         &mut self,
         now: Instant,
@@ -170,7 +170,7 @@ impl Links {
         self.send_sender_text(now, sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
     }
 
-    /// Says by whom a command was given that took effect.
+    /// Sends a text that names the sender of a command that took effect.
     pub(crate) fn log_command(&mut self, now: Instant, sender: SenderKind, command: &Command) {
         self.log_sender(now, sender, command.log_text(), command.from);
     }
@@ -196,7 +196,7 @@ impl Links {
         self.radio.is_half_full()
     }
 
-    /// Bytes that went out by radio beside the state.
+    /// Counts bytes sent by radio in addition to the state messages.
     pub(crate) fn count_radio_bytes(&mut self, bytes: usize) {
         self.radio.count_bytes(bytes);
     }

@@ -17,7 +17,8 @@
 //! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights PX4's SIH reported 0.25 m while
 //! the estimate was 0.7 m off: a receiver's bias and a barometer's drift look to the filter like the truth. Three times
 //! the reported accuracy covers that case, and no proof says that it covers the next. ArduCopter reports ratios and no metres: a
-//! consistent estimate with a constant error looks sound. So whoever flies near walls vouches for the receiver by `FLK_EST_M`.
+//! consistent estimate with a constant error looks sound. An operator who flies near walls vouches for the receiver by
+//! `FLK_EST_M`.
 
 use crate::time::Duration;
 
@@ -46,7 +47,7 @@ pub fn estimate_margin_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f3
     clearance_m - radius_m - tracking_m
 }
 
-/// Whether a bound fits into a room. Both are sums of decimal fractions: a rounding error is no metre.
+/// Whether a bound is within a margin, with a tolerance for rounding.
 pub fn is_bound_within(bound_m: f32, room_m: f32) -> bool {
     bound_m <= room_m + 1e-4
 }

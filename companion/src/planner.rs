@@ -28,7 +28,7 @@ pub enum PlanStep {
 /// desk measures their times.
 ///
 /// # Errors
-/// Why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or goals.
+/// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or goals.
 pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize>(
     mission: &MissionView<'_>,
     roadmap: &RoadmapView<'_>,

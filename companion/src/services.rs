@@ -25,7 +25,7 @@ use crate::time::Instant;
 /// `MAV_PARAM_TYPE_REAL32`.
 const PARAM_TYPE_REAL32: u8 = 9;
 
-/// A frame, from which link and sender it came, and when.
+/// A received frame with its link, its sender and its time of arrival.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceivedFrame<'a> {
     pub(crate) link: Link,
@@ -79,7 +79,7 @@ impl Services {
         self.store.as_ref().map_or(&[], Store::photographed)
     }
 
-    /// Keeps that.
+    /// Stores them in flash.
     pub(crate) fn store_photographed(&mut self, photographed: store::Photographed) {
         if let Some(store) = &mut self.store {
             store.store_photographed(photographed);
@@ -91,7 +91,7 @@ impl Services {
         self.unapplied
     }
 
-    /// Puts the parameters to use.
+    /// Applies the parameters to the settings.
     pub(crate) fn apply_parameters<const V: usize>(&mut self, config: &mut Config<V>) {
         self.unapplied = false;
         [config.cruise_mps, config.climb_mps, config.descend_mps] = self.nominal_mps;
@@ -113,7 +113,7 @@ impl Services {
         store.poll_request(erasing)
     }
 
-    /// Takes in how the flash did it: the bytes read, none for an erasure or a program.
+    /// Handles how the flash did it: the bytes read, none for an erasure or a program.
     pub(crate) fn handle_flash(&mut self, outcome: Result<&[u8], FlashFault>) {
         if let Some(answer) = self.store.as_mut().and_then(|store| store.handle_outcome(outcome)) {
             self.ftp.handle_read_outcome(answer);
@@ -125,7 +125,7 @@ impl Services {
         self.ftp.poll_reply(link as usize)
     }
 
-    /// Serves a frame, if it is one for the services; whether it was.
+    /// Handles a frame that is addressed to the services. Returns whether it was.
     pub(crate) fn handle_frame(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) -> bool {
         let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPANION_COMPONENT));
         if heard.sender_ids() == own {

@@ -5,7 +5,7 @@
 
 use crate::time::{Duration, Instant};
 
-/// Actions that can be due.
+/// Periodic and delayed actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Timer {
     /// A step of the control loop.
@@ -71,7 +71,7 @@ impl Timers {
         due
     }
 
-    /// Due again `every` after it was due: a rhythm, which begins again after a gap instead of catching up.
+    /// Sets the next due time to `every` after the last one. After a gap the period starts again instead of catching up.
     pub(crate) fn schedule_next(&mut self, timer: Timer, now: Instant, every: Duration) {
         let due = self.due_at[timer as usize] + every;
         self.set(timer, if due > now { due } else { now + every });

@@ -38,14 +38,14 @@ pub(crate) struct Handshake {
     disarm_refused: bool,
     /// Offboard or Guided was entered for this mission, and no other mode but landing was seen since.
     in_own_mode: bool,
-    /// The landing detector said air since arming was requested.
+    /// The landing detector reported flight since arming was requested.
     flown: bool,
     /// Refusals reported in this state: command and result.
     reported: [Option<(u16, u8)>; MAX_REFUSALS],
 }
 
 impl Handshake {
-    /// Forgets what belongs to the state left.
+    /// Clears what belongs to the state that was left.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
         self.reported = [None; MAX_REFUSALS];
         self.disarm_refused = false;
@@ -57,7 +57,7 @@ impl Handshake {
         }
     }
 
-    /// Looks at the mode and at the landing detector.
+    /// Updates the handshake from the mode and the landing detector.
     pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
         let kind = t.kind.unwrap_or_default();
         let on_ground = t.on_ground != Some(false);
@@ -109,7 +109,7 @@ impl Handshake {
         self.in_own_mode
     }
 
-    /// Whether the landing detector said air since arming was requested.
+    /// Whether the landing detector reported flight since arming was requested.
     pub(crate) fn has_flown(&self) -> bool {
         self.flown
     }

@@ -74,7 +74,7 @@ impl AutopilotKind {
         }
     }
 
-    /// Mask of a setpoint to stop wherever that is.
+    /// Type mask of a setpoint that stops at the current place.
     pub fn stop_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_VELOCITY,

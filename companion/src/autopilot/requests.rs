@@ -94,12 +94,12 @@ impl Requests {
         &self.limits
     }
 
-    /// Forgets what belongs to the state left.
+    /// Clears what belongs to the state that was left.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
         self.handshake.state_changed(from, to);
     }
 
-    /// Looks at the mode and at the landing detector.
+    /// Updates the handshake from the mode and the landing detector.
     pub(crate) fn update_mode_and_landed(&mut self, state: State, telemetry: &Telemetry) {
         self.handshake.update_mode_and_landed(state, telemetry);
     }

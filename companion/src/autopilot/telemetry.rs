@@ -113,7 +113,7 @@ pub struct Telemetry {
     pub armed: bool,
     /// `MAV_STATE`.
     pub system_status: u8,
-    /// Whether the landing detector says ground; `None` before the first report.
+    /// Whether the landing detector reports ground; `None` before the first report.
     pub on_ground: Option<bool>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
@@ -206,7 +206,7 @@ impl Telemetry {
         now < self.settled_at
     }
 
-    /// Takes a frame of the autopilot link in.
+    /// Updates the telemetry from a frame of the autopilot link.
     pub fn handle_frame(
         &mut self,
         now: Instant,
@@ -367,7 +367,7 @@ impl Telemetry {
         TelemetryChange::Updated
     }
 
-    /// Armed, the origin stays; disarmed, one in doubt is asked for.
+    /// While armed the origin stays. While disarmed a doubtful origin is requested again.
     fn update_origin_trust(&mut self) {
         if self.armed {
             self.last_armed_origin = self.last_armed_origin.or(self.ekf_origin);

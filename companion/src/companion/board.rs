@@ -26,14 +26,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.set_limits(&self.config, self.requests.limits());
     }
 
-    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] takes the result. Drained like the
+    /// What the shell has to do with the flash next; once each, then [`Self::handle_flash`] takes the result. Drained like the
     /// other `poll_*`, but it may take long: nothing else waits for it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
         let erasing = self.erase_permission();
         self.services.poll_flash(self.now, erasing, &mut self.links)
     }
 
-    /// Takes in how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
+    /// Handles how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
     pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], FlashFault>) {
         self.now = now;
         self.services.handle_flash(outcome);

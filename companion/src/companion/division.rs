@@ -117,7 +117,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
     }
 
-    /// Whether it is to fly on though it has left, be it that its pilot had it for so long: what it would fly is the others'.
+    /// Whether the others have divided its part while a pilot flew it, so that it must not resume that part.
     fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
@@ -180,7 +180,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         held_dm.or(fleet.commitment_dm()).map(|dm| f32::from(dm) / 10.0)
     }
 
-    /// Whether it stands there.
+    /// Whether it stands at that place.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m()
             .is_some_and(|at_m| self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.is_standing())
@@ -204,7 +204,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Flies on along its own path, beyond what it flew around.
+    /// Continues along its own path beyond the obstacle.
     fn resume_own_plan(&mut self, plan: &VehiclePlan<W, G>) {
         let Some(back_m) = self.detours.field_detour.rejoin_m() else { return };
         let ends = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
@@ -223,7 +223,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.detours.end_field_detour(meets);
     }
 
-    /// Takes the shell's answer.
+    /// Handles the plan that the shell computed for the division.
     pub(super) fn handle_division_plan(&mut self, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
         let may_take = self.is_at_division_start();
         let Some(fleet) = self.neighbours.fleet_mut() else { return };

@@ -23,7 +23,7 @@ use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Returns whether the mission table should be looked at.
+    /// Returns whether the mission table has to be evaluated.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
         let own = self.config.system_id;
         let sender = SenderKind::from_system_id(link, frame.system, own, &self.config.ground_stations);
@@ -161,7 +161,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Answers a command of a sender whose commands do not count.
+    /// Rejects a command from a sender without authority.
     pub(super) fn reject_command(&mut self, link: Link, sender: SenderKind, command: &Command) {
         if command.to_us {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };

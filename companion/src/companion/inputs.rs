@@ -197,7 +197,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it may fly on its plan though nobody hears it.
+    /// Whether it may continue its plan although no other vehicle hears it.
     fn may_fly_unheard(&self) -> bool {
         let follows =
             matches!(self.mission.state(), State::TakeOff | State::Climb | State::Follow | State::Alone);
@@ -206,7 +206,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         ranged && follows && !left && !self.guidance.returning && self.mission.plan().is_some()
     }
 
-    /// Whether it does: its next gate is open, or none is left.
+    /// Whether it flies on its plan unheard: its next gate is open, or none is left.
     fn is_flying_unheard(&self) -> bool {
         let length_m = self.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let clear_m = self.guidance.gates_open_up_to_m(&self.detour_view().scene);

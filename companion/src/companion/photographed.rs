@@ -68,7 +68,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         DoneReport { system_id: self.config.system_id, mission_crc: self.config.mission_crc, ..report }
     }
 
-    /// Takes in what another one knows.
+    /// Handles a report of photographed waypoints from another vehicle.
     pub(super) fn handle_done_report(&mut self, report: &DoneReport) {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);

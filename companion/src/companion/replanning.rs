@@ -35,7 +35,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         detours.save_place_before_jump(to, &view);
     }
 
-    /// Looks for what blocks the path, and whether the others stand.
+    /// Scans for obstacles on the path, and checks whether the others stand.
     pub(super) fn scan_for_obstacles(&mut self) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
@@ -46,16 +46,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Asks the shell for a way around, or just aside.
+    /// Requests a detour, or a path aside, from the shell.
     pub(super) fn request_detour(&mut self, aim: DetourPurpose) {
         self.detours.request(aim);
         self.guidance.reset_trap_timer();
         self.mission.forget_failure();
-        // Full only if the shell does not drain; then the way around is late.
+        // Full only if the shell does not drain; then the detour is late.
         let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
     }
 
-    /// Asks the shell for a way around what blocks its path over a field, and back to that.
+    /// Requests a detour around the obstacle on its path over a field, and back to the path.
     pub(super) fn request_detour_back_to_path(&mut self) {
         let back_m = self.detours.rejoin_m(&self.detour_view());
         if self.detours.field_detour.seek(back_m) {
@@ -73,7 +73,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if replans { self.detours.detour_request(&self.detour_view(), tell) } else { None }
     }
 
-    /// Takes the way around.
+    /// Begins the requested detour.
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));

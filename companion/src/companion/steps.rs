@@ -52,7 +52,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.timers.schedule_next(Timer::Step, now, every);
     }
 
-    /// Lets the task command what it wants at this place.
+    /// Sends the task's commands that are due at this place.
     fn step_task(&mut self) {
         let state = self.mission.state();
         let off_plan = self.guidance.returning || self.guidance.ends_aside || self.detours.is_on_detour();
@@ -220,8 +220,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
-        // Whom nobody hears is kept off where it may lie: it comes down as straight as it can be led. A landing that waited goes on
-        // as it began.
+        // Whom no other vehicle hears is kept clear where it may lie: it comes down as straight as it can be led. A
+        // landing that waited continues as it began.
         if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
             return self.guidance.begin_guided_landing(self.now);
         }
@@ -235,7 +235,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Goes on in the state that was interrupted.
+    /// Resumes the state that was interrupted.
     pub(super) fn resume_interrupted_state(&mut self, from: State, to: State) {
         let (now, position) = (self.now, self.telemetry.position);
         match to {

@@ -270,8 +270,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Adds, over an area, the points that it flies along beyond those if nobody hears it any more: as far as its lease takes
-    /// it, or to the end where it has left and needs none.
+    /// Adds, over an area, the points that it flies along beyond those if no other vehicle hears it any more: as far as
+    /// its lease takes it, or to the end where it has left and needs none.
     fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         let flies = self.mission.state().flies_on_lease();
         let descends = self.guidance.along_m() >= 0.0 && self.guidance.is_descending();

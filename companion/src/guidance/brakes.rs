@@ -40,7 +40,7 @@ impl Guidance {
             self.heard_by_others_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let alone = state == State::Alone;
-        // On its way down it goes on, and on its way aside.
+        // On its way down it continues, and on its way aside.
         let waits = matches!(
             state,
             State::Follow | State::Blocked | State::Replanning | State::Dividing | State::Alone

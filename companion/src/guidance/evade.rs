@@ -29,7 +29,7 @@ const MAX_SEARCH_COST: u16 = 96;
 const PLACE_COST: u16 = 4;
 /// Fastest on a straight leg, m/s.
 const MAX_LEG_MPS: f32 = 1.5;
-/// Fastest through the ends of a leg, m/s: at this speed the vehicle strays from a right angle by
+/// Fastest through the ends of a leg, m/s: at this speed the vehicle deviates from a right angle by
 /// 0.47 m.
 const MAX_CORNER_MPS: f32 = 0.6;
 /// Acceleration of a vehicle that evades, m/s².
@@ -37,7 +37,7 @@ const EVADE_MPS2: f32 = 1.0;
 /// Braking of a vehicle that flies on, m/s².
 const BRAKING_MPS2: f32 = 1.5;
 
-/// Place to wait at.
+/// Target of an evasion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum EvadeTarget {
     /// The place where the vehicle waits in any case.
@@ -49,7 +49,7 @@ pub enum EvadeTarget {
     Nowhere,
 }
 
-/// Looks for the nearest place to wait that no column holds.
+/// Search for the nearest waiting place that is outside all landing columns.
 #[derive(Clone, Debug, Default)]
 pub struct EvadeSearch {
     sweep: IncrementalScan,

@@ -35,7 +35,7 @@ pub(super) struct Fence {
     high: Point,
 }
 
-/// How an axis brakes.
+/// Acceleration and jerk with which an axis brakes.
 #[derive(Clone, Copy)]
 struct BrakingLimits {
     accel_mps2: f32,
@@ -174,7 +174,7 @@ fn nearest_safe(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     good
 }
 
-/// The axes that need not brake take what the others leave of the jerk and of the acceleration across.
+/// The axes that do not have to brake share the jerk and horizontal acceleration that the braking axes leave.
 fn distribute_remaining_jerk(
     jerk: &mut Point,
     brakes: [bool; 3],

@@ -1,7 +1,7 @@
 //! The safety filter: the last word on every motion, whatever was planned, commanded or reported.
 //!
 //! In each step it compares what the vehicle can no longer take back with where each neighbour can be
-//! ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It goes on once the next metre of its way
+//! ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It continues once the next metre of its way
 //! is free. The vehicle that yields also waits until 3 s of the way of the other one are free, or that one stands.
 //! In a descent it flies back up its own column. The filter knows no gates, no progress and no advice: it only asks the
 //! gates which vehicle goes first where both have stopped.
@@ -13,16 +13,16 @@ mod look;
 
 use crate::time::{Duration, Instant};
 
-/// Length of the path ahead that has to be free before a stopped vehicle goes on, metres.
+/// Length of the path ahead that has to be free before a stopped vehicle continues, metres.
 const RESUME_CLEAR_M: f32 = 1.0;
-/// Time for which the path ahead has to be free before a stopped vehicle goes on.
+/// Time for which the path ahead has to be free before a stopped vehicle continues.
 const RESUME_CLEAR_FOR: Duration = Duration::from_millis(300);
 /// Depth of the ground between pad and goal below the lower of both, metres: less than a storey.
 const GROUND_BELOW_PAD_M: f32 = 2.0;
-/// Longest standstill for a vehicle that the roster does not name; after it this vehicle goes on
+/// Longest standstill for a vehicle that the roster does not name; after it this vehicle continues
 /// slowly.
 const MAX_STOP_FOR_STRANGER: Duration = Duration::from_secs(10);
-/// Share of its speed at which a vehicle goes on after [`MAX_STOP_FOR_STRANGER`].
+/// Share of its speed at which a vehicle continues after [`MAX_STOP_FOR_STRANGER`].
 const PAST_STRANGER_SHARE: f32 = 0.15;
 /// Fastest setpoint that may reverse along the path, m/s.
 const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
@@ -31,14 +31,14 @@ const MAX_TURNING_SETPOINT_M: f32 = 0.03;
 /// A stop ahead nearer than this is a standstill, metres: a little more than the distance that
 /// advice looks ahead.
 const STANDSTILL_WITHIN_M: f32 = 0.6;
-/// Time for which whatever kept the vehicle from going on still does.
+/// Time for which whatever kept the vehicle from continuing still does.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
-/// Time of unhindered flight after which a vehicle was not kept from going on.
+/// Time of unhindered flight after which a vehicle was not kept from continuing.
 const FREE_AFTER: Duration = Duration::from_secs(5);
 /// A vehicle that yields in its descent climbs back up its column after it has stood for this long.
 const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 
-/// A neighbour whose set meets that of the vehicle.
+/// A neighbour whose reachable set intersects that of the vehicle.
 struct FilterConflict {
     id: u8,
     yields: bool,
@@ -72,7 +72,7 @@ pub(crate) struct SafetyFilter {
     column_blocked_for_good_since: Option<Instant>,
     /// Since when a landing has been waiting for the column; short gaps do not end the wait.
     landing_held_since: Option<Instant>,
-    /// Since when it has kept the vehicle from going on, and when it last did; short gaps do not count.
+    /// Since when it has kept the vehicle from continuing, and when it last did; short gaps do not count.
     hindered_since: Option<Instant>,
     hindered_at: Instant,
     /// Whether it was to yield then.
@@ -81,7 +81,7 @@ pub(crate) struct SafetyFilter {
     activations: u32,
 }
 
-/// The way a vehicle is about to fly.
+/// Direction in which a vehicle is about to fly.
 enum FlightDirection {
     Stands,
     /// Along the path, or back.
@@ -105,14 +105,14 @@ impl SafetyFilter {
         self.stopped_since.is_some()
     }
 
-    /// Time for which the filter has kept the vehicle from going on although the vehicle goes
+    /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
     /// first; zero once the filter has not for `free`.
     pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
         let since = self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
         since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which the filter has kept the vehicle from going on because of a vehicle that
+    /// Time for which the filter has kept the vehicle from continuing because of a vehicle that
     /// stands for good.
     pub(crate) fn blocked_for_good_for(&self, now: Instant) -> Duration {
         if self.blocker_rests { self.hindered_for(now) } else { Duration::default() }
@@ -163,12 +163,12 @@ impl SafetyFilter {
         self.column_since.filter(|_| self.column_clear).map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which a landing has been waiting, now and then.
+    /// Time for which a landing has been waiting, with interruptions.
     fn landing_held_for(&self, now: Instant) -> Duration {
         self.landing_held_since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which the filter has kept the vehicle from going on, stops and short flights
+    /// Time for which the filter has kept the vehicle from continuing, stops and short flights
     /// between them together.
     pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
         let since = self.hindered_since.filter(|_| now - self.hindered_at < HINDERED_WITHIN);

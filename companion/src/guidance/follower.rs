@@ -7,7 +7,7 @@
 //!
 //! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically damped loop. Its rate
 //! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`LOOP_RATE_SHARE`]): the
-//! limits do not make it swing. Where what it strays from the curve would lead out of the geofence, it brakes
+//! limits do not make it swing. Where what it deviates from the curve would lead out of the geofence, it brakes
 //! before, by the same limits ([`super::fence`]).
 //!
 //! ENU metres, seconds. Constant work.

@@ -1,7 +1,7 @@
-//! A vehicle that stands says that it will go on standing, so that others may pass it closely.
+//! A vehicle that stands says that it will continue standing, so that others may pass it closely.
 //!
 //! Of a vehicle that was heard to stand half a second ago others must assume that it has begun to fly since. Two that stopped
-//! for one another would therefore never go on. So a vehicle that was stopped reports no way ahead of its setpoint, and does
+//! for one another would therefore never continue. So a vehicle that was stopped reports no way ahead of its setpoint, and does
 //! not move before the others have heard of a way again: [`HOLD_REPORT_LIFETIME`] after it last reported none, and the time that its messages
 //! take. The vehicle that yields reports so at once, the other one only when it has stood for a while ([`FIRST_STANDSTILL`]), so that
 //! it goes first.
@@ -18,7 +18,7 @@ const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
 /// long to stand.
 const FIRST_STANDSTILL: Duration = Duration::from_secs(4);
 
-/// Whether a vehicle holds its place.
+/// Hold state of the vehicle, and when it was reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
     since: Option<Instant>,
@@ -51,7 +51,7 @@ impl Hold {
         self.reported_at = Some(now);
     }
 
-    /// Whether others may still count on it.
+    /// Whether other vehicles may still rely on the hold.
     pub(super) fn is_binding(&self, now: Instant) -> bool {
         self.reported_at.is_some_and(|at| now < (at + HOLD_REPORT_LIFETIME) + self.message_delay)
     }

@@ -1,4 +1,4 @@
-//! What guidance is ordered: to begin the path, to go on, to turn back, to settle where it stands.
+//! What guidance is ordered: to begin the path, to continue, to turn back, to settle where it stands.
 
 use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
@@ -11,7 +11,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::Tracker;
 
 impl Guidance {
-    /// Goes on where the flight was interrupted.
+    /// Continues where the flight was interrupted.
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
         self.evade_search.reset();
@@ -80,7 +80,7 @@ impl Guidance {
         self.guides_landing = false;
     }
 
-    /// Goes on after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
+    /// Continues after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
     /// its descent, or by the nearest point of the path.
     pub fn resume_flight<const W: usize, const G: usize>(
         &mut self,

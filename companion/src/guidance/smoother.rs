@@ -71,7 +71,7 @@ const FENCE_SLACK_M: f32 = 0.01;
 /// origin.
 const STEP_SLACK_M: f32 = 2e-3;
 
-/// How fast the clock is to run.
+/// Target speed of the smoother's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockPace {
     /// 1 runs, 0 stops.
@@ -117,11 +117,11 @@ pub struct SetpointSmoother {
     /// Speed of the clock, and its change each second.
     clock_speed: f32,
     clock_acceleration: f32,
-    /// Whether there is a setpoint to go on from.
+    /// Whether there is a setpoint to continue from.
     has_setpoint: bool,
     /// The place sent last.
     last_sent: Option<Point>,
-    /// Whether it goes on after a gap, which the next step makes up for.
+    /// Whether it continues after a gap, which the next step makes up for.
     resumes: bool,
     /// Velocity at which setpoints followed a vehicle that another flies.
     followed_velocity: Point,
@@ -165,7 +165,7 @@ impl SetpointSmoother {
         }
     }
 
-    /// Takes other limits; from a standstill only.
+    /// Sets other limits; allowed at standstill only.
     pub(crate) fn set_limits(&mut self, limits: MotionLimits, fence: Option<(Point, Point)>) {
         (self.limits, self.fence, self.average_ticks) =
             (limits, fence.map(Fence::new), ticks_per_average(&limits));
@@ -177,7 +177,7 @@ impl SetpointSmoother {
         self.has_setpoint
     }
 
-    /// Setpoints end: there is no last one to go on from.
+    /// Ends the setpoint stream: the last setpoint is forgotten.
     pub(crate) fn stop(&mut self) {
         self.has_setpoint = false;
     }
@@ -243,7 +243,7 @@ impl SetpointSmoother {
         speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
     }
 
-    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it goes on as it was: the autopilot has
+    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it continues as it was: the autopilot has
     /// done so too.
     pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
         if !self.has_setpoint && self.last_sent == Some(self.position()) && unsent_s < MAX_SETPOINT_GAP_S {
@@ -279,7 +279,7 @@ impl SetpointSmoother {
         }
     }
 
-    /// Whether the next step goes on from the last setpoint sent: its time is that since then.
+    /// Whether the next step continues from the last setpoint sent: its time is that since then.
     pub(crate) fn resumes_from_last(&self) -> bool {
         self.resumes
     }
@@ -388,7 +388,7 @@ impl SetpointSmoother {
         sound
     }
 
-    /// The follower stops before the fence; should sums of steps of odd lengths lead out of it all the same, inside comes before
+    /// The follower stops before the fence. If rounding of uneven steps still leads out of it, the fence comes before
     /// smoothness.
     fn hold_inside(&mut self) {
         let place = self.nearest_inside_fence(self.motion.position);
@@ -442,7 +442,7 @@ impl SetpointSmoother {
         self.clock_acceleration = if done { 0.0 } else { (next - clock) / dt_s };
     }
 
-    /// Takes a raw step in.
+    /// Adds a raw step to the averages.
     fn push_raw_step(&mut self, step: Point) {
         self.raw += step;
         self.newest_step = if self.newest_step == 0 { HISTORY_LEN - 1 } else { self.newest_step - 1 };

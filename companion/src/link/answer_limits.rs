@@ -81,7 +81,7 @@ pub(crate) struct AnswerTokenBuckets {
 }
 
 impl AnswerTokenBuckets {
-    /// Whether another answer may go out; if so, it is counted.
+    /// Takes a token for an answer. Returns false if the bucket is empty.
     pub fn take_token(&mut self, now: Instant, link: Link, sender: SenderKind, kind: AnswerKind) -> bool {
         let TokenBucketConfig { every_ms, burst } = RATES[sender as usize][kind as usize];
         let full_at = &mut self.full_at[link as usize][sender as usize][kind as usize];

@@ -4,7 +4,7 @@
 //! Obeyed on either link, from a ground station that the mission names (`answer_limits`), when addressed to our system or to all (0),
 //! and to our component or to all (0). From others a command that acts is DENIED. Answered only
 //! when addressed to our system: a broadcast to the swarm acts on each and is answered by none. A command to all
-//! components that we do not know is somebody else's and stays unanswered.
+//! components that we do not know belongs to another component and stays unanswered.
 
 use crate::link::frame::Frame;
 use crate::mission::{Guard, GuardInputs, MAX_POSITION_AGE, State, has_row_for};
@@ -45,7 +45,7 @@ const GLOBAL_INT: u8 = 5;
 /// Time within which the same frame is a repetition, not a new command.
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(5);
 
-/// A command that concerns us.
+/// A command addressed to this companion or to all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// `MAV_CMD`.
@@ -200,7 +200,7 @@ impl PendingCommands {
     }
 }
 
-/// Takes a mission command in and says the result; `None` for a command that is not one of the mission's.
+/// Applies a mission command and returns its MAV_RESULT; `None` for any other command.
 pub fn apply_command(
     pending: &mut PendingCommands,
     state: State,
@@ -260,7 +260,7 @@ pub fn apply_command(
             (&mut pending.pause, Guard::PauseCommanded, &[Paused])
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
-            // A place to go on from has to be known.
+            // A place to continue from has to be known.
             if state == PilotReturned && inputs.position_age >= MAX_POSITION_AGE {
                 return Some(TEMPORARILY_REJECTED);
             }
@@ -274,7 +274,7 @@ pub fn apply_command(
         }
         PAUSE_CONTINUE => return Some(DENIED),
         LAND if matches!(state, Failsafe | Aborted) => {
-            // Motors off there is nothing to do; else it acts, or somebody else flies.
+            // With motors off there is nothing to do. Otherwise the row acts, or a pilot or failsafe flies the vehicle.
             let acts = inputs.armed && inputs.offboard;
             pending.land = acts;
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });

@@ -65,7 +65,7 @@ impl SentIntents {
     }
 }
 
-/// How late a neighbour's messages are.
+/// Estimated one-way delay of a neighbour's messages.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MessageDelay {
     /// Seconds.

@@ -6,7 +6,7 @@
 //!
 //! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible and whose id the
 //! dialect knows. Of candidates that overlap, the first whose checksum is right is the frame; a candidate with a wrong
-//! checksum costs its start byte only, and the search goes on behind that byte. So no garbage, whatever it is, hides a
+//! checksum costs its start byte only, and the search continues behind that byte. So no garbage, whatever it is, hides a
 //! whole frame behind it. What no checksum covers is searched too: a frame of unknown id and a signature, which is not
 //! checked here. Their bytes are not counted as noise.
 //!

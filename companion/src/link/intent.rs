@@ -7,16 +7,16 @@
 //! | 0 | u8 | version, 5 |
 //! | 1 | u8 | system id |
 //! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
-//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where nobody hears it |
+//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where no other vehicle hears it |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
-//! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears nobody; −1e6 where it may stop at once |
+//! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears no other vehicle; −1e6 where it may stop at once |
 //! | 20 | u32 | vehicles that it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
-//! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
+//! | 28 | u8 | 1: it climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
-//! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while somebody else flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where nobody hears it |
+//! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where no other vehicle hears it |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
@@ -75,7 +75,7 @@ pub struct Intent {
     pub heard_bits: u32,
     /// Height of the ground below it, as far as it knows, metres.
     pub ground_m: f32,
-    /// Whether it may come down from where it is: it climbs, descends or lands, or somebody else flies it.
+    /// Whether it may come down from its place: it climbs, descends or lands, or a pilot or failsafe flies it.
     pub may_come_down: bool,
     /// Echo of another vehicle's intent, for that vehicle's measure of the delay.
     pub echo: Option<IntentEcho>,

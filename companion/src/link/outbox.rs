@@ -15,7 +15,7 @@ use crate::link::frame::{self, Header};
 /// Entries that a link's queue holds.
 pub const QUEUE_DEPTH: usize = 32;
 
-/// A message that waits.
+/// A message that waits in the queue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outgoing {
     /// SET_MESSAGE_INTERVAL: message id, microseconds or −1.
@@ -133,7 +133,7 @@ impl Outbox {
         Header { system, component: crate::COMPANION_COMPONENT, sequence }
     }
 
-    /// Writes the first that waits; 0 if none does.
+    /// Writes the first queued message as a frame; 0 if the queue is empty.
     pub fn write_first(&mut self, system: u8, out: &mut [u8]) -> usize {
         let Some(message) = self.queue.pop_front() else { return 0 };
         let header = self.next_header(system);
@@ -247,7 +247,7 @@ fn text_severity(warning: bool) -> MavSeverity {
     if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO }
 }
 
-/// A text with its numbers in it; what is beyond 50 bytes is left out.
+/// A text with its numbers filled in, cut to 50 bytes.
 fn format_text(text: &str, numbers: [u32; 3]) -> String<50> {
     let mut out = String::new();
     let mut numbers = numbers.iter();

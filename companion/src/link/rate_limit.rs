@@ -59,7 +59,7 @@ impl RateLimit {
         self.tokens > i64::from(MAX_SAVED_BYTES / 2) * MICROBYTES_PER_BYTE
     }
 
-    /// A frame went out.
+    /// Counts the bytes of a sent frame.
     pub fn count_bytes(&mut self, bytes: usize) {
         self.tokens -= bytes.min(MAX_FRAME_LEN) as i64 * MICROBYTES_PER_BYTE;
     }

@@ -50,7 +50,7 @@ impl MemberStatus {
     const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
 }
 
-/// One vehicle, as the sender knows it.
+/// State of one vehicle of the roster as the sender knows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RosterReportEntry {
     /// Counts its flights: what is known of an earlier one does not count. 0…7, then 0 again.

@@ -14,7 +14,7 @@ use crate::mission::waits::WaitReport;
 use crate::mission::{Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
 
-/// Greatest distance between the begin of a path and the vehicle, metres.
+/// Greatest distance between the start of a path and the vehicle, metres.
 const PATH_BEGIN_M: f32 = 0.1;
 /// A picture no further than this before the place where the vehicle comes back to its path is
 /// taken there, metres.
@@ -38,7 +38,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     plan: Option<VehiclePlan<W, G>>,
     /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
     left_with_all_pictures: Option<bool>,
-    /// Pictures of its path up to where it last came back from a way around: those taken before that were noted when it left.
+    /// Pictures of its path up to where it last came back from a detour: those taken before that were noted when it left.
     pictures_before_rejoin: u32,
     /// Place where the plan ends, the height in which the plan leads there, and the descent,
     /// metres.
@@ -89,7 +89,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.state
     }
 
-    /// Since when.
+    /// Time at which this state was entered.
     pub(crate) fn entered_at(&self) -> Instant {
         self.entered_at
     }
@@ -144,7 +144,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.plan.as_ref().map_or(0.0, |plan| plan.climb_m)
     }
 
-    /// Why the plan requested last did not come.
+    /// Reason why the plan requested last did not come.
     pub(crate) fn failure(&self) -> Option<PlanFailure> {
         self.failure
     }
@@ -161,7 +161,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.imprecise_since.map_or(Duration::default(), |since| now - since)
     }
 
-    /// Notes whether it is.
+    /// Notes whether the estimate is precise enough.
     pub(crate) fn note_estimate(&mut self, usable: bool, now: Instant) {
         self.imprecise_since = if usable { None } else { self.imprecise_since.or(Some(now)) };
     }
@@ -215,12 +215,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.tasks.reset();
     }
 
-    /// A way around is requested: the plan stays until it comes.
+    /// A detour is requested: the plan stays until it comes.
     pub(crate) fn forget_failure(&mut self) {
         self.failure = None;
     }
 
-    /// Takes the plan requested.
+    /// Stores the requested plan.
     pub(crate) fn set_plan(&mut self, plan: &VehiclePlan<W, G>) {
         match self.starts_at(plan, &self.start) {
             true => self.begin_plan(plan),
@@ -343,7 +343,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.tasks.handle_ack(ack, links);
     }
 
-    /// The requested plan did not come.
+    /// Notes why the requested plan did not come.
     pub(crate) fn set_failure(&mut self, failure: PlanFailure) {
         self.failure = Some(failure);
     }

@@ -115,9 +115,9 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
     ReturnInClimb,
-    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the way home is planned.
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the path home is planned.
     ReturnOverField,
-    /// In a coverage mission the path has been blocked for the limit, and the way home can be planned.
+    /// In a coverage mission the path has been blocked for the limit, and the path home can be planned.
     BlockedOverField,
     /// As [`Guard::BlockedOverField`], and the vehicle may fly around what blocks it and back to its path.
     AroundOverField,
@@ -131,7 +131,7 @@ pub enum Guard {
     YieldedOverField,
     /// As [`Guard::BlockedOverField`], but the safety filter has hindered the vehicle for the limit.
     HinderedOverField,
-    /// As [`Guard::Stalled`] where the way home can be planned.
+    /// As [`Guard::Stalled`] where the path home can be planned.
     StalledOverField,
     /// The vehicle is to fly home, and stands.
     StandsToReturn,
@@ -147,9 +147,9 @@ pub enum Guard {
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
-    /// The safety filter has made this vehicle yield for the limit, and it does not seek its way home.
+    /// The safety filter has made this vehicle yield for the limit, and it does not seek its path home.
     Yielded,
-    /// The safety filter has kept this vehicle from going on for the limit, and it does not seek its way home.
+    /// The safety filter has kept this vehicle from continuing for the limit, and it does not seek its path home.
     Hindered,
     /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be sought.
     NoRoomHere,
@@ -181,7 +181,7 @@ pub enum Guard {
     PathClear,
     /// The path is blocked, all others stand, and it is this vehicle's turn.
     OurTurn,
-    /// The way around has come.
+    /// The detour has come.
     DetourReady,
     /// No detour exists.
     DetourFailed,
@@ -272,7 +272,7 @@ pub struct GuardInputs {
     pub turn_back: bool,
     /// The mission is a coverage mission.
     pub area: bool,
-    /// In a coverage mission: the way home can be planned from here.
+    /// In a coverage mission: the path home can be planned from here.
     pub over_field: bool,
     /// The vehicle may fly around what blocks its path, and back to its path.
     pub may_fly_beside: bool,
@@ -284,11 +284,11 @@ pub struct GuardInputs {
     pub own_plan_lost: bool,
     /// The vehicle is to fly home, or does.
     pub homeward: bool,
-    /// Time for which the vehicle has sought its way home, if it does.
+    /// Time for which the vehicle has sought its path home, if it does.
     pub seeking_home_for: Option<Duration>,
-    /// The vehicle stands, and may request its way home.
+    /// The vehicle stands, and may request its path home.
     pub stands_to_return: bool,
-    /// The climb is not done: it goes on after the interruption.
+    /// The climb is not done: it continues after the interruption.
     pub in_climb: bool,
     /// Motors on.
     pub armed: bool,
@@ -308,15 +308,15 @@ pub struct GuardInputs {
     pub mode_foreign: bool,
     /// `MAV_STATE_CRITICAL` or worse.
     pub critical: bool,
-    /// The landing detector says ground.
+    /// The landing detector reports ground.
     pub on_ground: bool,
-    /// The landing detector said air since the motors were armed.
+    /// The landing detector reported flight since the motors were armed.
     pub has_flown: bool,
     /// Moves up or down.
     pub vertical: bool,
-    /// Motors on, and the landing detector says air.
+    /// Motors on, and the landing detector reports flight.
     pub airborne: bool,
-    /// The landing detector says air, or nobody waits for that.
+    /// The landing detector reports flight, or no row waits for that report.
     pub lifted_off: bool,
     /// The neighbours leave room to go.
     pub gates_open: bool,
@@ -348,7 +348,7 @@ pub struct GuardInputs {
     pub must_land: bool,
     /// Time for which the safety filter has made it yield.
     pub yielded_for: Duration,
-    /// Time for which the safety filter has kept it from going on.
+    /// Time for which the safety filter has kept it from moving on.
     pub hindered_for: Duration,
     /// Battery charge below the configured limit.
     pub battery_low: bool,
@@ -362,9 +362,9 @@ pub struct GuardInputs {
     pub blocked: bool,
     /// All others stand, and it is this vehicle's turn to fly around.
     pub our_turn: bool,
-    /// The way around has come.
+    /// The detour has come.
     pub detour_ready: bool,
-    /// No way around was found, often enough.
+    /// No detour was found, often enough.
     pub no_way_around: bool,
     /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
     pub time_below_landing: Duration,
@@ -391,7 +391,7 @@ impl GuardInputs {
 pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
-    /// Whether it holds, and has held for `limit`.
+    /// Whether the condition is met and has been met for `limit`.
     pub fn is_met(self, i: &GuardInputs, limit: Duration) -> bool {
         match self {
             Self::AutopilotHeard => i.heartbeat_age < MAX_HEARTBEAT_AGE,

@@ -49,7 +49,7 @@ pub(crate) struct PhotographedWaypoints {
 }
 
 impl PhotographedWaypoints {
-    /// Takes what the flash has kept of this mission.
+    /// Restores the record of this mission from flash.
     pub(crate) fn restore(&mut self, kept: &[u8], mission_crc: u32) {
         let Some((head, ranges)) = kept.split_at_checked(HEADER_LEN) else { return };
         if head[..4] != mission_crc.to_le_bytes() {
@@ -115,7 +115,7 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// Waypoints of an earlier round do not count any more.
+    /// Begins a new round: waypoints of an earlier round do not count any more.
     fn begin_round(&mut self) {
         self.round = self.round.wrapping_add(1);
         self.known.clear();
@@ -132,7 +132,8 @@ impl PhotographedWaypoints {
         photographs.shown_waypoints(path, pictures).for_each(|range| _ = self.known.insert(range));
     }
 
-    /// Takes in what another one knows. `waits`: this one stands on the ground, and is to plan as others do.
+    /// Handles a report of photographed waypoints from another vehicle. `waits`: this one stands on the ground, and is
+    /// to plan as others do.
     pub(crate) fn handle_report(&mut self, report: &DoneReport, waits: bool, now: Instant) {
         if report.is_left_out_by_plan {
             if waits {
@@ -162,7 +163,7 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// Plans as one that has started already.
+    /// Adopts the plan inputs of a vehicle that has already started.
     fn adopt_plan_of(&mut self, report: &DoneReport, now: Instant) {
         self.followed_at = Some(now);
         if self.left_out_by_plan.ranges() != &report.ranges[..] {

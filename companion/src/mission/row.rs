@@ -4,7 +4,7 @@ use super::guard::Guard;
 use super::state::{State, TargetState};
 use crate::time::Duration;
 
-/// Effect of a row beside the change of state.
+/// Action of a row, in addition to the change of state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// No effect.
@@ -31,19 +31,19 @@ pub enum Action {
     FollowPath,
     /// Brake the reference along the path.
     BrakeOnPath,
-    /// Go on in the interrupted state: from the nearest point of the path, from here in a climb or a descent.
+    /// Continue in the interrupted state: from the nearest point of the path, from here in a climb or a descent.
     Rejoin,
     /// Fly the path flown so far back to the start.
     TurnBack,
     /// Ask for AUTO.LAND or LAND, again every second.
     RequestLandMode,
-    /// Ask the shell for a way around, from here.
+    /// Ask the shell for a detour, from here.
     RequestDetour,
     /// Brake the reference along the path, to fly home from there.
     TurnHome,
-    /// Ask the shell for the way home over a field, from here.
+    /// Ask the shell for the path home over a field, from here.
     RequestPathHome,
-    /// Ask the shell for a way around and back to its own path over a field, from here.
+    /// Ask the shell for a detour and back to its own path over a field, from here.
     RequestDetourBackToPath,
     /// Ask the shell for a way aside, from here.
     RequestDetourAside,

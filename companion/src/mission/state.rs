@@ -48,7 +48,7 @@ pub enum State {
     Aborted,
     /// Stopped on the path: what left the plan is in its way. Waits until all others stand.
     Blocked,
-    /// Hovers; the shell was asked for a way around.
+    /// Hovers; the shell was asked for a detour.
     Replanning,
     /// Replanning on the ground, before the take-off.
     PadReplanning,

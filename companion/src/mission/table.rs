@@ -134,7 +134,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Land, Disarm],     G::ModeTaken,        AT_ONCE,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
     warning_row(ON_PAD,              G::FailsafeActs,     AT_ONCE,    Aborted,         A::ForgetStart, "Failsafe before take-off: start cancelled"),
     warning_row(ON_PAD,              G::ModeTaken,        AT_ONCE,    Aborted,         A::ForgetStart, "Mode changed by pilot: start cancelled"),
-    // Started again in the air: what flies the vehicle goes on doing so; without setpoints that is the autopilot alone.
+    // Started again in the air: what flies the vehicle continues doing so; without setpoints that is the autopilot alone.
     warning_row(WAITING_ON_GROUND,             G::FoundFlying,      AT_ONCE,    Failsafe,        A::ForgetStart, "Found in flight: no mission"),
     // Links and position.
     warning_row(WAITING_ON_GROUND,             G::NoHeartbeat,      secs(3),   WaitAutopilot,   A::ForgetStart, "Autopilot silent: start cancelled"),

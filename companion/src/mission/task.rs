@@ -14,7 +14,7 @@ use crate::autopilot::telemetry::Ack;
 use crate::link::Links;
 use crate::time::Instant;
 
-/// Memory of the tasks.
+/// State of the tasks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tasks {
     camera: CameraControl,
@@ -26,7 +26,7 @@ impl Tasks {
         *self = Self::default();
     }
 
-    /// Commands what is due at this place of the path.
+    /// Sends the task's commands that are due at this place of the path.
     pub(crate) fn step<const W: usize>(
         &mut self,
         task: &Task,

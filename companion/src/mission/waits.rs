@@ -1,4 +1,4 @@
-//! A vehicle of the mission that never starts is named while this one waits for it: nobody else may see why the swarm stands.
+//! A vehicle of the mission that never starts is named while this one waits for it: the operator sees why the swarm waits.
 //!
 //! Constant work.
 

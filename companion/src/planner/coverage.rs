@@ -42,7 +42,7 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
 }
 
 impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             vertices: Vec::new(),
@@ -72,7 +72,7 @@ impl<const X: usize, const L: usize, const K: usize> Default for Workspace<X, L,
     }
 }
 
-/// Why there is no coverage plan.
+/// Reason why there is no coverage plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Error {
     /// The area, or how it is to be photographed.
@@ -196,11 +196,11 @@ fn read_area<'a, const X: usize>(
     Area::new(vertices, rings).map_err(CoverageError::Area)
 }
 
-/// Plans one vehicle's way home over the area, or aside, that keeps off all `obstacles`, above the field and out of no-fly zones, which may
-/// have `C` corners.
+/// Plans one vehicle's way home over the area, or aside, that keeps clear of all `obstacles`, above the field and out
+/// of no-fly zones, which may have `C` corners.
 ///
 /// # Errors
-/// Why there is none.
+/// Reason why there is none.
 pub fn plan_detour<
     const X: usize,
     const L: usize,
@@ -228,7 +228,7 @@ pub fn plan_detour<
 /// division: the lots of all vehicles by the rank of their ids.
 ///
 /// # Errors
-/// Why there is no plan.
+/// Reason why there is no plan.
 pub fn plan_flights<
     'l,
     const X: usize,

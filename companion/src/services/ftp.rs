@@ -65,7 +65,7 @@ struct Session {
     used_at: Instant,
 }
 
-/// Work of the server.
+/// Operation that the server executes.
 #[derive(Clone, Copy, Debug)]
 enum FtpOperation {
     Nothing,
@@ -136,7 +136,7 @@ impl Ftp {
         self.text.take()
     }
 
-    /// Goes on as far as the flash and the link let it.
+    /// Continues the current operation as far as flash and link allow.
     pub fn continue_work(&mut self, store: &mut Store, now: Instant, erasing: ErasePermission) {
         self.now = now;
         while self.reply.is_none() {
@@ -153,7 +153,7 @@ impl Ftp {
         }
     }
 
-    /// Takes what the flash answered.
+    /// Handles the result of a flash read.
     pub fn handle_read_outcome(&mut self, answer: ReadOutcome<'_>) {
         match (core::mem::replace(&mut self.operation, FtpOperation::Nothing), answer) {
             (FtpOperation::Read(request, true), ReadOutcome::Bytes(bytes)) => match self.burst {
@@ -175,7 +175,7 @@ impl Ftp {
         }
     }
 
-    /// Asks the flash again, or sees whether an upload has come further.
+    /// Continues the current operation: requests the flash again, or checks the progress of an upload.
     fn continue_operation(&mut self, store: &mut Store) {
         match &mut self.operation {
             FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Sum(_, true) => {}
@@ -384,7 +384,7 @@ impl Ftp {
         }
     }
 
-    /// Says once more what a session was opened with.
+    /// Repeats the ACK with which a session was opened.
     fn repeat_open_ack(&mut self, request: &Request, session: &Session, store: &Store) {
         match store.file_size(session.file) {
             Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
@@ -411,7 +411,7 @@ impl Ftp {
         self.now - session.used_at > SESSION_IDLE
     }
 
-    /// Opens a session; says so where there is none to be had.
+    /// Opens a session. Sends a NAK if no session is free.
     fn open_session(&mut self, request: &Request, file: File, writes: bool, store: &mut Store) -> bool {
         let held = |session: &Session| session.client != request.client && !self.is_idle(session);
         if self.session.as_ref().is_some_and(held) {
@@ -440,7 +440,7 @@ impl Ftp {
         }
     }
 
-    /// Answers, and remembers the answer.
+    /// Sends the reply and remembers it for repeated requests.
     fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
         self.duplicates.remember(request, result, self.now);
         self.respond(request, result);

@@ -8,7 +8,7 @@ use crate::config::{Config, REACHES_ALL_M};
 
 /// Longest name of a parameter, bytes.
 pub const NAME_LEN: usize = 16;
-/// Bytes of a kept parameter.
+/// Bytes of a stored parameter.
 const ENTRY_LEN: usize = NAME_LEN + 4;
 
 /// A parameter.
@@ -64,7 +64,7 @@ const START_TOL: usize = 7;
 const SWARM_HZ: usize = 8;
 const SYS_ID: usize = 9;
 
-/// Why a value was not taken.
+/// Reason why a parameter value was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterError {
     /// No parameter has this name or index.

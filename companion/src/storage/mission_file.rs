@@ -53,7 +53,7 @@ const KIND_COVERAGE: u8 = 1;
 pub struct MissionHeader {
     /// CRC-32 of the roadmap file it belongs to.
     pub roadmap_crc: u32,
-    /// How goals are given out.
+    /// Rule by which goals are assigned to vehicles.
     pub mode: Mode,
     /// How vehicles keep apart.
     pub method: Method,

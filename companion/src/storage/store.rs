@@ -7,7 +7,7 @@
 //!
 //! A file is whole or not there: it is written into an area that was erased before, read back, and sealed last ([`area`]). A cut
 //! at any byte leaves what was sealed before. The areas not in use are erased ahead of time, as soon as the vehicle is known
-//! to be disarmed, so that an upload finds one ready. A small crate for such journals (`sequential-storage`) was looked at: its
+//! to be disarmed, so that an upload finds one ready. A small crate for such journals (`sequential-storage`) was checked: its
 //! operations are futures over a flash driver that they own, which cannot be asked for one step at a time.
 //!
 //! A roadmap is used in place, so the slot a companion started from is not written until the next start; the newest roadmap and

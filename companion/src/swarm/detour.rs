@@ -3,17 +3,17 @@
 //! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it counts as dead) opens every
 //! gate that waits for it, and is an obstacle where it rests. A vehicle whose path that blocks, or which was out itself and
 //! may fly again, stops and waits until all others are out or stand and wait themselves. Then the one with the lowest
-//! system id asks its shell for a way around everybody and flies it to its goal. All the while it reports the progress at which it
-//! left the plan: a vehicle that waits for it goes on waiting, so it flies alone. On the ground it is out, and the next may go.
+//! system id asks its shell for a detour around everybody and flies it to its goal. All the while it reports the progress at which it
+//! left the plan: a vehicle that waits for it continues waiting, so it flies alone. On the ground it is out, and the next may go.
 //!
 //! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the vehicle reports that its path is
 //! blocked and no longer that it waits, for [`TURN_CLAIM`], longer than a word takes to be heard. It begins only if all others
 //! wait then; a vehicle that hears a lower system id claim waits again.
 //!
-//! A vehicle that is out is looked at along the whole path before its gates open, and from then on twice a second: [`MAX_STRETCHES_PER_STEP`] of the path a
+//! A vehicle that is out is checked along the whole path before its gates open, and from then on twice a second: [`MAX_STRETCHES_PER_STEP`] of the path a
 //! step, so a look among many takes several steps.
 //!
-//! Over a field there is no roadmap, and nobody waits for a turn: who is stopped flies around what stops it and back to its path
+//! Over a field there is no roadmap and no turn: a stopped vehicle flies around the obstacle and back to its path
 //! ([`field_detour`]), or home ([`homeward`]).
 //!
 //! ENU metres.
@@ -64,7 +64,7 @@ const GIVE_UP_AFTER_S: u64 = 60;
 const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress after which a vehicle that was blocked is blocked again, not still, metres.
 const BLOCKED_AGAIN_M: f32 = 2.0;
-/// Time for which whatever kept the vehicle from going on still does; once the vehicle counts as
+/// Time for which whatever kept the vehicle from continuing still does; once the vehicle counts as
 /// blocked it is [`BLOCKED_HINDERED_WITHIN`]: a neighbour that sways at the edge of the path must not make the block
 /// begin again and again.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
@@ -78,7 +78,7 @@ const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Age from which a neighbour's position is vague.
 const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
-/// Greatest stray from the path, metres: a path that much nearer to a keep-out zone is blocked.
+/// Greatest deviate from the path, metres: a path that much nearer to a keep-out zone is blocked.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
 /// Purpose of a requested detour.
@@ -114,19 +114,19 @@ pub(crate) struct Detours {
     pub(crate) home: HomewardFlight,
     /// The vehicle's detour beside its path over a field, and back.
     pub(crate) field_detour: FieldDetour,
-    /// Progress on the plan when it was left for a way around, metres.
+    /// Progress on the plan when it was left for a detour, metres.
     left_at_m: f32,
-    /// The way around asked for has come.
+    /// The detour asked for has come.
     detour_ready: bool,
-    /// Ways around not found since somebody moved.
+    /// Number of detours that were not found since another vehicle last moved.
     failures: u8,
     /// The last one was not found although all others lie or rest for good, or for a while from here, whichever moved.
     no_retry: bool,
-    /// Ways around not found from here, whichever moved between; how far along the path that is, and since when.
+    /// Detours not found from here, whichever moved between; how far along the path that is, and since when.
     failures_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
-    /// Ways around on which it did not move, in a row.
+    /// Detours on which it did not move, in a row.
     detours_without_progress: u8,
     /// When no way aside was found.
     no_way_aside_at: Option<Instant>,
@@ -135,7 +135,7 @@ pub(crate) struct Detours {
     quiet_since: Option<Instant>,
     /// Since when it claims its turn.
     claimed_since: Option<Instant>,
-    /// When a look was last due, and when the one that goes on began.
+    /// When a look was last due, and when the one that continues began.
     scanned_at: Instant,
     scan_began: Option<Instant>,
     /// Progress of the scan along the path, and the result of the last one.
@@ -146,7 +146,7 @@ pub(crate) struct Detours {
     blocked_here: Option<(f32, Instant)>,
 }
 
-/// Result of a check of the path.
+/// Result of a scan of the path.
 struct ScanResult {
     /// When one that found nothing began.
     clear_at: Option<Instant>,
@@ -160,7 +160,7 @@ impl Detours {
         self.obstacles.forget_avoided();
     }
 
-    /// Takes the path as blocked until the next scan has checked it.
+    /// Treats the path as blocked until the next scan has checked it.
     pub(crate) fn assume_blocked(&mut self) {
         (self.blocked, self.obstructed) = (true, true);
     }
@@ -196,12 +196,12 @@ impl Detours {
         self.blocked_here.map_or(Duration::default(), |(_, since)| now - since)
     }
 
-    /// Whether it was out once: the others do not count on it any more.
+    /// Whether it has left the plan once: the others do not count on it any more.
     pub(crate) fn has_left_plan(&self) -> bool {
         self.left_plan
     }
 
-    /// Whether the path is one around.
+    /// Whether the current path is a detour.
     pub(crate) fn is_on_detour(&self) -> bool {
         self.on_detour
     }
@@ -248,17 +248,17 @@ impl Detours {
         }
     }
 
-    /// Whether it lands at the end of that.
+    /// Whether it lands at the end of the detour.
     pub(crate) fn lands_at_end(&self) -> bool {
         self.lands_at_end
     }
 
-    /// Whether the way around asked for has come.
+    /// Whether the requested detour has come.
     pub(crate) fn is_ready(&self) -> bool {
         self.detour_ready
     }
 
-    /// Progress on the plan when it was left for a way around, metres.
+    /// Progress on the plan when it was left for a detour, metres.
     pub(crate) fn left_at_m(&self) -> f32 {
         self.left_at_m
     }
@@ -279,7 +279,7 @@ impl Detours {
         }
     }
 
-    /// Whether it stands until somebody else moves: it does not claim the turn to move itself.
+    /// Whether it stands until another vehicle moves: it does not claim the turn to move itself.
     pub(crate) fn is_waiting<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -309,7 +309,7 @@ impl Detours {
             }
             // Blocked on its way down it stays there.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
-            // The vehicle goes on by itself only once its column is free.
+            // The vehicle continues by itself only once its column is free.
             State::LandingHeld => view.telemetry.velocity.norm() < MAX_HOVER_MPS,
             _ => false,
         }
@@ -340,7 +340,7 @@ impl Detours {
         }
     }
 
-    /// Looks for what blocks the path, and whether the others stand.
+    /// Scans for obstacles on the path, and checks whether the others stand.
     pub(crate) fn scan_path<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,
@@ -426,7 +426,7 @@ impl Detours {
         filter.blocked_for(now, free) > STUCK_AFTER || (for_good && filter.hindered_for(now) > STUCK_AFTER)
     }
 
-    /// Whether anything is; `None` while the look goes on.
+    /// Whether an obstacle is on the path; `None` while the scan is not finished.
     fn continue_path_scan<const V: usize, const W: usize, const G: usize>(
         &mut self,
         on_ground: bool,

@@ -17,20 +17,20 @@ mod lots;
 
 pub use lots::{DivisionInput, DivisionInputs};
 
-/// Time for which a vehicle goes on photographing after a majority last reported that they hear it.
+/// Time for which a vehicle continues photographing after a majority last reported that they hear it.
 pub const LEASE: Duration = Duration::from_secs(20);
 /// Greatest age of a report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
 /// Silence after which a vehicle's share is divided among the others.
 pub const SILENT_AFTER: Duration = Duration::from_secs(45);
 /// Time for which a vehicle commits itself to fly on, seconds, up to the last picture that it takes
-/// within it. A vehicle requests a division this long before its path ends if its route goes on
+/// within it. A vehicle requests a division this long before its path ends if its route continues
 /// there.
 pub const COMMITMENT_S: f32 = 10.0;
 /// Most divisions of a mission; after the last one the waypoints that a vehicle leaves stay
 /// unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
-/// Incarnations that can be told apart: 3 bits.
+/// Number of distinct incarnations: 3 bits.
 const INCARNATIONS: u8 = 8;
 
 /// Time limits of a fleet. A vehicle that has no lease lands after twice the lease.
@@ -135,7 +135,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// A flight begins, or is planned again: whoever was silent before is not.
+    /// Starts a flight, or a new plan: no vehicle counts as silent from before.
     pub fn begin(&mut self, now: Instant) {
         let entry = self.members[self.own].entry;
         if entry.status != MemberStatus::Alive || self.excluded || !self.divisions.is_empty() {
@@ -242,7 +242,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// The last reported inputs do not hold any more.
+    /// Withdraws the last reported inputs.
     fn withdraw_inputs(&mut self) {
         if self.hash != 0 {
             (self.previous_inputs, self.previous_hash) = (self.division_inputs.clone(), self.hash);
@@ -290,7 +290,7 @@ impl<const V: usize> Fleet<V> {
             && self.is_majority(|rank, _| self.is_alive(rank))
     }
 
-    /// The division under way counts from now on.
+    /// Makes the division under way binding.
     fn commit_division(&mut self) {
         let lots = core::mem::take(&mut self.division_inputs);
         self.committed_hash = self.hash;
@@ -308,7 +308,7 @@ impl<const V: usize> Fleet<V> {
         let _ = self.divisions.push(lots);
     }
 
-    /// Takes in what the vehicle of rank `sender` reports.
+    /// Handles what the vehicle of rank `sender` reports.
     pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, waits: bool) {
         if sender >= self.members.len() || sender == self.own {
             return;
@@ -375,7 +375,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Takes what others know of this vehicle.
+    /// Handles the entry that another vehicle reports about this one.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
         let own = self.members[self.own].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
@@ -458,7 +458,7 @@ impl<const V: usize> Fleet<V> {
         lots.map_or(0, |lot| lot.along_dm)
     }
 
-    /// Divisions that count.
+    /// Number of divisions that are binding.
     pub fn division_count(&self) -> usize {
         self.divisions.len()
     }
@@ -473,12 +473,12 @@ impl<const V: usize> Fleet<V> {
         self.excluded && self.members[self.own].entry.status != MemberStatus::Finished
     }
 
-    /// Whether this one flies its part, or will.
+    /// Whether this vehicle flies its part of the area, or will fly it.
     pub(crate) fn takes_part(&self) -> bool {
         self.is_alive(self.own)
     }
 
-    /// Whether this one has left, and said so.
+    /// Whether this vehicle has left the mission and has reported it.
     pub(crate) fn has_reported_leaving(&self) -> bool {
         self.members[self.own].entry.status == MemberStatus::Left
     }
@@ -490,7 +490,7 @@ impl<const V: usize> Fleet<V> {
     }
 }
 
-/// A standing in another division: who had finished its part there may have one more here.
+/// Status carried over to another division: a vehicle that finished its part may get another part.
 fn status_in_division(standing: MemberStatus, same: bool) -> MemberStatus {
     if standing == MemberStatus::Finished && !same { MemberStatus::Left } else { standing }
 }

@@ -52,7 +52,7 @@ pub struct Neighbours<const V: usize> {
     place: Point,
     /// With the vehicle of this rank the next relay begins.
     relay_next: u16,
-    /// The own place in the roster.
+    /// Rank of this vehicle in the roster.
     own_rank: u16,
     /// The fleet: the state that all vehicles of a coverage mission agree on.
     fleet: Option<Fleet<V>>,
@@ -68,8 +68,8 @@ pub struct Neighbours<const V: usize> {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The vehicles of a roster sorted by id, without the own one; nobody heard yet. None of them flies faster along its path
-    /// than `nominal_mps`, or than it lands.
+    /// The vehicles of a roster sorted by id, without the own one; no other vehicle heard yet. None of them flies
+    /// faster along its path than `nominal_mps`, or than it lands.
     pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
@@ -117,12 +117,12 @@ impl<const V: usize> Neighbours<V> {
         self.range_edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
     }
 
-    /// The own place in the roster.
+    /// Rank of this vehicle in the roster.
     pub(crate) fn own_rank(&self) -> u16 {
         self.own_rank
     }
 
-    /// Vehicles that found no slot, by frames.
+    /// Number of frames from vehicles for which the table had no slot.
     pub fn dropped_count(&self) -> u32 {
         self.dropped
     }
@@ -194,7 +194,7 @@ impl<const V: usize> Neighbours<V> {
         strangers.iter().position(|c| c.id == id).map(|at| at + self.roster)
     }
 
-    /// Forgets strangers that do not meet the condition.
+    /// Removes the strangers that do not meet the condition.
     fn retain_strangers(&mut self, mut keep: impl FnMut(&NeighbourEntry) -> bool) {
         let mut at = self.roster;
         while let Some(contact) = self.contacts.get(at) {
@@ -321,7 +321,7 @@ impl<const V: usize> Neighbours<V> {
             shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was looked at
+    /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was checked
     /// whether it blocks the path ([`Self::found_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
@@ -359,7 +359,7 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Seconds until `gate` is open for sure, whoever is heard until then; none where that is not known.
+    /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where that is unknown.
     pub(crate) fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
         if self.has_passed(gate, now) {
             return Some(0.0);
@@ -396,18 +396,18 @@ impl<const V: usize> Neighbours<V> {
         self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
     }
 
-    /// How late the messages of `id` are.
+    /// Delay estimate of the messages from `id`.
     pub(crate) fn message_delay(&mut self, id: u8) -> Option<&mut MessageDelay> {
         let at = self.roster_index(id)?;
         Some(&mut self.contacts[at].message_delay)
     }
 
-    /// How late the messages of those that are heard are at most, seconds.
+    /// Greatest message delay of all vehicles that are heard, seconds.
     pub(crate) fn max_message_delay_s(&self) -> f32 {
         self.contacts[..self.roster].iter().fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
     }
 
-    /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
+    /// Whether no vehicle of the roster is heard: then this vehicle's own radio is assumed faulty.
     #[inline(never)]
     pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
         self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
@@ -419,7 +419,7 @@ impl<const V: usize> Neighbours<V> {
         IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
     }
 
-    /// Whom we heard lately, a bit for each rank.
+    /// Vehicles heard lately, one bit for each rank.
     pub fn heard_bits(&self, now: Instant) -> u32 {
         let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
         heard.fold(0, |bits, c| bits | 1 << c.rank)
@@ -455,7 +455,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.len()
     }
 
-    /// Whether there are none.
+    /// Whether the table has no entry.
     pub fn is_empty(&self) -> bool {
         self.contacts.is_empty()
     }

@@ -15,7 +15,7 @@ pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
 /// obstacle revokes it.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
-/// Obstacles that were not on the map, and for how many of them a way around was planned.
+/// Obstacles that were not on the map, and for how many of them a detour was planned.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Obstacles {
     known: Vec<KeepOutZone, MAX_OBSTACLES>,
@@ -66,7 +66,7 @@ impl Obstacles {
         }
     }
 
-    /// All of them.
+    /// All reported obstacles.
     pub(crate) fn all(&self) -> &[KeepOutZone] {
         &self.known
     }
@@ -81,7 +81,7 @@ impl Obstacles {
         self.avoided = 0;
     }
 
-    /// A way around those known now is requested.
+    /// Notes that a detour around all obstacles known now is requested.
     pub(crate) fn mark_requested(&mut self) {
         self.requested = self.known.len();
     }

@@ -1,8 +1,8 @@
 //! Is any of many things on the path? Asked a few at a time, since a control step is not to take longer with more neighbours.
 //!
 //! The things are stretches to keep off ([`KeepOutZone`]), given by sources: a neighbour gives up to 16 of them. A step asks about as
-//! many as its budget pays for, the next goes on from there. One thing that is on the path answers at once, and its source is
-//! asked first the next time: what blocks the way mostly goes on doing so. That nothing is, is known after all were asked.
+//! many as its budget pays for, the next continues from there. One thing that is on the path answers at once, and its source is
+//! asked first the next time: what blocks the way mostly continues doing so. That nothing is, is known after all were asked.
 
 use planner_core::detour::KeepOutZone;
 
@@ -61,7 +61,7 @@ impl IncrementalScan {
         Some(false)
     }
 
-    /// Asks all again, from the source at hand on.
+    /// Restarts the scan from the current source.
     pub fn restart(&mut self) {
         (self.sources_checked, self.zones_checked) = (0, 0);
     }

@@ -61,7 +61,7 @@ pub struct Bench {
     pub mute: bool,
     /// SYS_STATUS does not come.
     pub no_battery: bool,
-    /// The landing detector says ground, whatever the height.
+    /// The landing detector reports ground, whatever the height.
     pub false_ground: bool,
     /// Vertical speed as reported, m/s.
     pub climbs_mps: f32,
@@ -99,7 +99,7 @@ pub struct Bench {
     idle_since: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<Plan, crate::PlanFailure>>,
-    /// Whether there is a way around: by y = 16; over a field as planned.
+    /// Whether there is a detour: by y = 16; over a field as planned.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
@@ -285,7 +285,7 @@ impl Bench {
         }
         let rank = usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
-        // Beside its path its plan is the way around.
+        // Beside its path its plan is the detour.
         let own = self.own_plan.take_if(|_| self.companion.detours.field_detour.is_flying());
         let plan = own.clone().or_else(|| self.companion.mission.plan().cloned());
         let Some(mut plan) = plan.filter(|_| self.answer_division) else { return };

@@ -56,7 +56,7 @@ struct Other {
 }
 
 impl Other {
-    /// Takes in what this one reports, agrees, lets it count once both hold, and says so.
+    /// Handles what this one reports, agrees, lets it count once both hold, and says so.
     fn tick(&mut self, b: &mut Bench) {
         self.sequence = self.sequence.wrapping_add(1);
         if !self.sequence.is_multiple_of(4) {

@@ -418,7 +418,7 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     b.answer_detour = None;
     b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     b.until(State::Replanning, 10.0);
-    // Upon the way around that comes a second later.
+    // Upon the detour that comes a second later.
     let place = enu_to_geodetic(&ORIGIN, &Point::new(13.0, 16.0, 2.0));
     let data = COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,

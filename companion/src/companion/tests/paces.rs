@@ -1,4 +1,4 @@
-//! Fast flights that are stopped and go on at any moment, as over a field: the setpoint stays on its path, and on the curve
+//! Fast flights that are stopped and continue at any moment, as over a field: the setpoint stays on its path, and on the curve
 //! that stops with it. Descents to the ground.
 
 use planner_core::flight::Path;

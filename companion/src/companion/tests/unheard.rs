@@ -1,4 +1,4 @@
-//! A vehicle that nobody hears any more over an area is found where it last said that it may be.
+//! A vehicle that no other vehicle hears any more over an area is found where it last said that it may be.
 
 use super::State::*;
 use super::divisions::over_a_field;

@@ -42,7 +42,7 @@ impl Guidance {
         back: bool,
     ) -> ReachableSet {
         let velocity_mps = telemetry.velocity.norm();
-        // Beside the path it flies straight to where it goes on.
+        // Beside the path it flies straight to where it continues.
         let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
         let join = path.point_at(self.tracker.along_m).filter(|_| joins);
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
@@ -81,7 +81,7 @@ impl Guidance {
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.hears_nobody(now);
         let deaf = lands && hears_nobody;
-        // Led down over an area it looks as in a landing for who lies there unheard.
+        // In a guided descent over an area it checks, as in a landing, for unheard vehicles on the ground.
         let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
         let floor_m = scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
         let mut near = 0;
@@ -140,7 +140,7 @@ impl Guidance {
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.motion.grounded || met.stands) && by_gates {
-                // Past a vehicle that waits the schedule leads as near as that and what both stray.
+                // Past a vehicle that waits the schedule leads as near as that and what both deviate.
                 safety_m
             } else if met.motion.grounded {
                 let vertical = lands || state == State::Climb || self.is_descending();

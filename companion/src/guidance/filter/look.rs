@@ -50,7 +50,7 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                // The filter goes on checking the neighbour that stopped the vehicle's descent
+                // The filter continues checking the neighbour that stopped the vehicle's descent
                 // while the vehicle stands.
                 match self.is_descending() {
                     true => FlightDirection::Vertical {
@@ -127,7 +127,7 @@ impl Guidance {
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
-                // Past a stranger it goes on in the same stop, slowly.
+                // Past a stranger it continues in the same stop, slowly.
                 let clear_for =
                     if self.filter.passes_stranger(now) { MAX_STOP_FOR_STRANGER } else { RESUME_CLEAR_FOR };
                 if now - since >= clear_for {

@@ -3,7 +3,7 @@
 //! By distance, `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the trigger on at a stretch's first place, with a picture at once,
 //! and off at its last, with another. By waypoint, `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands go one after the
 //! other and are repeated until they are acknowledged. A vehicle that leaves its path switches the trigger off; where it comes
-//! back it goes on with a picture at once, so that no gap is wider than the spacing.
+//! back it continues with a picture at once, so that no gap is wider than the spacing.
 
 use heapless::Deque;
 use libm::atan2f;
@@ -79,7 +79,7 @@ pub(super) struct CameraControl {
 }
 
 impl CameraControl {
-    /// Commands what is due.
+    /// Queues and sends the camera commands that are due.
     pub(super) fn step<const W: usize>(
         &mut self,
         photographs: &PicturePlan,
@@ -165,7 +165,7 @@ impl CameraControl {
         let _ = self.commands.push_back(order);
     }
 
-    /// Sends the first that waits, again where it was not acknowledged.
+    /// Sends the first queued command, and repeats it until it is acknowledged.
     fn send_current_command(&mut self, now: Instant, links: &mut Links) {
         let Some(&order) = self.commands.front() else { return };
         if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
@@ -205,7 +205,7 @@ impl CameraControl {
     }
 }
 
-/// Heading of the vehicle `along_m` metres along its path: along the stretch at hand, and before a
+/// Heading of the vehicle `along_m` metres along its path: along the current stretch, and before a
 /// stretch along that stretch, so that the vehicle has turned before the first picture.
 pub(super) fn heading<const W: usize>(
     photographs: &PicturePlan,

@@ -40,7 +40,7 @@ struct ClosedSession {
 }
 
 impl DuplicateDetection {
-    /// Notes what came of a request: TerminateSession by its session, any other by all that is in it.
+    /// Remembers the outcome of a request: TerminateSession by its session, any other request by its whole content.
     pub fn remember(&mut self, request: &Request, outcome: Outcome, at: Instant) {
         if request.opcode == op::TERMINATE {
             self.closed =
@@ -52,7 +52,7 @@ impl DuplicateDetection {
         }
     }
 
-    /// Outcome of the same request a short time ago.
+    /// Outcome of the same request if it was answered a short time ago.
     pub fn previous_outcome(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let print = request_fingerprint(request);
         let known = |done: &&AnsweredRequest| done.request == print && now - done.at < DUPLICATE_WINDOW;

@@ -34,7 +34,7 @@ pub mod op {
     pub const BURST_READ: u8 = 15;
 }
 
-/// Why not, as NAK says it.
+/// Error code of a NAK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NakError {
     /// With an `errno`.

@@ -15,7 +15,7 @@ pub struct FtpBurst {
 }
 
 impl FtpBurst {
-    /// A burst of which nothing was sent yet.
+    /// A burst before its first packet.
     pub fn new(request: &Request) -> Self {
         Self {
             request: *request,

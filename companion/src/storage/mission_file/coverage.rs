@@ -54,7 +54,7 @@ pub struct CoverageHeader {
     pub heading: HeadingRule,
     /// Trigger of the pictures.
     pub trigger: Trigger,
-    /// Changes of the lanes' order that are looked at, at most.
+    /// Changes of the lanes' order that are checked, at most.
     pub search_steps: u32,
     /// Height of the pictures and of the layers.
     pub heights: Heights,
@@ -164,7 +164,7 @@ pub struct CoverageView<'a> {
 const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
-    /// A vehicle that nobody hears any more is down after so many seconds, from the highest layer.
+    /// A vehicle that no other vehicle hears any more is down after so many seconds, from the highest layer.
     pub fn time_to_ground_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);

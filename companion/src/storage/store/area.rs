@@ -76,7 +76,7 @@ pub fn seal_mark(layout: &FlashLayout, area: FlashArea, seal: &Seal) -> WordToPr
     (area.offset(layout) + SEAL_OFFSET, seal.to_bytes())
 }
 
-/// Content of a sealed area.
+/// Record that marks an area as complete: sequence number, length, CRC and kind of its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seal {
     /// The larger, the newer.

@@ -57,7 +57,7 @@ impl FlashLayout {
     }
 }
 
-/// Flash did not do what it was asked for: an erasure or program failed, or what was to be read is torn.
+/// A flash operation failed: an erase or program error, or a torn word on reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashFault;
 

@@ -10,9 +10,9 @@ pub enum FlashJob {
     None,
     /// The result of the request under way does not matter any more.
     Ignored,
-    /// Reading for somebody.
+    /// Reads bytes for a caller of the store.
     Read { at: u32, len: usize },
-    /// Summing for somebody.
+    /// Computes the CRC of a file for a caller of the store.
     Sum { at: u32, end: u32, sum: u32 },
     /// Erasing an area, sector by sector.
     Erase { area: FlashArea, at: u32 },

@@ -25,7 +25,7 @@ impl Store {
         if self.job == FlashJob::None {
             self.job = self.choose_job(erasing)?;
         }
-        // An erasure goes on only while it may.
+        // An erasure continues only while it may.
         if matches!(self.job, FlashJob::Erase { .. }) && erasing != ErasePermission::Allowed {
             self.job = FlashJob::None;
             return None;
@@ -173,7 +173,7 @@ impl Store {
         FlashJob::Erase { area, at: area.offset(&self.layout) }
     }
 
-    /// Takes in how the last request went; `Ok` of an erasure or a program holds no bytes.
+    /// Handles how the last request went; `Ok` of an erasure or a program holds no bytes.
     pub fn handle_outcome<'a>(&mut self, outcome: Result<&'a [u8], FlashFault>) -> Option<ReadOutcome<'a>> {
         if !core::mem::take(&mut self.request_pending) {
             return None;
@@ -304,7 +304,7 @@ impl Store {
         }
     }
 
-    /// Gives up what was being done for an upload.
+    /// Cancels the job of an upload.
     pub(super) fn drop_job(&mut self) {
         match self.job {
             FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => *self.condition_mut(area) = AreaCondition::Dirty,

@@ -160,7 +160,7 @@ fn a_flash_that_stalls_only_reads_while_armed() {
     run_armed(&mut store, &mut flash);
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     assert!(!store.is_unsaved());
-    // Armed at any moment of an upload: nothing is programmed, and it goes on when it is over.
+    // Armed at any moment of an upload: nothing is programmed, and it continues when it is over.
     let pieces: Vec<_> = road.chunks(239).collect();
     for armed_at in 0..=pieces.len() {
         let mut flash = Flash::new(2);

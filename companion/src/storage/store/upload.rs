@@ -39,7 +39,7 @@ impl Store {
         Ok(())
     }
 
-    /// Takes a piece of the file.
+    /// Accepts a piece of the file.
     pub fn take_piece(&mut self, offset: u32, piece: &[u8]) -> PieceOutcome {
         match self.upload {
             Some((File::Mission, UploadState::Taking)) => {

@@ -6,7 +6,7 @@ use super::flash::MAX_PROGRAM;
 /// and 512 bytes of marks.
 pub const WINDOW_LEN: usize = 4096;
 
-/// Fate of a piece of the upload.
+/// What became of a received piece of the upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PieceOutcome {
     /// The piece is here, or was already.
@@ -72,7 +72,7 @@ impl UploadReassembly {
         PieceOutcome::Yes
     }
 
-    /// Bytes that are here from the front on, without a gap, at most `most`.
+    /// Number of bytes received from the front on without a gap, at most `most`.
     fn contiguous_len(&self, most: usize) -> usize {
         let gap = self.marks.iter().position(|marks| *marks != u64::MAX);
         let run = gap.map_or(WINDOW_LEN, |i| 64 * i + self.marks[i].trailing_ones() as usize);
@@ -90,7 +90,7 @@ impl UploadReassembly {
         (len <= WINDOW_LEN && self.contiguous_len(len) == len).then(|| &self.bytes[..len])
     }
 
-    /// Lets the first block go: it is in flash.
+    /// Drops the first block: it was written to flash.
     pub fn drop_first_block(&mut self) {
         self.bytes.copy_within(MAX_PROGRAM.., 0);
         self.marks.copy_within(MAX_PROGRAM / 64.., 0);

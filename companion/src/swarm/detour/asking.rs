@@ -1,6 +1,6 @@
-//! What is asked of the shell: a way around, aside or home; and what becomes of its answer.
+//! What is asked of the shell: a detour, aside or home; and what becomes of its answer.
 //!
-//! Cost: a request names everything that is known to be in the way.
+//! Cost: a request lists every known obstacle on the path.
 
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
@@ -20,7 +20,7 @@ const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Two searches from places nearer than this are searches from the same place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
 
-/// Whether a way around that was not found may be found later.
+/// Whether a detour that was not found may be found later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RetryOutlook {
     /// A silent vehicle may still come down, and leave more room once it lies.
@@ -32,7 +32,8 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
-    /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
+    /// Whether it may search for a landing place beside its path: it is on its path, hears another vehicle, and did not
+    /// just fail.
     pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -45,12 +46,13 @@ impl Detours {
             && self.no_way_aside_at.is_none_or(retries)
     }
 
-    /// Whether enough ways around were not found, or led nowhere.
+    /// Whether enough detours were not found, or led nowhere.
     pub(crate) fn has_given_up(&self) -> bool {
         self.no_retry || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
     }
 
-    /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
+    /// Time for which it has waited below a landing vehicle without another place; zero for a while after no way aside
+    /// was found.
     pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -60,7 +62,7 @@ impl Detours {
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
-    /// A way around, or just aside, is requested of the shell.
+    /// Notes that a detour, or a path aside, is requested of the shell.
     pub(crate) fn request(&mut self, aim: DetourPurpose) {
         self.detour_aside = matches!(aim, DetourPurpose::Aside | DetourPurpose::Landing);
         self.lands_at_end = aim == DetourPurpose::Landing;
@@ -129,7 +131,7 @@ impl Detours {
         })
     }
 
-    /// The way around has come: it is flown from here on. `progress_m` is the progress on the plan.
+    /// The detour has come: it is flown from here on. `progress_m` is the progress on the plan.
     pub(crate) fn begin_detour(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
         if !self.on_detour {
             self.left_at_m = progress_m;

@@ -1,7 +1,7 @@
 //! Around what hovers or lies on a path over a field, and back to that path beyond it.
 //!
 //! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
-//! plan, and then asks for its own plan again, to go on from there. It keeps its part: no division follows, its progress stays
+//! plan, and then asks for its own plan again, to continue from there. It keeps its part: no division follows, its progress stays
 //! where it left its path until it is back, and others wait for it. It comes back no further than its gates are open.
 //!
 //! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
@@ -16,7 +16,7 @@ use crate::time::{Duration, Instant};
 /// Distance ahead along the path within which a keep-out zone blocks it, metres: from 8 m/s a
 /// vehicle stops in less than half of it.
 pub(super) const LOOK_AHEAD_M: f32 = 60.0;
-/// Margin beyond the safety distance on a detour, metres: a zone that strays a little does not
+/// Margin beyond the safety distance on a detour, metres: a zone that deviates a little does not
 /// block the detour again.
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
@@ -73,7 +73,7 @@ impl FieldDetour {
         self.is_off_plan_path()
     }
 
-    /// The way there was not found. Whether one was sought.
+    /// Notes that no path was found. Returns whether one was sought.
     pub(crate) fn note_failure(&mut self, now: Instant) -> bool {
         let before = self.phase;
         self.phase = match before {
@@ -132,7 +132,7 @@ impl FieldDetour {
         self.phase == FieldDetourPhase::Back
     }
 
-    /// Whether there is none.
+    /// Whether its own plan will not come.
     pub(crate) fn is_lost(&self) -> bool {
         self.phase == FieldDetourPhase::Lost
     }

@@ -13,14 +13,14 @@ const RETURN_RETRY: Duration = Duration::from_secs(5);
 /// around.
 const MAX_RETURNS: u8 = 4;
 
-/// Progress of a vehicle on its way home.
+/// Progress of a vehicle on its path home.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HomewardFlight {
     /// Time since which the vehicle stands and seeks its way.
     seeks_since: Option<Instant>,
     /// When it was last not found.
     missed_at: Option<Instant>,
-    /// The vehicle flies its way home.
+    /// The vehicle flies its path home.
     flies: bool,
     attempts: u8,
 }
@@ -42,17 +42,17 @@ impl HomewardFlight {
         *self = Self { attempts: self.attempts, ..Self::default() };
     }
 
-    /// The way home was not found.
+    /// Notes that no path home was found.
     pub(crate) fn note_failure(&mut self, now: Instant) {
         self.missed_at = Some(now);
     }
 
-    /// Whether it stops for its way home, seeks it, or flies it.
+    /// Whether it stops for its path home, seeks it, or flies it.
     pub(crate) fn is_on(&self) -> bool {
         self.is_seeking() || self.flies
     }
 
-    /// Whether it stops for its way home, or seeks it.
+    /// Whether it stops for its path home, or seeks it.
     pub(crate) fn is_seeking(&self) -> bool {
         self.seeks_since.is_some()
     }

@@ -135,7 +135,7 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     assert!(told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5), "{told:?}");
 }
 
-/// What is kept off vehicle 77 half a minute on.
+/// What is kept clear vehicle 77 half a minute on.
 fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
     let mut bench = Bench::accompanied(two_vehicles());
     let at = Point::new(8.0, 40.0, 9.0);
@@ -186,7 +186,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-        // So many things beside the path that the one on it is looked at in a later step.
+        // So many things beside the path that the one on it is checked in a later step.
         for i in 0..MAX_OBSTACLES {
             exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }

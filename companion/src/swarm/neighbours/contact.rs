@@ -49,7 +49,7 @@ pub(crate) struct NeighbourEntry {
     /// When an intent of our mission was last heard from it.
     pub(super) intent_at: Option<Instant>,
     pub(super) points: Vec<Point, MAX_POINTS>,
-    /// Number of the last of them that the vehicle flies to only where nobody hears it.
+    /// Number of the last of them that the vehicle flies to only where no other vehicle hears it.
     pub(super) first_unheard_point: u8,
     /// Place of the vehicle on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
@@ -121,7 +121,7 @@ impl NeighbourEntry {
         self.rank != STRANGER_RANK && silent(self.heard_at) && silent(self.known_at())
     }
 
-    /// Whether it speaks, but has not known for long where it is.
+    /// Whether it is heard, but has had no valid position for long.
     pub(super) fn is_position_imprecise(&self) -> bool {
         self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
     }
@@ -143,7 +143,7 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether it flies its plan unheard, or did.
+    /// Whether it flies its plan while unheard, or did so.
     #[inline(never)]
     pub(super) fn flies_plan_unheard(&self) -> bool {
         self.state.progress_m.is_some_and(|progress_m| {
@@ -201,7 +201,7 @@ impl NeighbourEntry {
             || (!self.has_flag(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
-    /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
+    /// Whether it is out of the plan, or lately reported that it stands until another vehicle moves.
     pub(super) fn is_waiting(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
             || (self.has_flag(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
@@ -295,7 +295,7 @@ impl NeighbourEntry {
         libm::fmaxf(self.unheard_way_m + LEGS_ROUNDING_M, self.unheard_stop_m())
     }
 
-    /// The stretch of a vehicle that stops where it notices that nobody hears it, metres.
+    /// The stretch of a vehicle that stops where it notices that no other vehicle hears it, metres.
     pub(super) fn unheard_stop_m(&self) -> f32 {
         UNHEARD_STRETCH_M + UNHEARD_STRETCH_MPS * 2.0 * self.message_delay.delay_s
     }
@@ -305,7 +305,7 @@ impl NeighbourEntry {
         !self.has_flag(GROUNDED | LANDED) || self.first_unheard_point > 0
     }
 
-    /// Whether it is silent, and goes on over an area as long as its lease allows, or as its autopilot takes it.
+    /// Whether it is silent, and continues over an area as long as its lease allows, or as its autopilot takes it.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.is_leased()
             && self.is_under_way()
@@ -353,7 +353,7 @@ impl NeighbourEntry {
 
     /// How high it lies at most, once it came down from a place: on the ground that it reported, which away from pads is the
     /// lowest there is. Then it is below what it flew along, which is over the ground by [`Ground::height_m`] but for what it
-    /// strayed; above its pad, and where it came down already, that is not known.
+    /// deviated; above its pad, and where it came down already, that is not known.
     pub(super) fn max_ground_height_m(&self, field: AreaGround, place: &Point) -> f32 {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;

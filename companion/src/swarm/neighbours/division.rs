@@ -55,7 +55,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
-    /// Takes in what another vehicle reports of all. `waits`: this one has not been started.
+    /// Handles what another vehicle reports of all. `waits`: this one has not been started.
     pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, waits: bool) {
         let rank = self.roster_index(id).map(|at| usize::from(self.contacts[at].rank));
         if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {

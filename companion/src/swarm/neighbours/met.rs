@@ -43,7 +43,7 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) ahead_s: f32,
     /// Whether it follows the shared plan: gates keep it apart from those that do.
     pub(crate) on_plan: bool,
-    /// Whether it hears nobody: then those that it does not hear fly on.
+    /// Whether it hears no other vehicle: then those that it does not hear fly on.
     pub(crate) hears_nobody: bool,
     /// Whether it lands: then it looks for where those that it does not hear may lie.
     pub(crate) lands: bool,
@@ -83,7 +83,7 @@ impl NeighbourEntry {
     }
 
     /// The same where its place is old. Seen from above it is where it was or, known by its intents, at the first of its points;
-    /// or as far from there as it can have flown: as long as it may not have noticed that nobody hears it, in a climb to its top
+    /// or as far from there as it can have flown: as long as it may not have noticed that no other vehicle hears it, in a climb to its top
     /// and a little further, and once it counts as dead along its points alone. What lies after so long moves no more.
     fn is_silent_beyond(
         &self,

@@ -1,4 +1,4 @@
-//! Where others are and may come to be, as the search for a way around asks for it.
+//! Where others are and may come to be, as the search for a detour asks for it.
 
 use planner_core::Point;
 use planner_core::detour::{KeepOutZone, ZoneKind};
@@ -25,8 +25,8 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears nobody has lost its own radio
-    /// rather: the others fly on, nobody knows where.
+    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears no other vehicle
+    /// has lost its own radio rather: the others fly on, nobody knows where.
     #[inline(never)]
     fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !contact.heard_within(now, LANDS_UNHEARD);
@@ -49,19 +49,19 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Every vehicle that was out at `at` was looked at, and none blocks the path.
+    /// Notes that every vehicle out of the plan at time `at` was checked and none blocks the path.
     pub fn mark_path_clear(&mut self, at: Instant) {
         self.clear_at = at;
     }
 
-    /// Whether that was found at `at` or later.
+    /// Whether the path was found clear at `at` or later.
     pub fn is_path_clear_since(&self, at: Instant) -> bool {
         self.clear_at >= at
     }
 
     /// Places of the other vehicles of the roster while they stand, those out of the plan among
     /// them: `apart_m` away from one in the air is far enough, and `lying_m` from one that lies,
-    /// and no longer strays.
+    /// and no longer deviates.
     pub fn for_each_place(
         &self,
         now: Instant,
@@ -149,7 +149,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
-    /// A way around what rests now was planned.
+    /// Marks the vehicles that now rest: a detour around them was planned.
     pub fn mark_avoided(&mut self, now: Instant) {
         for contact in &mut self.contacts {
             contact.avoided_at = if contact.is_out_of_plan(now) { contact.state.position } else { NO_PLACE };

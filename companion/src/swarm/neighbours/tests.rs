@@ -333,7 +333,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             met.motion.delay_s = 0.0;
         }
         if met.lost && !lands && reach.hears_nobody {
-            // As a vehicle that hears nobody sees it.
+            // As a vehicle that hears no other vehicle sees it.
             (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
         }
         let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
