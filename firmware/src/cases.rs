@@ -66,7 +66,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self { search: SearchWorkspace::new(), assignment: AssignmentWorkspace::new() }
     }

@@ -27,7 +27,7 @@ const UNKNOWN_RESTART: &str = "Restarted: watchdog, reset key or brown-out";
 /// Checksum of the kept record: a few bytes at a start and at an end need no table.
 static RECORD_CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// How a start ended.
+/// How a run of the firmware ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 enum RunEnd {
@@ -119,7 +119,7 @@ impl CrashRecord {
         self.end == RunEnd::Crashed
     }
 
-    /// The program ends because a person requested that.
+    /// Notes that an operator requested the restart.
     pub fn note_requested_restart(&mut self) {
         self.end = RunEnd::Asked;
     }
@@ -139,7 +139,7 @@ impl CrashRecord {
         may
     }
 
-    /// The work came to its end.
+    /// Notes that the work has ended.
     pub fn finish_work(&mut self) {
         let (work, files) = core::mem::take(&mut self.task);
         if let Some(i) = (work as usize).checked_sub(1)

@@ -3,7 +3,7 @@
 
 use core::ops::{Deref, Range};
 
-/// Bytes of the flash that stay as they are. Whoever drops it leaves them lent for good.
+/// Bytes of the flash that stay as they are. If this is dropped, they stay lent for good.
 #[derive(Debug)]
 pub struct LentFlash(&'static [u8]);
 

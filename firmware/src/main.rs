@@ -89,7 +89,7 @@ fn main() -> ! {
 /// A line's two ends.
 type UartEnds = (Receiver, Transmitter);
 
-/// Reports of the start.
+/// Messages that the start leaves for the operator.
 struct StartReport {
     crashed: Option<String<50>>,
     warnings: Vec<&'static str, MAX_WARNINGS>,
@@ -188,7 +188,7 @@ struct FoundMission {
     files: u32,
     /// Whether it was set aside.
     set_aside: bool,
-    /// Why it is none.
+    /// Reason why it is none.
     refused: Option<MissionError>,
 }
 

@@ -105,7 +105,7 @@ impl Planner<'_> {
     /// planned on.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Reason why there is none.
     pub fn answer(
         &mut self,
         wanted: PlanKind,

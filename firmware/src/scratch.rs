@@ -33,7 +33,7 @@ pub struct AreaWorkspace {
 }
 
 impl AreaWorkspace {
-    /// Empty.
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self { area: coverage::Workspace::new(), schedule: ScheduleWorkspace::new() }
     }
@@ -146,7 +146,7 @@ pub struct CoverageWorkspace {
 }
 
 impl CoverageWorkspace {
-    /// Empty.
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self {
             tracks: Tracks::new(),

@@ -169,7 +169,7 @@ impl Shell {
         }
     }
 
-    /// Puts the companion in, before any task of links or time starts. Until then the board is
+    /// Stores the companion, before any task of links or time starts. Until then the board is
     /// alive for no longer than [`START_TIMEOUT_MS`].
     pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
@@ -221,7 +221,7 @@ impl Shell {
         result
     }
 
-    /// Once asked for, it is not put off by being asked for again.
+    /// Requests a restart. A repeated request does not delay it.
     fn request_restart(&self) {
         let _ = self.restart_ms.compare_exchange(0, now_ms().max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
@@ -279,7 +279,7 @@ impl Shell {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
                     self.setpoints.note_setpoint(now_ms());
                 }
-                // Work that waited for room for its report may go on.
+                // Work that waited for room for its report may continue.
                 self.work_due.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
                     self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
@@ -289,7 +289,7 @@ impl Shell {
         }
     }
 
-    /// Lets the companion's time pass.
+    /// Calls the companion whenever one of its timers is due.
     pub async fn run_timers(&'static self) -> ! {
         loop {
             let now = now();
@@ -323,7 +323,7 @@ impl Shell {
         }
     }
 
-    /// Does one thing that the companion asks of its flash; false if it asks for none, or is about to restart: that must
+    /// Executes one flash request of the companion; false if it asks for none, or is about to restart: that must
     /// not tear what is being written.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
         if self.restart_ms.load(Ordering::Relaxed) != 0 {

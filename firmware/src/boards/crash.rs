@@ -56,12 +56,12 @@ pub fn begin(work: FileWork, files: u32) -> bool {
     update_record(|kept| kept.begin_work(work, files))
 }
 
-/// The work came to its end.
+/// Notes that the work has ended.
 pub fn finish() {
     update_record(CrashRecord::finish_work);
 }
 
-/// Restarts, as somebody asked for: there is nothing to report.
+/// Restarts on request: there is no crash to report.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
     update_record(CrashRecord::note_requested_restart);

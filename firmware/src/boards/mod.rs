@@ -53,7 +53,7 @@ pub fn begin(work: FileWork, files: u32) -> bool {
     return crate::kept::CrashRecord::default().begin_work(work, files);
 }
 
-/// The work came to its end.
+/// Notes that the work has ended.
 pub fn finish() {
     #[cfg(all(target_os = "none", feature = "board"))]
     crash::finish();

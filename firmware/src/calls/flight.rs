@@ -120,7 +120,7 @@ pub fn measure_flight<M: Meter>(
     flight.take_off();
     for (i, other) in flight.others.iter_mut().enumerate() {
         let (flags, silent) = match seed % 4 {
-            // All on ways of their own: each is looked at along the whole path ahead.
+            // All on ways of their own: each is checked along the whole path ahead.
             1 => (AIR | intent::ON_DETOUR, false),
             3 => EASY[random_below(&mut rng, EASY.len())],
             _ => HARD[random_below(&mut rng, HARD.len())],
@@ -155,7 +155,7 @@ pub fn measure_flight<M: Meter>(
     COUNTED_STEPS
 }
 
-/// One flight among neighbours that are near but seldom on the path, the safety filter alone counted by `meter`: in full flight,
+/// One flight among neighbours that are near but rarely on the path, the safety filter alone counted by `meter`: in full flight,
 /// and stopped, when it looks further ahead.
 ///
 /// # Panics

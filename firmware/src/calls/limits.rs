@@ -32,7 +32,7 @@ pub(super) const HARD_NUMBERS: [f32; 14] = [
     f32::NAN,
 ];
 
-/// Hears which call comes next.
+/// Receives the name of each call before it is made.
 pub trait CallListener {
     /// `name` is its file, its type if it has one, and its own name.
     fn next(&mut self, name: &'static str);

@@ -33,7 +33,7 @@ pub(super) struct FlightWorkspaces {
 }
 
 impl FlightWorkspaces {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub(super) const fn new() -> Self {
         Self {
             area: coverage::CoverageWorkspaces::new(),

@@ -66,7 +66,7 @@ pub(super) struct CoverageWorkspaces {
 }
 
 impl CoverageWorkspaces {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub(super) const fn new() -> Self {
         Self {
             tracks: Tracks::new(),

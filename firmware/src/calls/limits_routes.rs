@@ -36,7 +36,7 @@ pub struct RouteWorkspaces {
 }
 
 impl RouteWorkspaces {
-    /// Empty.
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self {
             ws: Workspace::new(),

@@ -57,7 +57,7 @@ pub const RCC_AHB2ENR: u32 = 0x5802_44DC;
 /// RCC_RSR's bit that clears the others.
 pub const RMVF: u32 = 1 << 16;
 
-/// Why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset sources). All
+/// Reason why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset sources). All
 /// causes but a wake-up press the reset pin too, and the power's coming is also a brown-out.
 pub const fn reset_cause(rsr: u32) -> ResetCause {
     const BOR: u32 = 1 << 21;

@@ -29,7 +29,7 @@ use super::super::mpu;
 use crate::chips::h743;
 use crate::lent::{FlashLender, LentFlash};
 
-/// Offset of bank 2 from the begin of the flash.
+/// Offset of bank 2 from the start of the flash.
 const BANK2_OFFSET: u32 = 1 << 20;
 /// Address of bank 2.
 const BANK2_ADDRESS: usize = 0x0810_0000;

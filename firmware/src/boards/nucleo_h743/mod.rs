@@ -144,7 +144,7 @@ impl Watchdog {
         self.device.unleash();
     }
 
-    /// Puts the reset off.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         self.device.pet();
         self.light.toggle();

@@ -45,7 +45,7 @@ static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING
 
 /// Bytes of the whole flash.
 const FLASH_LEN: usize = 4 << 20;
-/// Offset of our store from the begin of the flash.
+/// Offset of our store from the start of the flash.
 const STORE_OFFSET: u32 = 1 << 20;
 /// Address of our store.
 const STORE_ADDRESS: usize = 0x1010_0000;
@@ -75,7 +75,7 @@ unsafe fn SWI_IRQ_1() {
     unsafe { executors::poll_plans_executor() }
 }
 
-/// Why the chip started.
+/// Reason why the chip started.
 pub fn reset_cause() -> ResetCause {
     let chip = pac::POWMAN.chip_reset().read().0;
     rp2350::reset_cause(chip, pac::WATCHDOG.reason().read().0)
@@ -209,7 +209,7 @@ impl Watchdog {
         set_watchdog_resets();
     }
 
-    /// Puts the reset off.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         self.device.feed(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         self.light.toggle();

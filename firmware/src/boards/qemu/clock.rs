@@ -107,7 +107,7 @@ impl Clock {
             }
             let due = next_us.saturating_mul(COUNTS_PER_US);
             if due > now {
-                // Far alarms are looked at again when the timer has run down.
+                // Far alarms are checked again when the timer has run down.
                 let wait = (due - now).min(u64::from(u32::MAX)) as u32;
                 Register::new(TIMER1, VALUE).write(wait);
                 return;

@@ -100,7 +100,7 @@ pub fn send(port: u8, bytes: &[u8]) -> bool {
 }
 
 impl SimulationLink {
-    /// Does all that is due, and sets the timer for what is next.
+    /// Runs all work that is due, and sets the timer for the next.
     fn run_due_work(&mut self, cs: CriticalSection<'_>) {
         loop {
             let Some(record) = self.next_record() else {
@@ -134,7 +134,7 @@ impl SimulationLink {
         unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.length) }
     }
 
-    /// Does what a record says.
+    /// Executes a record.
     fn execute_record(&mut self, record: ToBoard) {
         let from = self.done + HEAD;
         self.done = from + record.payload_len();

@@ -25,7 +25,7 @@ pub(super) enum Bank2 {
 }
 
 impl Bank2 {
-    /// Whether it is for this: the first to ask decides.
+    /// Claims the bank for this use. Returns false if it was claimed for the other one.
     pub(super) fn claim(self) -> bool {
         static CLAIMED: AtomicU8 = AtomicU8::new(0);
         let before = CLAIMED.compare_exchange(0, self as u8, Ordering::Relaxed, Ordering::Relaxed);

@@ -109,7 +109,7 @@ impl Uart {
     }
 }
 
-/// Bytes were lost, by the device or behind it.
+/// Error: bytes were lost in the device or in the receive buffer.
 #[derive(Clone, Copy, Debug)]
 pub struct BytesLost;
 

@@ -47,7 +47,7 @@ fn note_fed() {
 pub struct Watchdog(pub(super) ());
 
 impl Watchdog {
-    /// Wakes it.
+    /// Starts the watchdog.
     pub(super) fn wake(&mut self) {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
         Register::new(WATCHDOG, LOAD).write(RELOAD_COUNTS);
@@ -55,7 +55,7 @@ impl Watchdog {
         note_fed();
     }
 
-    /// Puts the reset off.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         Register::new(WATCHDOG, INTCLR).write(1);
         note_fed();
