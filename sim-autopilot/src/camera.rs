@@ -69,7 +69,7 @@ impl CameraTrigger {
         Self { photos: core::mem::take(&mut self.photos), ..Self::default() }
     }
 
-    /// Hands over what was photographed since the last call.
+    /// Returns the pictures taken since the last call.
     pub(super) fn take_photos(&mut self) -> Vec<Photo> {
         core::mem::take(&mut self.photos)
     }
@@ -79,7 +79,7 @@ impl CameraTrigger {
         self.taken
     }
 
-    /// When it looks next, microseconds since boot.
+    /// Time of the next trigger check, microseconds since boot.
     pub(super) fn next_poll_us(&self) -> u64 {
         self.next_poll_us
     }

@@ -118,7 +118,7 @@ impl Config {
     }
 }
 
-/// Why no autopilot can be made from a [`Config`].
+/// Reason why no autopilot can be made from a [`Config`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     /// A latitude, longitude or altitude out of range.

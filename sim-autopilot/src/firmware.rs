@@ -42,7 +42,7 @@ impl Firmware {
         }
     }
 
-    /// Sends what it says unasked when it has booted.
+    /// Sends the boot messages.
     pub(super) fn send_boot_messages(&mut self, platform: &mut Platform) {
         match self {
             Self::Px4(_) => platform.announce_origin(),

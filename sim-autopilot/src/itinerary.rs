@@ -46,7 +46,7 @@ pub(super) enum MissionLeg {
 }
 
 impl MissionLeg {
-    /// Begin of the leg after this one: its point, or the place of the vehicle.
+    /// Start of the leg after this one: its point, or the place of the vehicle.
     pub(super) fn leg_end(leg: Option<Self>, here: &Point) -> Point {
         match leg {
             Some(Self::To { at, .. }) => at,
@@ -98,7 +98,7 @@ impl Platform {
         legs.next() == Some(NAV_TAKEOFF)
     }
 
-    /// Does what is to be done at once and says what is to be flown; `None` once all is done. The next
+    /// Executes the commands that are due and returns the leg to fly; `None` once the mission is complete. The next
     /// call begins with the first item again.
     pub(super) fn fly_mission(&mut self, sensors: &SensorReadings, landed: bool) -> Option<MissionLeg> {
         let first = self.first_item();

@@ -60,7 +60,7 @@ impl MissionProgress {
         Self { current, ..Self::default() }
     }
 
-    /// The item is begun again when the mission goes on.
+    /// The item is begun again when the mission continues.
     pub(super) fn interrupt(&mut self) {
         (self.since_us, self.inside_us) = (None, None);
     }

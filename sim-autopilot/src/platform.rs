@@ -63,7 +63,7 @@ pub struct ActuatorCommand {
 /// Treatment of the velocity controller's integral in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegralAction {
-    /// The integral goes on.
+    /// The integral continues.
     Keep,
     /// The integral is zero, as on the ground.
     Clear,

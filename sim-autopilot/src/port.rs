@@ -155,13 +155,13 @@ impl Port {
         }
     }
 
-    /// Whether somebody whom a message is for was heard here; 0 is all.
+    /// Whether the addressee of a message was heard on this port; 0 addresses all.
     pub fn is_route_to(&self, (system, component): (u8, u8)) -> bool {
         let meant = |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
         self.heard.iter().any(meant)
     }
 
-    /// Queues a frame of somebody else's as it came.
+    /// Queues another sender's frame unchanged.
     pub fn forward_frame(&mut self, frame: &Frame) {
         if self.reserve_frame() {
             frame.write(&mut self.queue);

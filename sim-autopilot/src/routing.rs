@@ -2,7 +2,7 @@
 //! station on one port reaches a companion on another.
 //!
 //! A port leads to every component that was heard on it. A message to one goes to the ports that lead there, a message to nobody
-//! in particular to all other ports on which somebody was heard; what is for this autopilot alone goes no further.
+//! in particular to all other ports on which a sender was heard; what is for this autopilot alone goes no further.
 
 use super::frame::Frame;
 use super::port::{AUTOPILOT_COMPONENT, Port};

@@ -102,7 +102,7 @@ impl Snapshot {
         true
     }
 
-    /// How it is turned.
+    /// Sends attitude messages.
     fn send_attitude(&self, id: u32, port: &mut Port) -> bool {
         match id {
             30 => {

@@ -194,7 +194,7 @@ impl Vehicle {
         Point::new(self.thrust.x, self.thrust.y, self.thrust.z + GRAVITY)
     }
 
-    /// Takes the decision of the autopilot's state machine.
+    /// Sets the armed and landed flags that the autopilot's state machine decided.
     pub fn set_flags(&mut self, armed: bool, landed: bool) {
         self.state.armed = armed;
         self.state.landed = landed;

@@ -1,7 +1,7 @@
 //! ArduCopter's AUTO: an uploaded mission.
 //!
 //! It is entered only with a mission, on the ground armed only with one that begins with a take-off; it is not armed in.
-//! On the ground it waits for MISSION_START, as nobody raises a throttle; in the air it goes on at once. It looks where it
+//! On the ground it waits for MISSION_START, as nobody raises a throttle; in the air it continues at once. It looks where it
 //! flies (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. A return and a landing are flown within AUTO.
 
 use planner_core::Point;

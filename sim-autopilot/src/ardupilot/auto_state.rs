@@ -11,7 +11,7 @@ pub(super) struct Auto {
     pub may_lift: bool,
     /// Leg that is flown now.
     pub leg: Option<MissionLeg>,
-    /// Begin of that leg.
+    /// Start of that leg.
     pub from: Point,
     /// Place where the vehicle stays without a commanded leg.
     pub stay: Option<Point>,

@@ -344,7 +344,7 @@ impl Copter {
         if mode == self.mode {
             return;
         }
-        // Land goes on with the reference of a controller that was running, the others start theirs.
+        // Land continues with the reference of a controller that was running, the others start theirs.
         let runs = self.mode.needs_position() && !self.landed;
         if mode != Mode::Land || !runs {
             self.reference = Reference::new(sensors.position, sensors.velocity);

@@ -17,7 +17,7 @@ impl Copter {
         platform.send_on_all_ports(1);
     }
 
-    /// Reports what has become so since the last step.
+    /// Sends messages about changes since the last step.
     pub(super) fn send_progress_messages(&mut self, platform: &mut Platform, now_us: u64) {
         if !self.reported[0] && self.origin_known(now_us) {
             self.reported[0] = true;
@@ -35,7 +35,7 @@ impl Copter {
         }
     }
 
-    /// PARAM_VALUE that nobody asked for.
+    /// Unrequested PARAM_VALUE.
     fn send_runtime_param(&self, platform: &mut Platform, seconds: f32) {
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&seconds.to_le_bytes());

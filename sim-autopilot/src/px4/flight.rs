@@ -29,7 +29,7 @@ const CRAWL_SHARE: f32 = 0.75;
 const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
-    /// Fixes what the mode leans on: where it stops, which leg of the return is next.
+    /// Initialises the mode: its stopping point, and the next leg of a return.
     pub(super) fn enter_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         self.hold = sensors.position + glide::stopping_point(&sensors.velocity);
         self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
@@ -81,7 +81,7 @@ impl Commander {
                 let up = self.takeoff_up;
                 let up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
                 if !self.landed && sensors.position.z > up - ARRIVED_M {
-                    // Reached: PX4 goes on in Hold at the height asked for.
+                    // Reached: PX4 continues in Hold at the height asked for.
                     self.intended_mode = Mode::Hold;
                     self.after_disarm = Mode::Hold;
                     self.takeoff_up = f32::NAN;

@@ -36,7 +36,7 @@ impl SmoothedApproach {
         Self { at_us: now_us, position: *position, ramps: [ramp(velocity.x), ramp(velocity.y)] }
     }
 
-    /// Goes on towards `target` until `now_us`, at `speed_max` m/s and `jerk` m/s³ at most.
+    /// Continues towards `target` until `now_us`, at `speed_max` m/s and `jerk` m/s³ at most.
     pub fn advance(&mut self, now_us: u64, target: &Point, speed_max: f32, jerk: f32) {
         let since_us = now_us.saturating_sub(core::mem::replace(&mut self.at_us, now_us));
         let dt = (since_us as f32 * 1e-6).min(MAX_STEP_S);

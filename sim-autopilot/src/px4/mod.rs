@@ -70,7 +70,7 @@ struct Mission {
     ready: bool,
     /// Leg that the mission commands, while it is flown.
     leg: Option<MissionLeg>,
-    /// Begin of that leg.
+    /// Start of that leg.
     from: Point,
 }
 
@@ -274,7 +274,7 @@ impl Commander {
         true
     }
 
-    /// Changes the mode as a pilot's switch does, whom nobody asks whether it can run.
+    /// Changes the mode as a pilot's switch does: without a check whether the mode can run.
     pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         self.intended_mode = mode;
         if !mode.ends_with_flight() {
