@@ -7,9 +7,9 @@
 //! | separation from one that stands | safety distance + tracking + estimate + gust | it stands where the referee sees it, but its path ended where it believed to be |
 //! | tracking | [`companion::margins::TRACKING_M`] | beside the path by the own estimate |
 //! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`PAIR_STRAY_M`] are measured with it |
-//! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, seldom and not beside an error of tracking |
+//! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, rarely and not beside an error of tracking |
 //! | estimate, `recorded`, ArduPilot | 0.12 m | the greatest recorded error |
-//! | touchdown, PX4 | 0.5 m, and [`STRAY_PER_GUST_S`] × `gust_mps` | pads: up to 0.7 m beside them without wind, 1.1 m in gusts of 3 m/s, seldom two towards each other |
+//! | touchdown, PX4 | 0.5 m, and [`STRAY_PER_GUST_S`] × `gust_mps` | pads: up to 0.7 m beside them without wind, 1.1 m in gusts of 3 m/s, rarely two towards each other |
 //! | part of a picture that counts | what it shows less twice the margin, and what [`TRIGGER_DELAY_S`] at cruise is along the lanes | the camera is not where the waypoint is |
 //! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m | a lower camera shows less |
 //! | gust | [`STRAY_PER_GUST_S`] × `gust_mps` | what a vehicle gives way to gusts that blow it |

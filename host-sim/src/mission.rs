@@ -231,7 +231,7 @@ impl Mission {
         }
     }
 
-    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or a way around.
+    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or a detour.
     pub fn answer_plan_request(
         &self,
         plan: &SwarmPlan,

@@ -90,7 +90,7 @@ pub fn printed() -> anyhow::Result<()> {
     }
 }
 
-/// Prints a line. Where that fails the work goes on, since it may fly something; [`printed`](crate::progress::printed)
+/// Prints a line. Where that fails the work continues, since it may fly something; [`printed`](crate::progress::printed)
 /// reports at its end.
 #[macro_export]
 macro_rules! say {

@@ -7,7 +7,7 @@ pub const MAX_QUOTE_CHARS: usize = 200;
 /// Longest line of an error, characters: the words around two quotations.
 const MAX_ERROR_CHARS: usize = 600;
 
-/// A character that changes how a terminal shows what stands around it.
+/// Whether a character changes how a terminal shows the text around it.
 fn is_control_code(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
@@ -15,7 +15,7 @@ fn is_control_code(c: char) -> bool {
 
 /// The text with its codes escaped; where it is longer than [`MAX_QUOTE_CHARS`] characters, its beginning and its end.
 pub fn quoted(text: &str) -> String {
-    // No more than could be shown is looked at, from either end.
+    // No more than could be shown is checked, from either end.
     shortened(&escaped(&shortened(text, 2 * MAX_QUOTE_CHARS)), MAX_QUOTE_CHARS)
 }
 

@@ -1,7 +1,7 @@
 //! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what would help.
 //!
 //! Whether a way is missing in the roadmap or in the building is read from the map itself: the widest way from a goal to a
-//! start, over the centres of its cells, by a flood that always goes on from the widest cell it has reached. Its width is
+//! start, over the centres of its cells, by a flood that always continues from the widest cell it has reached. Its width is
 //! the distance to the nearest obstacle at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood
 //! of each near a wall; only missions that fall short pay it.
 

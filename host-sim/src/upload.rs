@@ -186,7 +186,7 @@ impl FtpClient {
         Ok(for_us.map(|(p, _)| read(p)).collect())
     }
 
-    /// Asks until it is answered.
+    /// Repeats a request until it is answered.
     fn request_until_answered(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
         let request = self.request(opcode, 0, data);
         let began = self.link.now();

@@ -1,4 +1,4 @@
-//! Polygons from files: what is to be photographed, holes in it, and zones that nobody enters.
+//! Polygons from files: what is to be photographed, holes in it, and zones that no vehicle may enter.
 //!
 //! GeoJSON, WKT, KML and QGroundControl `.plan`. Points and lines in a file are passed over. Coordinates are as the file
 //! has them, x (east or longitude) first.

@@ -151,7 +151,7 @@ impl EmulatedBoard {
         Ok(answer)
     }
 
-    /// Both, one after the other.
+    /// Begins a grant and waits for its end.
     ///
     /// # Errors
     /// As [`begin_grant`](Self::begin_grant) and [`finish_grant`](Self::finish_grant).

@@ -48,7 +48,7 @@ pub struct Args {
 
 /// Sleep between two polls of the links.
 const POLL_SLEEP: Duration = Duration::from_millis(1);
-/// Time for which a companion whose mission has ended goes on reporting that to the others and to
+/// Time for which a companion whose mission has ended continues reporting that to the others and to
 /// ground stations, as a board does for good.
 const REPORT_END_FOR: Duration = Duration::from_secs(2);
 /// Silence of its autopilot after which a vehicle cannot be helped.

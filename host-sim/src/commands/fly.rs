@@ -56,7 +56,7 @@ pub struct FlyArgs {
     #[arg(long, value_name = "FIRMWARE", conflicts_with = "companion")]
     emulate: Option<PathBuf>,
     /// Keep what each companion keeps in its flash in this directory, as boards do: parameters, and in a coverage mission
-    /// what is photographed. The next flight goes on there, and is judged by the pictures of all
+    /// what is photographed. The next flight continues there, and is judged by the pictures of all
     #[arg(long, value_name = "DIR", conflicts_with_all = ["companion", "emulate"])]
     flash: Option<PathBuf>,
     /// How many of the scenario's first vehicles have such a board, if not all
@@ -64,7 +64,7 @@ pub struct FlyArgs {
     boards: Option<usize>,
 }
 
-/// How a flight is looked at while it lasts.
+/// Display of a running flight: clock speed and ground station.
 #[derive(Default)]
 struct FlightDisplay<'a> {
     realtime: bool,

@@ -1,7 +1,7 @@
 //! The one checker of coverage plans: is everything photographed, every waypoint once, on routes without a break, outside
 //! no-fly zones?
 //!
-//! It looks at flights as they are written, or at pictures as they were taken, in f64, and shares no code with the planner. Cells are a tenth of the lane
+//! It compares flights as they are written, or at pictures as they were taken, in f64, and shares no code with the planner. Cells are a tenth of the lane
 //! spacing. A cell counts if its middle is in the area and outside no-fly zones; it is photographed if one picture shows
 //! all its corners. Where overlaps are less than a cell, pictures must show its middle and each corner that is in the
 //! area.
@@ -46,7 +46,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Whether nothing is wrong.
+    /// Whether the check found no fault.
     pub fn is_clean(&self) -> bool {
         self.covered_share >= 1.0
             && self.left + self.twice + self.broken + self.forbidden == 0

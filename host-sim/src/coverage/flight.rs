@@ -16,7 +16,7 @@ use crate::scenario::coverage::Trigger;
 /// A corner within this distance of a picture is at the picture's place, metres.
 const SAME_PLACE_M: f32 = 0.01;
 
-/// Action of a vehicle at a point of its flight.
+/// Action of a vehicle at a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopAction {
     /// The vehicle stands on its pad.
@@ -110,7 +110,7 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
     }
 }
 
-/// Begin of the first lane.
+/// Start of the first lane.
 fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Point {
     match &planned.following {
         Some(following) => following.start_point(begin, end),

@@ -27,7 +27,7 @@ pub struct HeightFindings {
 }
 
 impl HeightFindings {
-    /// Whether nothing is wrong.
+    /// Whether the check found no fault.
     pub fn is_clean(&self) -> bool {
         self.too_low + self.too_steep == 0
     }

@@ -380,7 +380,7 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     Ok(Some(shares))
 }
 
-/// Why there is no plan, for a person.
+/// Reason why there is no plan, for a person.
 fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> anyhow::Error {
     let place = &wanted.place;
     let why = match error {

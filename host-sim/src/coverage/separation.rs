@@ -1,8 +1,8 @@
 //! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. The vehicle that flies longest
 //! leaves first; each other one leaves as soon as it keeps the separation to all before it, as planned.
 //!
-//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights stray from that: on board the safety
-//! filter is what keeps vehicles apart, and this only keeps it from having to.
+//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights deviate from that: on
+//! board the safety filter is what keeps vehicles apart, and this only keeps it from having to.
 
 use planner_core::Point;
 

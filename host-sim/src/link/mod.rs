@@ -50,7 +50,7 @@ pub enum LinkUrl {
     },
 }
 
-/// Why a link URL or link is no good. Displays as `WHAT: WHERE: WHY`.
+/// Reason why a link URL or link is no good. Displays as `WHAT: WHERE: WHY`.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// The text is no link URL.

@@ -13,7 +13,7 @@ pub trait Link: Send {
     /// lost for now are no errors.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// Sends whole frames. What nobody takes in time is dropped.
+    /// Sends whole frames. Frames that the receiver does not take in time are dropped.
     ///
     /// # Errors
     /// When the link is gone for good.

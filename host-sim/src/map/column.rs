@@ -18,7 +18,7 @@ const NEAREST_COLUMN_CELLS: f32 = 3e8;
 /// Spacing of the places that [`nearest_column`] tries, metres.
 const NEAREST_COLUMN_STEP_M: f32 = 0.1;
 
-/// Why a vehicle cannot fly straight up or down between the ground and a point.
+/// Reason why a vehicle cannot fly straight up or down between the ground and a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColumnError {
     /// The point lies in an obstacle, in unknown space or outside the map.

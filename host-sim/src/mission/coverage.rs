@@ -67,7 +67,7 @@ pub(super) fn prepare(
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
     }
-    // Over fields there is nothing but the others to keep clear of: each may stray half of what lies between.
+    // Over fields there is nothing but the others to keep clear of: each may deviate half of what lies between.
     let stray_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
@@ -128,7 +128,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whoever believes to be at the height of the pictures is over the ground.
+/// A vehicle that believes to be at the height of the pictures must be above the ground.
 fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = above_ground_m(planned.wanted);
     for vehicle in &planned.scenario.vehicles {
@@ -146,7 +146,7 @@ fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// How its work is divided.
+/// Method by which the work is divided.
 pub fn method(scenario: &Scenario) -> Method {
     scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
@@ -261,7 +261,7 @@ impl Mission {
     /// The plan of what is left when these waypoints are photographed, after these losses.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Reason why there is none.
     pub fn plan_rest<'l>(
         &self,
         done: &[WaypointRange],
@@ -270,7 +270,7 @@ impl Mission {
         self.plan_area(done, losses, &mut on_heap(DeskWorkspace::new))
     }
 
-    /// A vehicle's way home over the area, or aside.
+    /// A vehicle's path home over the area, or aside.
     pub(super) fn plan_area_detour(
         &self,
         request: &DetourRequest,

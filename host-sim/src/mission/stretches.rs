@@ -41,7 +41,7 @@ fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
     DivisionInput { alive: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
 }
 
-/// Lots when the first vehicle of a plan requests a division, by rank; none where no route goes on.
+/// Lots when the first vehicle of a plan requests a division, by rank; none where no route continues.
 pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
     let hold_s = plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();

@@ -127,7 +127,7 @@ fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     kept
 }
 
-/// Keeps so many more of the edges, the first in an order; of equal ones the shortest.
+/// Keeps `count` more edges, first by the given order, then the shortest.
 fn keep_first<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn(usize) -> O) {
     let mut others: Vec<usize> = (0..kept.len()).filter(|&i| !kept[i]).collect();
     others.sort_by(|&a, &b| order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b)));

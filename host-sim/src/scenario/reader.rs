@@ -110,7 +110,7 @@ impl<'a> Value<'a> {
         self.value.as_str().ok_or_else(|| self.expected("a string"))
     }
 
-    /// One of several words; each stands beside its meaning.
+    /// Value of a keyword, from a list of keywords and their values.
     pub(super) fn one_of<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
         let given = self.str()?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == given) {

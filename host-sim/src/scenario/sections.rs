@@ -133,7 +133,7 @@ struct Common {
     estimator_span: Option<Span>,
 }
 
-/// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the stray of two
+/// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the deviation of two
 /// vehicles, metres, and the time limit of a flight, seconds.
 fn common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
     let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;

@@ -1,5 +1,5 @@
-//! What companions of a coverage mission divide in flight, as their radio tells: the plans that they fly after it, and what each
-//! division follows from. Whoever has the mission file can plan the same again.
+//! Divisions that companions of a coverage mission make in flight, from their radio messages: the plans that they fly
+//! after it, and what each division follows from. Whoever has the mission file can plan the same again.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -48,7 +48,7 @@ pub struct DivisionLog {
 }
 
 impl DivisionLog {
-    /// Takes in what stations sent.
+    /// Handles what stations sent.
     pub fn handle_packets(&mut self, t_s: f32, packets: &[Rc<[u8]>]) {
         for packet in packets {
             let mut input = &packet[..];

@@ -11,12 +11,12 @@
 //! | `gps-loss` | no position | position again |
 //! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
-//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to go on | |
+//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to continue | |
 //! | `autopilot-reboot` | motors off, everything forgotten, silent while it boots | 3 s if not given |
 //! | `companion-reset` | a new companion with a new clock | |
 //! | `late-plan` | a request for a plan gets no answer | answered |
 //! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
-//! | `pause-order` | the ground station commands a pause | commands to go on |
+//! | `pause-order` | the ground station commands a pause | commands to continue |
 //! | `return-order` | the ground station commands to fly home | |
 //! | `land-order` | the ground station commands to land | |
 //! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | gone; the companions keep off on |
@@ -74,7 +74,7 @@ pub struct FaultTargets<'a> {
     pub members: &'a mut [SimulatedVehicle],
     /// Radio of the swarm.
     pub radio: &'a mut Radio,
-    /// The ground station that commands them to go on.
+    /// The ground station that commands them to continue.
     pub ground_station: &'a mut GroundStation,
     /// Spheres that are on no map: centre and radius, metres.
     pub obstacles: &'a mut Vec<(Point, f32)>,
@@ -109,14 +109,14 @@ impl<'a> FaultScript<'a> {
         self.struck[vehicle]
     }
 
-    /// Whether nothing is left to happen.
+    /// Whether all faults have begun and ended.
     pub fn is_over(&self) -> bool {
         let ends = |fault: &Fault| fault.duration_s.is_some();
         let mut pairs = self.scenario.faults.iter().zip(&self.stages);
         pairs.all(|(fault, stage)| *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault)))
     }
 
-    /// Lets begin and end what is due; reports each.
+    /// Begins and ends the faults that are due, and logs each.
     pub fn step(
         &mut self,
         now_us: u64,

@@ -1,6 +1,6 @@
 //! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! commands a vehicle to go on that its pilot gave back, gives the orders of the script, and reports each obstacle it sees to
-//! all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
+//! commands a vehicle to continue that its pilot gave back, gives the orders of the script, and reports each obstacle
+//! it sees to all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -25,7 +25,7 @@ const ORDER_REPEATED_FOR_US: u64 = 10_000_000;
 /// Command to one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OperatorCommand {
-    /// To go on after a pilot's control, or after a pause.
+    /// To continue after a pilot's control, or after a pause.
     Resume,
     /// To stop.
     Pause,
@@ -36,7 +36,7 @@ pub enum OperatorCommand {
 }
 
 impl OperatorCommand {
-    /// Whether a vehicle in this state is still to be told.
+    /// Whether a vehicle in this state still needs the command.
     fn is_still_needed(self, state: State) -> bool {
         match self {
             // On the pad a vehicle waits for it in its states before the start.
@@ -102,7 +102,7 @@ impl GroundStation {
         self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
-    /// Commands a vehicle to do this from now on, in place of what it was told before.
+    /// Sets the command for a vehicle; it replaces the earlier command.
     pub fn set_command(&mut self, now_us: u64, vehicle: usize, order: OperatorCommand) {
         self.orders.retain(|&(of, ..)| of != vehicle);
         self.orders.push((vehicle, order, now_us + ORDER_REPEATED_FOR_US));

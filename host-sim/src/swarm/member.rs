@@ -48,7 +48,7 @@ pub struct SimulatedVehicle {
     pub wants_plan: Option<PlanKind>,
     /// How it is answered.
     pub planner: Planner,
-    /// The last warning of a mission that did not go on since: why it left its usual course.
+    /// The last warning of a mission that did not continue since: why it left its usual course.
     pub cause: Option<&'static str>,
     /// When it left the ground, seconds.
     pub took_off_s: Option<f64>,
@@ -120,7 +120,7 @@ impl SimulatedVehicle {
         self.board = Some(board);
     }
 
-    /// Says how much of its stack its board used, if it has one in lock step.
+    /// Prints how much stack its board used, if the board is in lock step.
     ///
     /// # Errors
     /// The board is gone.
@@ -152,7 +152,7 @@ impl SimulatedVehicle {
         self.wrecked
     }
 
-    /// Takes all power away.
+    /// Cuts the power of autopilot and companion.
     pub fn cut_power(&mut self) {
         self.cut_motors();
         self.killed = true;
@@ -273,7 +273,7 @@ impl SimulatedVehicle {
             .with_context(|| format!("the board of vehicle {id}"))
     }
 
-    /// Lets the companion in this process have what has come by now.
+    /// Gives the companion in this process the bytes that have arrived by now.
     fn step_companion(
         &mut self,
         now_us: u64,
@@ -336,7 +336,7 @@ impl SimulatedVehicle {
         }
     }
 
-    /// Takes what a ground station sent.
+    /// Handles bytes from a ground station.
     pub fn handle_ground_bytes(&mut self, now_us: u64, bytes: &[u8]) {
         if !self.is_down(now_us) {
             self.autopilot.handle_ground_bytes(bytes);

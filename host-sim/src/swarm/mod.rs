@@ -46,7 +46,7 @@ use crate::shortage;
 const REACHED_M: f32 = 0.5;
 /// Distance from its pad beyond which a vehicle has left the pad, metres.
 const OFF_PAD_M: f32 = 2.0;
-/// Simulated time that goes on after the last vehicle is done, seconds.
+/// Simulated time that continues after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
 /// Standstill of all vehicles after a fault after which no vehicle will fly any more, seconds:
 /// longer than from a gate's opening to the take-off.
@@ -272,7 +272,7 @@ impl<'a> SimulationRun<'a> {
         Ok(())
     }
 
-    /// Sets when the simulation ends, once nothing more is to come.
+    /// Sets the end of the simulation once no vehicle will move any more.
     fn update_end(&mut self) {
         let (members, plan) = (&self.members, self.plan);
         let started = self.ground_station.started();

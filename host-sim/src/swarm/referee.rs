@@ -156,7 +156,7 @@ impl<'a> Referee<'a> {
         }
     }
 
-    /// Looks at all vehicles at one physics step.
+    /// Checks all vehicles at one physics step.
     pub fn observe(&mut self, t_s: f64, seen: &[Observation]) {
         for (i, now) in seen.iter().enumerate() {
             self.watch_walls(i, t_s, now);

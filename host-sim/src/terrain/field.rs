@@ -18,7 +18,7 @@ const MIN_CELL_M: f32 = 2.0;
 /// away.
 const MIN_RISE_STEPS: f32 = 5.0;
 
-/// Why there is no field.
+/// Reason why there is no field.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
     /// The map has no height at this place, metres east and north.

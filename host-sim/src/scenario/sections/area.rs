@@ -343,7 +343,7 @@ fn flat(
     }
 }
 
-/// Why rings that do not cross are no area all the same, and what would help.
+/// Reason why rings that do not cross still form no area, and a remedy.
 fn overlapping(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
     let of = |kind: RingKind| {
         let indices = 0..area.rings().len();

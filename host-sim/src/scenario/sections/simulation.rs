@@ -8,7 +8,7 @@ use super::values::{MAX_ID, point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
-/// The table of a mission in which vehicles stray from their paths by `stray_m` together, unless it says otherwise.
+/// The table of a mission in which vehicles deviate from their paths by `stray_m` together, unless it says otherwise.
 pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.one_of("method", Method::Priority, &methods)?;
