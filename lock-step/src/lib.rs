@@ -110,7 +110,7 @@ fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
 }
 
 impl ToBoard {
-    /// As it travels.
+    /// The bytes of the record header.
     pub fn to_bytes(self) -> [u8; HEAD] {
         to_bytes(match self {
             Self::Bytes { port, len, due_us } => (0, port, len, 0, due_us),
@@ -121,7 +121,7 @@ impl ToBoard {
         })
     }
 
-    /// As it was meant; `None` for bytes of no record.
+    /// The record that these bytes encode; `None` for bytes of no record.
     pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
         let (kind, port, len, address, time) = from_bytes(head);
         Some(match kind {
@@ -134,7 +134,7 @@ impl ToBoard {
         })
     }
 
-    /// Bytes that follow.
+    /// Number of payload bytes that follow the header.
     pub fn payload_len(self) -> usize {
         match self {
             Self::Bytes { len, .. } | Self::Poke { len, .. } => len.into(),
@@ -144,7 +144,7 @@ impl ToBoard {
 }
 
 impl FromBoard {
-    /// As it travels.
+    /// The bytes of the record header.
     pub fn to_bytes(self) -> [u8; HEAD] {
         to_bytes(match self {
             Self::Started => (0, 0, 0, 0, 0),
@@ -154,7 +154,7 @@ impl FromBoard {
         })
     }
 
-    /// As it was meant; `None` for bytes of no record.
+    /// The record that these bytes encode; `None` for bytes of no record.
     pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
         let (kind, port, len, _, time) = from_bytes(head);
         Some(match kind {
@@ -166,7 +166,7 @@ impl FromBoard {
         })
     }
 
-    /// Bytes that follow.
+    /// Number of payload bytes that follow the header.
     pub fn payload_len(self) -> usize {
         match self {
             Self::Sent { len, .. } | Self::Memory { len } => len.into(),

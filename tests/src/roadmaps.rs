@@ -78,7 +78,7 @@ impl Forger {
     /// Changes some of the roadmap's file, makes its CRC right again, and searches what is accepted.
     ///
     /// # Errors
-    /// Why the file is refused.
+    /// Reason why the file is refused.
     ///
     /// # Panics
     /// It is accepted and a search is wrong.

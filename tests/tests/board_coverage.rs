@@ -9,7 +9,7 @@ use host_sim::swarm::Flight;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 
-/// An area with a zone that nobody enters, small: boards in QEMU are no faster than a few times the clock.
+/// An area with a zone that no vehicle may enter, small: boards in QEMU are no faster than a few times the clock.
 const FIELD: &str = r#"
 [area]
 polygon = [[0, 0], [70, 0], [80, 45], [10, 50]]

@@ -54,7 +54,7 @@ struct Draw {
     most_in_three: usize,
 }
 
-/// The row of a vehicle that nobody heard for so long that its part was divided among the others.
+/// The row of a vehicle that no other vehicle heard for so long that its part was divided among the others.
 const GIVEN_AWAY: &str = "Its part was given away: landing";
 
 /// What the radio does beside losing messages one by one.

@@ -1,7 +1,7 @@
 //! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of a planner that has the map.
 //!
 //! A vehicle flies from node to node; another one fell silent above its path and lies on the ground there. With a file of
-//! version 1 the whole column below is kept off.
+//! version 1 the whole column below is kept clear.
 
 use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::shared_data;

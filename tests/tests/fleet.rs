@@ -61,7 +61,7 @@ struct Vehicle {
 }
 
 impl Vehicle {
-    /// The waypoints of its path, and whether its part goes on after them.
+    /// The waypoints of its path, and whether its part continues after them.
     fn path(&self) -> (&[u32], bool) {
         (&self.part[..self.part.len().min(self.most)], self.part.len() > self.most)
     }
@@ -204,7 +204,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             };
             vehicle.down |= ends;
             let stop_dm = vehicle.along_dm.saturating_add((STOP_S * PER_S * f32::from(WAYPOINT_DM)) as u16);
-            // On its way home it promises a place beyond its waypoints.
+            // On its path home it promises a place beyond its waypoints.
             let last_dm = if goes_on { length as u16 * WAYPOINT_DM } else { u16::MAX };
             let promise_dm = stop_dm.next_multiple_of(WAYPOINT_DM).min(last_dm);
             let holds = vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);

@@ -1,7 +1,7 @@
 //! All logs of the shared data: read as pymavlink reads them, and survived in whatever state they arrive.
 //!
 //! Damage is seeded by the log's place in the folder and the round. `FLOCKMATE_FUZZ_ROUNDS=20 cargo test -p flockmate-tests
-//! --test logs` goes on for twenty rounds instead of one.
+//! --test logs` continues for twenty rounds instead of one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -208,7 +208,7 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
         agrees: bits & 128 != 0,
     };
     let bits = entropy.bits();
-    // Seldom what lands the vehicle at once: the others gave it up, or are divisions ahead.
+    // Rarely what lands the vehicle at once: the others gave it up, or are divisions ahead.
     let (about_it, ahead) = (bits >> 40 & 255 == 0, bits >> 48 & 255 == 0);
     let mut entry_of = |rank| {
         let drawn = entry(entropy.bits());

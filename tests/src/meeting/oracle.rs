@@ -148,7 +148,7 @@ pub struct Seen {
     pub own: bool,
     /// It lands by its autopilot, as its companion commanded.
     pub lands: bool,
-    /// It has heard nobody for so long that it has to come down where it is.
+    /// It has heard no other vehicle for so long that it has to come down where it is.
     pub deaf: bool,
 }
 
@@ -343,7 +343,7 @@ impl Oracle {
         let Some(warned) = warned.filter(|warned| *warned < step) else { return track[step].position };
         if track[warned..=step].iter().any(|seen| !seen.own || (seen.deaf && seen.lands)) {
             // Somebody else took it: its companion could not have stopped it. Nor could a vehicle stay up for good that
-            // hears nobody any more.
+            // hears no other vehicle any more.
             return track[step].position;
         }
         let speed = track[warned].velocity.norm();

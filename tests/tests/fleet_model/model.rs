@@ -73,7 +73,7 @@ pub struct Vehicle {
     pub hears: u32,
     /// Whether its clock is a tick slow.
     pub slow: bool,
-    /// Whether it stands, and goes on only to where it has promised to hold.
+    /// Whether it stands, and continues only to where it has promised to hold.
     pub stands: bool,
     /// Waypoints that it has photographed.
     pub taken: u32,
@@ -171,7 +171,7 @@ impl FleetModel {
         }
     }
 
-    /// The waypoints of its path, and whether its part goes on after them.
+    /// The waypoints of its path, and whether its part continues after them.
     fn path(&self, vehicle: &Vehicle) -> (Vec<u32>, bool) {
         let mut part = parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank);
         let goes_on = part.len() > self.most;

@@ -269,7 +269,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
         let is_struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
         row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !is_struck(v)).count();
         if simulation.contains("[[faults]]") && method == METHODS[0] {
-            // Whom nobody hears is where it was struck, or further along its path.
+            // Whom no other vehicle hears is where it was struck, or further along its path.
             let silent = simulation.contains("radio-cut") && !simulation.contains("\"rx\"");
             let struck = Struck { index: usize::from(struck) - 1, at_s: at_s.parse()?, silent };
             explain(row, &mission, &plan, &flight, struck);
