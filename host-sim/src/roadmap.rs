@@ -1,5 +1,5 @@
 //! Building a roadmap on the desk: planner-core's PRM on all cores, every edge with its clearance, encoded as the file
-//! that continues the board.
+//! that goes on the board.
 //!
 //! Edges come in the same order whatever the number of threads, because pieces of work are joined in their order.
 

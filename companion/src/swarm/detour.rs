@@ -78,7 +78,7 @@ const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Age from which a neighbour's position is vague.
 const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
-/// Greatest deviate from the path, metres: a path that much nearer to a keep-out zone is blocked.
+/// Greatest deviation from the path, metres: a path that much nearer to a keep-out zone is blocked.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
 /// Purpose of a requested detour.
