@@ -35,7 +35,7 @@ use self::hold::Hold;
 use self::limits::{MotionLimits, Settings};
 use self::nearest::nearest_arc_length_m;
 use self::phase::Phase;
-use self::setpoint::correction;
+use self::setpoint::position_correction;
 use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
 use self::waypoints::Algorithm2Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
@@ -433,7 +433,7 @@ impl Guidance {
         self.mark_trapped(blocked, now);
         let sound = self.smoother.make_setpoint();
         let correction = if flies && state != State::PilotControl && known {
-            correction(&self.smoother.position(), &self.smoother.velocity(), scene.telemetry)
+            position_correction(&self.smoother.position(), &self.smoother.velocity(), scene.telemetry)
         } else {
             Point::zeros()
         };

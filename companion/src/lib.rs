@@ -39,7 +39,7 @@
 //! the newest is dropped and counted ([`Companion::dropped_messages`]).
 //!
 //! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are in [`autopilot::px4`] and
-//! [`autopilot::ardupilot`]; [`autopilot::Kind`] chooses between them by HEARTBEAT.
+//! [`autopilot::ardupilot`]; [`autopilot::AutopilotKind`] chooses between them by HEARTBEAT.
 #![no_std]
 #![forbid(unsafe_code)]
 

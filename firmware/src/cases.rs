@@ -38,7 +38,7 @@ pub const CLEARANCE_M: f32 = 0.8;
 pub const ASSIGNMENT_MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
 
 /// A swarm for the terminals of a roadmap: one vehicle a start.
-pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
+pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
     let starts = view.header().starts.min(VEHICLES as u16);
     let task = |i: u16| VehicleTask {
         id: 1 + i as u8,
@@ -50,12 +50,12 @@ pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
 }
 
 /// Height of every goal above its ground, metres.
-pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
+pub fn goal_descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
     (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
 }
 
 /// The plan request for that swarm.
-pub fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
+pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
     PlanRequest { vehicles, descents_m, mode: ASSIGNMENT_MODE, schedule: SCHEDULE, max_gates: GATES }
 }
 
@@ -263,7 +263,7 @@ pub const ROADMAP_CONFIG: Config = Config {
 ///
 /// # Panics
 /// It is none.
-pub fn map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
+pub fn voxel_map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
     let word =
         |i: usize| u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]]);
     let shape = GridShape {

@@ -70,7 +70,7 @@ fn main() -> ! {
     #[cfg(any(feature = "nucleo-h743", feature = "qemu"))]
     // SAFETY: nothing runs yet, and the chip's memories do since it was asked for the cause.
     unsafe {
-        firmware::boards::sections::zero();
+        firmware::boards::sections::zero_sections();
     }
     let crashed = crash::take_report(cause);
     let parts = chosen::start();
@@ -164,10 +164,10 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, boo
         if let Some(lent) = lies.and_then(|r| flash.lend(r.start, (r.end - r.start) as usize)) {
             // A file ends with its checksum.
             let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
-            let begun = crash::begin(FileWork::CheckRoadmap, sum);
+            let begun = crash::begin_work(FileWork::CheckRoadmap, sum);
             aside |= !begun;
             let is_one = begun && (RoadmapView::parse(&lent).is_ok() || FieldView::parse(&lent).is_ok());
-            crash::finish();
+            crash::finish_work();
             if is_one {
                 return (Some(lent), aside);
             }
@@ -209,11 +209,11 @@ fn find_mission(
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
     let files = map_crc ^ sum.rotate_left(1);
     // The crash may have come from reading the mission, or from a plan.
-    if !crash::may_begin(FileWork::Plan, files) || !crash::begin(FileWork::ReadMission, files) {
+    if !crash::may_begin(FileWork::Plan, files) || !crash::begin_work(FileWork::ReadMission, files) {
         return FoundMission { files, set_aside: true, ..FoundMission::default() };
     }
     let read = MissionView::parse(bytes);
-    crash::finish();
+    crash::finish_work();
     let refused = read.err();
     let mission = read.ok().filter(|mission| mission.can_be_planned_with(roadmap));
     FoundMission { mission, files, refused, set_aside: false }

@@ -114,11 +114,11 @@ impl Planner<'_> {
         if wanted == PlanKind::Detour && detour.is_none() {
             return Err(PlanFailure::Unreachable);
         }
-        if !boards::begin(FileWork::Plan, self.files) {
+        if !boards::begin_work(FileWork::Plan, self.files) {
             return Err(PlanFailure::Invalid);
         }
         let outcome = self.plan(detour);
-        boards::finish();
+        boards::finish_work();
         outcome
     }
 

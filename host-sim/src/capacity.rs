@@ -95,14 +95,14 @@ impl BoardCapacity {
     ///
     /// # Errors
     /// There is none; the error names those there are.
-    pub fn named(name: &str) -> Result<&'static Self, String> {
+    pub fn by_name(name: &str) -> Result<&'static Self, String> {
         let names = || BOARDS.map(|board| board.name).join(", ");
         BOARDS.iter().find(|board| board.name == name).ok_or_else(|| format!("boards are {}", names()))
     }
 
     /// The first of the board's limits that a roadmap file exceeds.
     pub fn roadmap_excess(&self, roadmap: &RoadmapView<'_>) -> Option<String> {
-        self.excess(&[
+        self.first_excess(&[
             ("nodes", roadmap.node_count(), self.nodes),
             ("half-edges", roadmap.half_edge_count(), self.half_edges),
             ("bytes of roadmap", roadmap.byte_len(), self.roadmap_bytes),
@@ -111,12 +111,12 @@ impl BoardCapacity {
 
     /// The first of the board's limits that an area exceeds.
     pub fn area_excess(&self, vertices: usize, lanes: usize) -> Option<String> {
-        self.excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
+        self.first_excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
     }
 
     /// The first of the board's limits that a mission file exceeds.
     pub fn mission_excess(&self, mission: &MissionView<'_>) -> Option<String> {
-        self.excess(&[
+        self.first_excess(&[
             ("vehicles", mission.vehicles().len(), self.vehicles),
             ("goals", mission.goals().len(), self.vehicles),
         ])
@@ -124,10 +124,10 @@ impl BoardCapacity {
 
     /// Whether a vehicle's plan has more gates than it holds.
     pub fn gates_excess(&self, gates: usize) -> Option<String> {
-        self.excess(&[("gates of one vehicle", gates, self.gates)])
+        self.first_excess(&[("gates of one vehicle", gates, self.gates)])
     }
 
-    fn excess(&self, limits: &[(&str, usize, usize)]) -> Option<String> {
+    fn first_excess(&self, limits: &[(&str, usize, usize)]) -> Option<String> {
         let over = limits.iter().find(|(_, count, most)| count > most);
         over.map(|(what, count, most)| format!("{count} {what}, {} holds {most}", self.name))
     }

@@ -71,9 +71,9 @@ impl ResultFiles {
         let results = Self { dir: dir.into(), made: missing.map(PathBuf::from).collect(), files: Vec::new() };
         fs::create_dir_all(dir).with_context(|| format!("cannot make a directory: {}", quoted_path(dir)))?;
         for name in names {
-            results.target(name)?;
+            results.target_path(name)?;
         }
-        results.temporary()?;
+        results.temporary_file()?;
         Ok(results)
     }
 
@@ -81,7 +81,7 @@ impl ResultFiles {
     ///
     /// # Errors
     /// As [`Self::open`], or the path names no file.
-    pub fn file(path: &Path) -> anyhow::Result<Self> {
+    pub fn single_file(path: &Path) -> anyhow::Result<Self> {
         // `a/` means a directory, though its last part is `a`.
         let slash = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         let name = path.file_name().and_then(|name| name.to_str()).filter(|_| !slash);
@@ -90,7 +90,7 @@ impl ResultFiles {
     }
 
     /// Place of a file of this name: the target of a link.
-    fn target(&self, name: &str) -> anyhow::Result<PathBuf> {
+    fn target_path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
         let cannot = || format!("cannot write: {}", quoted_path(&path));
         match fs::canonicalize(&path) {
@@ -103,7 +103,7 @@ impl ResultFiles {
         }
     }
 
-    fn temporary(&self) -> anyhow::Result<NamedTempFile> {
+    fn temporary_file(&self) -> anyhow::Result<NamedTempFile> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".flockmate-");
         #[cfg(unix)]
@@ -121,8 +121,8 @@ impl ResultFiles {
     /// # Errors
     /// It cannot be written.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let target = self.target(name)?;
-        let mut file = self.temporary()?;
+        let target = self.target_path(name)?;
+        let mut file = self.temporary_file()?;
         let written = file.write_all(bytes).and_then(|()| file.flush());
         written.with_context(|| format!("cannot write: {}", quoted_path(&target)))?;
         self.files.push((file, target));
@@ -253,7 +253,7 @@ mod tests {
             assert!(ResultFiles::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
         }
         for path in ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y", "/tmp/x/"] {
-            assert!(ResultFiles::file(Path::new(path)).is_err(), "{path}");
+            assert!(ResultFiles::single_file(Path::new(path)).is_err(), "{path}");
         }
         assert!(!folder.path().join("file/x").exists());
     }
@@ -265,7 +265,7 @@ mod tests {
         let (real, link) = (folder.path().join("real"), folder.path().join("link"));
         fs::write(&real, b"old").unwrap();
         std::os::unix::fs::symlink(&real, &link).unwrap();
-        let mut results = ResultFiles::file(&link).unwrap();
+        let mut results = ResultFiles::single_file(&link).unwrap();
         results.add_file(&link, b"new").unwrap();
         results.commit().unwrap();
         assert_eq!(fs::read(&real).unwrap(), b"new");

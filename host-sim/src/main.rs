@@ -51,10 +51,10 @@ fn main() -> ExitCode {
         Err(error) => print_argument_error(&error),
     };
     // Results that nobody could read are none.
-    let done = done.and_then(|code| progress::printed().map(|()| code));
+    let done = done.and_then(|code| progress::check_printed().map(|()| code));
     done.unwrap_or_else(|error| {
         // Where the error cannot be printed either, the exit code reports it.
-        let _ = writeln!(std::io::stderr(), "error: {}", quote::message(&format!("{error:#}")));
+        let _ = writeln!(std::io::stderr(), "error: {}", quote::quote_message(&format!("{error:#}")));
         ExitCode::from(BAD_INPUT)
     })
 }

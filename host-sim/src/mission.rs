@@ -72,16 +72,16 @@ impl Mission {
         }
         let mut timing = Timing::default();
         let begun = Instant::now();
-        let stage = progress.stage("map");
+        let stage = progress.begin_stage("map");
         let map = map::load(&scenario.map.file, scenario.map.resolution_m)?.voxel_map(scenario.map.unknown);
         timing.map_s = begun.elapsed().as_secs_f64();
         drop(stage);
 
         let begun = Instant::now();
-        let stage = progress.stage("roadmap");
+        let stage = progress.begin_stage("roadmap");
         let schedule = schedule_config(&scenario);
-        let goals = places::goals(&scenario, &map, &schedule)?;
-        let tasks = places::tasks(&scenario, &map)?;
+        let goals = places::goal_points(&scenario, &map, &schedule)?;
+        let tasks = places::vehicle_tasks(&scenario, &map)?;
         let descents_m = descents_m(&scenario, &map, &goals)?;
         if let Some(BoardCapacity { name, vehicles, .. }) =
             board.filter(|b| b.vehicles < tasks.len().max(goals.len()))
@@ -91,7 +91,7 @@ impl Mission {
                 scenario.path
             );
         }
-        let (mut roadmap, header, parts) = places::build(&scenario, &map, &goals)?;
+        let (mut roadmap, header, parts) = places::build_roadmap(&scenario, &map, &goals)?;
         timing.roadmap_parts = parts;
         let capping = Instant::now();
         if let Some(board) = board {

@@ -47,7 +47,7 @@ fn shortened(text: &str, most: usize) -> String {
 }
 
 /// A whole message as it is printed: nothing in it is a code but its ends of line, and no line is endless.
-pub fn message(text: &str) -> String {
+pub fn quote_message(text: &str) -> String {
     let lines: Vec<String> = text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
     lines.join("\n")
 }
@@ -63,7 +63,7 @@ pub fn about_arguments(text: &str, arguments: impl Iterator<Item = String>) -> S
             }
         }
     }
-    message(&text)
+    quote_message(&text)
 }
 
 #[cfg(test)]
@@ -96,7 +96,7 @@ mod tests {
         fn whatever_is_quoted_is_short_and_without_codes(text in "(?s).{0,700}") {
             let short = quoted(&text);
             prop_assert!(short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_control_code), "{short:?}");
-            prop_assert!(message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_control_code)));
+            prop_assert!(quote_message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_control_code)));
         }
     }
 }

@@ -277,12 +277,12 @@ fn describe(error: &PrmError) -> anyhow::Error {
 mod tests {
     use super::*;
     use crate::map::Unknown;
-    use crate::map::building::building;
+    use crate::map::building::building_map;
     use planner_core::prm::Sampling;
 
     #[test]
     fn any_number_of_threads_gives_the_same_edges() {
-        let map = building(1, 0.5).unwrap().voxel_map(Unknown::Blocked);
+        let map = building_map(1, 0.5).unwrap().voxel_map(Unknown::Blocked);
         let config = Config {
             nodes: 500,
             edge_min_m: 0.5,

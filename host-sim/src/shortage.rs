@@ -60,8 +60,8 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     let bound =
         mission.tasks.iter().enumerate().find(|(_, task)| task.goal.is_some_and(|g| usize::from(g) == goal));
     let reachable = match bound {
-        Some((vehicle, _)) => reach.joined(vehicle, goal),
-        None => (0..vehicles).any(|vehicle| reach.joined(vehicle, goal)),
+        Some((vehicle, _)) => reach.are_connected(vehicle, goal),
+        None => (0..vehicles).any(|vehicle| reach.are_connected(vehicle, goal)),
     };
     let labelled = mission.tasks.iter().any(|task| task.goal.is_some());
     let why = match (reachable, bound, labelled) {
@@ -87,7 +87,7 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String 
     let at = &mission.scenario.vehicles[vehicle].start;
     let place = mission.scenario.vehicle_places.get(vehicle).map_or(String::new(), |p| format!(" ({p})"));
     let goals = mission.goals.len();
-    let why = if !(0..goals).any(|goal| reach.joined(vehicle, goal)) {
+    let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
         let helps = if asks { format!("; {}", what_helps(asked, vehicle, goal)) } else { String::new() };
         format!("no way in the roadmap leads from it to a goal{helps}")
@@ -164,7 +164,7 @@ impl Reachability {
         Self { joined: (0..vehicles).map(row).collect() }
     }
 
-    fn joined(&self, vehicle: usize, goal: usize) -> bool {
+    fn are_connected(&self, vehicle: usize, goal: usize) -> bool {
         self.joined[vehicle][goal]
     }
 }
@@ -262,7 +262,7 @@ mod tests {
     /// Two rooms behind a wall with a door of `door` cells of 0.1 m.
     fn rooms(door: u32) -> VoxelMap {
         let shape = GridShape { dims: [60, 40, 20], min: Point::zeros(), resolution_m: 0.1 };
-        let mut map = OccupancyMap::unknown(shape, "rooms").unwrap();
+        let mut map = OccupancyMap::all_unknown(shape, "rooms").unwrap();
         for (i, j, k) in (0..60).flat_map(|i| (0..40).flat_map(move |j| (0..20).map(move |k| (i, j, k)))) {
             let in_door = (20 - door / 2..20 + door.div_ceil(2)).contains(&j);
             let wall = (i == 30 && !in_door) || k == 0;

@@ -151,7 +151,7 @@ impl FtpClient {
         )
     }
 
-    fn request(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
+    fn request_payload(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
         let mut payload = [0; PAYLOAD_LEN];
         (payload[1], payload[2]) = (self.system.unwrap_or(0), COMPANION_COMPONENT);
         payload[3..5].copy_from_slice(&self.sequence.to_le_bytes());
@@ -169,7 +169,7 @@ impl FtpClient {
         self.send(&out[..length])
     }
 
-    fn answers(&mut self) -> anyhow::Result<Vec<Answer>> {
+    fn receive_answers(&mut self) -> anyhow::Result<Vec<Answer>> {
         let (us, frames) = ((self.own_system, COMPONENT_ID), self.receive_frames()?);
         let for_us = frames
             .iter()
@@ -188,7 +188,7 @@ impl FtpClient {
 
     /// Repeats a request until it is answered.
     fn request_until_answered(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
-        let request = self.request(opcode, 0, data);
+        let request = self.request_payload(opcode, 0, data);
         let began = self.link.now();
         let mut asked_at = began;
         self.send_request(&request)?;
@@ -199,7 +199,7 @@ impl FtpClient {
             }
             let sequence = self.sequence;
             let mine = |a: &Answer| a.sequence == sequence && a.answers == opcode;
-            if let Some(answer) = self.answers()?.into_iter().find(mine) {
+            if let Some(answer) = self.receive_answers()?.into_iter().find(mine) {
                 if !answer.yes {
                     bail!("{}", nak_reason(&answer.data));
                 }
@@ -226,7 +226,7 @@ impl FtpClient {
             while under_way.len() < self.retransmission.window()
                 && let Some((i, piece)) = pieces.next()
             {
-                let request = self.request(WRITE, (i * MAX_DATA) as u32, piece);
+                let request = self.request_payload(WRITE, (i * MAX_DATA) as u32, piece);
                 self.send_request(&request)?;
                 let piece =
                     PendingPiece { request, length: piece.len(), sent_at: self.link.now(), repeated: false };
@@ -235,7 +235,7 @@ impl FtpClient {
             if under_way.is_empty() {
                 break;
             }
-            for answer in self.answers()? {
+            for answer in self.receive_answers()? {
                 if answer.answers != WRITE {
                     continue;
                 }

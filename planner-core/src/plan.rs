@@ -3,7 +3,7 @@
 //! Every companion computes this for the whole swarm from the mission's starts and goals, never from live positions, so all
 //! agree; the CRC of the plan is what they compare. P3D §3.3: one roadmap, a shortest path per vehicle (labelled) or the
 //! assignment of least total length over all pairs (unlabelled); what the paper leaves out is the order at shared stretches,
-//! which [`crate::schedule_flights`] settles.
+//! which [`crate::schedule`] settles.
 //!
 //! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A*, up to a dozen searches
 //! of the schedule (one for each departure looked at) and one pass over all scheduled pieces per vehicle; twice that for more than

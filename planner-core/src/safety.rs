@@ -1,7 +1,7 @@
 //! The safety filter's geometry: where can a vehicle be until it has stopped, and do two such sets meet?
 //!
 //! The set of this vehicle ([`ReachableSet::along`], [`ReachableSet::vertical`]) is what it can no longer take back: [`REACTION_S`] at
-//! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`Heard::reachable_set`]) follows
+//! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`NeighbourMotion::reachable_set`]) follows
 //! from what was last heard and from nothing else: no gate, no progress, no advice.
 //!
 //! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A motion that does not reduce a

@@ -57,7 +57,7 @@ impl<const N: usize> SearchWorkspace<N> {
     /// Length in metres of the shortest way from the last search's source to `node`; infinite if it was not settled.
     pub fn distance_m(&self, node: u16) -> f32 {
         match self.distance.get(usize::from(node)) {
-            Some(&distance) if self.heap.place(node) == SETTLED => distance,
+            Some(&distance) if self.heap.entry_index(node) == SETTLED => distance,
             _ => f32::INFINITY,
         }
     }
@@ -66,7 +66,7 @@ impl<const N: usize> SearchWorkspace<N> {
     /// may be taken out for every target of a [`dijkstra_row`].
     pub fn path_to<const P: usize>(&self, node: u16, out: &mut Vec<u16, P>) -> Result<(), SearchError> {
         out.clear();
-        if usize::from(node) >= N || self.heap.place(node) != SETTLED {
+        if usize::from(node) >= N || self.heap.entry_index(node) != SETTLED {
             return Err(SearchError::NoPath);
         }
         let mut at = node;
@@ -362,11 +362,11 @@ fn search<const N: usize>(
             let straight = libm::sqrtf((view.node(node) - goal).norm_squared());
             straight.max(libm::fabsf(a - goal_a)).max(libm::fabsf(b - goal_b))
         };
-        if informed && ws.heap.place(target) != SETTLED {
+        if informed && ws.heap.entry_index(target) != SETTLED {
             let distance = &ws.distance;
             ws.heap.reorder(|node| distance[usize::from(node)] + heuristic(node));
         }
-        while ws.heap.place(target) != SETTLED
+        while ws.heap.entry_index(target) != SETTLED
             && let Some(node) = ws.heap.pop()
         {
             relax_edges(graph, node, &passable, heuristic, ws, &mut gains);
@@ -414,7 +414,7 @@ fn relax_edges<const N: usize>(
         for &place in gains.iter().take(count) {
             let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
             let length = reached + graph.length(k, &here, target);
-            let gain = length < distance[usize::from(target)] && ws.heap.place(target) != SETTLED;
+            let gain = length < distance[usize::from(target)] && ws.heap.entry_index(target) != SETTLED;
             if gain && passable(node, &view.half_edge(k)) {
                 distance[usize::from(target)] = length;
                 ws.parent[usize::from(target)] = node;

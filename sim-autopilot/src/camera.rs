@@ -61,7 +61,7 @@ impl CameraTrigger {
 
     /// DO_DIGICAM_CONTROL: 1 in parameter 5 asks for a picture.
     pub(super) fn handle_digicam_control(&mut self, command: &Command) {
-        self.picture_requested |= libm::roundf(command.number5) == 1.0;
+        self.picture_requested |= libm::roundf(command.param5) == 1.0;
     }
 
     /// The state that a reboot leaves: the photos taken.

@@ -25,7 +25,7 @@ pub struct Command {
     /// Parameters 1 to 4.
     pub param: [f32; 4],
     /// Parameter 5 where it is no place.
-    pub number5: f32,
+    pub param5: f32,
     /// Latitude and longitude in degrees, where given.
     pub place: [f64; 2],
     /// Parameter 7.
@@ -41,7 +41,7 @@ impl Command {
         Self {
             id: fields.u16(28),
             param: first_four(fields),
-            number5: fields.f32(16),
+            param5: fields.f32(16),
             place,
             z: fields.f32(24),
             relative: false,
@@ -59,7 +59,7 @@ impl Command {
         Self {
             id: fields.u16(28),
             param: first_four(fields),
-            number5: fields.i32(16) as f32,
+            param5: fields.i32(16) as f32,
             place,
             z: fields.f32(24),
             relative,

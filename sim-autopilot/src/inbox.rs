@@ -1,6 +1,6 @@
 //! What the simulated autopilot does with each message that comes in.
 //!
-//! Read by field ([`Fields`]): offsets are those of the wire order. What is for another system or component, or of an id
+//! Read by field ([`PayloadReader`]): offsets are those of the wire order. What is for another system or component, or of an id
 //! not listed here, changes nothing and is not answered, as on PX4 and ArduPilot.
 
 use mavlink::dialects::ardupilotmega as dialect;

@@ -185,7 +185,7 @@ impl Platform {
                 self.execute_camera_command(&Command {
                     id,
                     param: [0, 4, 8, 12].map(|at| item_f32(item, at)),
-                    number5: item_i32(item, 16) as f32,
+                    param5: item_i32(item, 16) as f32,
                     place: [f64::NAN; 2],
                     z: item_f32(item, 24),
                     relative: false,

@@ -73,7 +73,7 @@ impl Snapshot {
             onboard_control_sensors_enabled: bits(enabled),
             onboard_control_sensors_health: bits(health),
             load: 300,
-            voltage_battery: (1000.0 * self.volts()) as u16,
+            voltage_battery: (1000.0 * self.battery_volts()) as u16,
             current_battery: -100,
             drop_rate_comm: 0,
             errors_comm: 0,
@@ -207,7 +207,7 @@ impl Snapshot {
 
     pub(super) fn send_battery(&self, port: &mut Port) {
         let mut voltages = [u16::MAX; 10];
-        voltages[0] = (1000.0 * self.volts()) as u16;
+        voltages[0] = (1000.0 * self.battery_volts()) as u16;
         port.send(&dialect::BATTERY_STATUS_DATA {
             current_consumed: (5000.0 * (1.0 - self.battery)) as i32,
             energy_consumed: -1,

@@ -61,7 +61,7 @@ impl MissionProgress {
     }
 
     /// The item is begun again when the mission continues.
-    pub(super) fn interrupt(&mut self) {
+    pub(super) fn restart_item(&mut self) {
         (self.since_us, self.inside_us) = (None, None);
     }
 }

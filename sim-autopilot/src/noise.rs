@@ -46,7 +46,7 @@ impl Gaussian {
         (sum as f32 - 131_070.0) * (1.732_050_8 / 65_536.0)
     }
 
-    fn vector(&mut self) -> Point {
+    fn sample_vector(&mut self) -> Point {
         Point::new(self.sample(), self.sample(), self.sample())
     }
 }
@@ -63,11 +63,11 @@ impl OrnsteinUhlenbeck {
     fn new(sigma: Point, tau_s: f32, random: &mut Gaussian) -> Self {
         let keep = libm::expf(-SLOT_S / tau_s);
         let kick = sigma * libm::sqrtf(1.0 - keep * keep);
-        Self { value: random.vector().component_mul(&sigma), decay: keep, noise_gain: kick }
+        Self { value: random.sample_vector().component_mul(&sigma), decay: keep, noise_gain: kick }
     }
 
     fn advance(&mut self, random: &mut Gaussian) {
-        self.value = self.value * self.decay + random.vector().component_mul(&self.noise_gain);
+        self.value = self.value * self.decay + random.sample_vector().component_mul(&self.noise_gain);
     }
 }
 

@@ -40,7 +40,7 @@ impl ParamValue {
     }
 
     /// The whole number, of the integer types.
-    fn integer(self) -> Option<i32> {
+    fn as_i32(self) -> Option<i32> {
         match self {
             Int8(i) => Some(i32::from(i)),
             Int16(i) => Some(i32::from(i)),
@@ -51,7 +51,7 @@ impl ParamValue {
 
     /// A value of the same integer type; `None` of a float.
     pub fn with_integer(self, integer: i32) -> Option<Self> {
-        self.integer().map(|_| self.from_i32_like(integer))
+        self.as_i32().map(|_| self.from_i32_like(integer))
     }
 
     /// A value of the same type from a whole number, kept within the type's range.
@@ -119,8 +119,8 @@ impl Params {
     pub fn to_wire(&self, value: ParamValue) -> f32 {
         match (value, self.encoding) {
             (Real(real), _) => real,
-            (value, Encoding::Bytewise) => f32::from_bits(value.integer().unwrap_or(0) as u32),
-            (value, Encoding::Cast) => value.integer().unwrap_or(0) as f32,
+            (value, Encoding::Bytewise) => f32::from_bits(value.as_i32().unwrap_or(0) as u32),
+            (value, Encoding::Cast) => value.as_i32().unwrap_or(0) as f32,
         }
     }
 
@@ -150,7 +150,7 @@ impl Params {
 
     /// The value of an integer; 0 where there is none of that name.
     pub fn i32_value(&self, name: &str) -> i32 {
-        self.index(name).and_then(|index| self.values[index].integer()).unwrap_or(0)
+        self.index(name).and_then(|index| self.values[index].as_i32()).unwrap_or(0)
     }
 }
 

@@ -96,7 +96,7 @@ impl Snapshot {
         (self.time_us / 1000) as u32
     }
 
-    pub(super) fn volts(&self) -> f32 {
+    pub(super) fn battery_volts(&self) -> f32 {
         // Four cells between BAT1_V_EMPTY and BAT1_V_CHARGED.
         4.0 * (3.6 + 0.45 * self.battery)
     }

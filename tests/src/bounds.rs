@@ -188,7 +188,7 @@ impl Meter for Uncounted {
 pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
-    let map = building::building(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
+    let map = building::building_map(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
     let lines = board::measure(program, &mission.roadmap_file, &board::map_image(&map.grid()));
     let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());
     let mut scratch = Box::new(WorkspaceOverlay::new());

@@ -49,7 +49,7 @@ pub struct SetpointStats {
     pub outside: u64,
     /// Setpoints with more jerk than allowed.
     pub jerky: u64,
-    /// Setpoints further from the last one than [`MotionLimits::speed_mps`] leads.
+    /// Setpoints further from the last one than [`Limits::speed_mps`] leads.
     pub jumps: u64,
 }
 

@@ -327,7 +327,7 @@ impl Heard {
 /// The autopilot of a mission's first vehicle.
 fn config(mission: &Mission) -> Config {
     let (vehicle, origin) = (&mission.scenario.vehicles[0], mission.scenario.map.origin);
-    let pad = mission.pad(0);
+    let pad = mission.pad_position(0);
     let start: Point = geodetic_to_enu(&origin, &pad);
     Config {
         system_id: vehicle.id,

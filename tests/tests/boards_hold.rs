@@ -113,7 +113,7 @@ fn scanned_maps_fit_and_paths_stay_short() {
 /// A hall of 36 × 28 × 8 m with rows of shelves, at 0.05 m.
 fn hall() -> VoxelMap {
     let shape = GridShape { dims: [720, 560, 160], min: Point::zeros(), resolution_m: 0.05 };
-    let mut map = OccupancyMap::unknown(shape, "hall").unwrap();
+    let mut map = OccupancyMap::all_unknown(shape, "hall").unwrap();
     map.fill([0; 3], shape.dims, Occupancy::Occupied);
     map.fill([4; 3], [716, 556, 156], Occupancy::Free);
     for row in 0..7 {

@@ -131,7 +131,7 @@ fn written(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Vec<String> {
         let items = export::flight_items(planned, sortie, stops);
         export::qgc_plan(planned, &sortie.route, &items).to_string()
     };
-    flights.iter().map(plan).chain([export::csv(planned, flights)]).collect()
+    flights.iter().map(plan).chain([export::flights_csv(planned, flights)]).collect()
 }
 
 fn judge(seed: u64) -> Option<Seen> {

@@ -65,10 +65,10 @@ impl<'a> Ceiling<'a> {
         for row in 0..rows {
             for column in 0..columns {
                 let cell = [column, row];
-                let Some(height_m) = self.grid.height(cell).filter(|height_m| *height_m > over) else {
+                let Some(height_m) = self.grid.cell_height(cell).filter(|height_m| *height_m > over) else {
                     continue;
                 };
-                let away = (self.grid.middle(cell) - place).abs();
+                let away = (self.grid.cell_centre(cell) - place).abs();
                 let far_m = (away.x - self.near_m).max(0.0) + (away.y - self.near_m).max(0.0);
                 over = over.max(height_m - self.slope * far_m);
             }

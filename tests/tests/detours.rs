@@ -183,7 +183,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
 
 #[test]
 fn desk_and_board_find_the_detours_that_the_map_gives() {
-    let map = building::building(building::DEFAULT_SEED, 0.25).expect("the building");
+    let map = building::building_map(building::DEFAULT_SEED, 0.25).expect("the building");
     detours("building", &map.voxel_map(Unknown::Blocked), 0.8);
     for (name, resolution_m, clearance_m) in
         [("geb079", 0.08, 0.2), ("manufacturing", 0.086_642_2, 0.3), ("maze", 0.195_32, 0.3)]

@@ -133,7 +133,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let mut vehicles: Vec<Vehicle> = (0..count)
         .map(|own| {
             let mut fleet = Whole::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
-            fleet.begin(zero);
+            fleet.begin_flight(zero);
             let part = parts(&whole, &fleet, count).0.swap_remove(own);
             Vehicle {
                 fleet,
@@ -387,7 +387,7 @@ fn vehicles_that_fly_on_without_their_lease_are_found() {
 #[test]
 fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     let mut fleet = Whole::new(1, 3, FleetTimeouts::of_flight(Duration::from_secs(60)));
-    fleet.begin(Instant::ZERO);
+    fleet.begin_flight(Instant::ZERO);
     let own = OwnReport { commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
     let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);

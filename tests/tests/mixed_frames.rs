@@ -12,7 +12,7 @@ use host_sim::swarm::ground_station::GroundStation;
 use host_sim::swarm::member::{SimulatedVehicle, is_finished};
 use host_sim::swarm::radio::{Radio, RadioConfig};
 use host_sim::swarm::step::STEP_US;
-use host_sim::swarm::vehicles::members;
+use host_sim::swarm::vehicles::vehicles_on_pads;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::Point;
 use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
@@ -103,7 +103,7 @@ fn fly(seed: u64) -> Errors {
     let scenario = scenario::parse(&text, "mixed frames").unwrap_or_else(|e| panic!("mission {seed}: {e}"));
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
     let plan = mission.plan().expect("they fly side by side");
-    let mut members = members(&mission).expect("good vehicles");
+    let mut members = vehicles_on_pads(&mission).expect("good vehicles");
     // One station more than vehicles: it listens.
     let listener = members.len();
     let mut radio = Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);

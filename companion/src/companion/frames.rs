@@ -146,7 +146,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
                 late.update(delay_s);
             }
-            if self.neighbours.accept(id, frame.sequence, self.now) {
+            if self.neighbours.accept_intent(id, frame.sequence, self.now) {
                 let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
                 self.neighbours.handle_intent(
                     self.now,

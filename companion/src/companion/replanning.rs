@@ -48,7 +48,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Requests a detour, or a path aside, from the shell.
     pub(super) fn request_detour(&mut self, aim: DetourPurpose) {
-        self.detours.request(aim);
+        self.detours.note_request(aim);
         self.guidance.reset_trap_timer();
         self.mission.forget_failure();
         // Full only if the shell does not drain; then the detour is late.
@@ -58,7 +58,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Requests a detour around the obstacle on its path over a field, and back to the path.
     pub(super) fn request_detour_back_to_path(&mut self) {
         let back_m = self.detours.rejoin_m(&self.detour_view());
-        if self.detours.field_detour.seek(back_m) {
+        if self.detours.field_detour.start_seeking(back_m) {
             self.request_detour(DetourPurpose::Beyond);
         } else {
             self.detours.field_detour.note_failure(self.now);

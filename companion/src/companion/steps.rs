@@ -132,7 +132,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !row.text.is_empty() {
             self.links.send_text(row.warning, row.text);
         }
-        if let Some(text) = self.mission.interruption(from, to) {
+        if let Some(text) = self.mission.interruption_text(from, to) {
             self.links.send_text(false, text);
         }
         // Full only if the shell does not drain: then the newest is lost.
@@ -158,7 +158,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.reset();
                 self.mission.photographed_mut().begin_plan(self.config.resumes);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
-                    fleet.begin(now);
+                    fleet.begin_flight(now);
                 }
                 let _ = self.events.push_back(Event::PlanRequested(PlanKind::Mission));
             }
@@ -184,7 +184,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
             Action::TurnHome => {
                 self.guidance.begin_braking();
-                self.detours.field_detour.end();
+                self.detours.field_detour.abort();
                 self.detours.home.begin(now);
             }
             Action::RequestDetourAside => {
@@ -201,14 +201,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::FlyDivision => {
                 self.mission.fly_division();
-                self.detours.field_detour.end();
+                self.detours.field_detour.abort();
                 self.guidance.start_following(now);
             }
             Action::BrakeOnPath => self.guidance.begin_braking(),
             Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
-                self.detours.home.forget();
-                self.detours.field_detour.end();
+                self.detours.home.cancel();
+                self.detours.field_detour.abort();
                 let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
                 let guidance = &mut self.guidance;
                 self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));

@@ -94,7 +94,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let plan_crc = self.mission.plan().map_or(0, |plan| plan.plan_crc);
         let crc = self.config.mission_crc;
-        let relay = self.neighbours.relay(self.now, crc, plan_crc);
+        let relay = self.neighbours.next_relay(self.now, crc, plan_crc);
         if relay.is_empty() {
             return 0;
         }

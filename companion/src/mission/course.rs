@@ -130,7 +130,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// The place of the vehicle on the ground before it starts.
-    pub(crate) fn pad(&self) -> Point {
+    pub(crate) fn pad_position(&self) -> Point {
         self.start - Point::new(0.0, 0.0, self.climb_m())
     }
 
@@ -145,7 +145,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Reason why the plan requested last did not come.
-    pub(crate) fn failure(&self) -> Option<PlanFailure> {
+    pub(crate) fn plan_failure(&self) -> Option<PlanFailure> {
         self.failure
     }
 
@@ -204,7 +204,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// The text for a change of state that interrupts another.
-    pub(crate) fn interruption(&self, from: State, to: State) -> Option<&'static str> {
+    pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
         self.interrupted.interruption_text(from, to)
     }
 

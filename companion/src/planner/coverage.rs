@@ -270,7 +270,7 @@ pub fn plan_flights<
         }
     }
     let (tracks, transit) = (&ws.tracks, &transit);
-    let (left, done) = ws.losses.begin(tracks, transit, done)?;
+    let (left, done) = ws.losses.start_plan(tracks, transit, done)?;
     let whole = Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
     let work = Work { tracks: left, ..whole };
     match header.parts {

@@ -191,7 +191,7 @@ impl Ftp {
                 }
             }
             FtpOperation::Sum(request, asked) => {
-                match request.file().filter(|file| store.file_size(*file).is_some()) {
+                match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
                     Some(file) => *asked = store.request_crc(file, 0),
                     None => {
                         let request = *request;
@@ -277,15 +277,17 @@ impl Ftp {
                 self.finish(request, Ok(()));
             }
             op::LIST => self.handle_list(request, store),
-            op::OPEN_READ => match request.file().and_then(|file| Some((file, store.file_size(file)?))) {
-                None => self.nak(request, NakError::NotFound),
-                Some((file, size)) => {
-                    if self.open_session(request, file, false, store) {
-                        self.duplicates.remember(request, Ok(()), self.now);
-                        self.ack(request, &size.to_le_bytes());
+            op::OPEN_READ => {
+                match request.requested_file().and_then(|file| Some((file, store.file_size(file)?))) {
+                    None => self.nak(request, NakError::NotFound),
+                    Some((file, size)) => {
+                        if self.open_session(request, file, false, store) {
+                            self.duplicates.remember(request, Ok(()), self.now);
+                            self.ack(request, &size.to_le_bytes());
+                        }
                     }
                 }
-            },
+            }
             op::READ | op::BURST_READ => match self.session_of(request) {
                 Ok(Session { writes: true, .. }) => self.nak(request, NakError::InvalidSession),
                 Ok(_) => {
@@ -296,7 +298,7 @@ impl Ftp {
             },
             op::CREATE | op::OPEN_WRITE => self.handle_open(request, store, erasing),
             op::WRITE => self.handle_write(request, store),
-            op::REMOVE => match request.file().filter(|file| store.file_size(*file).is_some()) {
+            op::REMOVE => match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
                 Some(file) => {
                     store.remove_file(file);
                     self.text = Some(FILE_REMOVED);
@@ -306,7 +308,7 @@ impl Ftp {
             },
             op::CRC32 => self.operation = FtpOperation::Sum(*request, false),
             op::TRUNCATE | op::RENAME
-                if request.file().is_none_or(|file| store.file_size(file).is_none()) =>
+                if request.requested_file().is_none_or(|file| store.file_size(file).is_none()) =>
             {
                 self.nak(request, NakError::NotFound);
             }
@@ -340,7 +342,7 @@ impl Ftp {
     }
 
     fn handle_open(&mut self, request: &Request, store: &mut Store, erasing: ErasePermission) {
-        let Some(file) = request.file() else { return self.nak(request, NakError::Protected) };
+        let Some(file) = request.requested_file() else { return self.nak(request, NakError::Protected) };
         let same = |session: &&mut Session| {
             (session.client, session.id, session.file) == (request.client, request.session, file)
                 && session.fresh

@@ -59,7 +59,7 @@ pub struct Store {
     upload: Option<(File, UploadState)>,
     job: FlashJob,
     /// An erasure that lets a read go first, between two sectors.
-    paused: FlashJob,
+    paused_job: FlashJob,
     /// Whether the shell is at work for us.
     request_pending: bool,
     buffer: [u8; MAX_PROGRAM],
@@ -85,7 +85,7 @@ impl Store {
             reassembly: UploadReassembly::default(),
             upload: None,
             job: FlashJob::None,
-            paused: FlashJob::None,
+            paused_job: FlashJob::None,
             request_pending: false,
             buffer: [0; MAX_PROGRAM],
             program_word: [0; WORD],
@@ -195,7 +195,7 @@ impl Store {
     fn start_read(&mut self, job: FlashJob) -> bool {
         match self.job {
             FlashJob::None => {}
-            FlashJob::Erase { .. } if !self.request_pending => self.paused = self.job,
+            FlashJob::Erase { .. } if !self.request_pending => self.paused_job = self.job,
             _ => return false,
         }
         self.job = job;

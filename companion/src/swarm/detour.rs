@@ -14,7 +14,7 @@
 //! step, so a look among many takes several steps.
 //!
 //! Over a field there is no roadmap and no turn: a stopped vehicle flies around the obstacle and back to its path
-//! ([`field_detour`]), or home ([`homeward`]).
+//! ([`beside`]), or home ([`homeward`]).
 //!
 //! ENU metres.
 
@@ -433,7 +433,7 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> Option<bool> {
         let Some(plan) = view.mission.plan() else { return Some(false) };
-        let here = if on_ground { view.mission.pad() } else { view.telemetry.position };
+        let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
         let apart_m = view.config.safety_distance_m + BLOCKED_WITHIN_M;

@@ -136,7 +136,7 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Starts a flight, or a new plan: no vehicle counts as silent from before.
-    pub fn begin(&mut self, now: Instant) {
+    pub fn begin_flight(&mut self, now: Instant) {
         let entry = self.members[self.own].entry;
         if entry.status != MemberStatus::Alive || self.excluded || !self.divisions.is_empty() {
             self.rejoin((entry.incarnation + 1) % INCARNATIONS);
@@ -234,7 +234,7 @@ impl<const V: usize> Fleet<V> {
         }
         // A vehicle without a part in the division before has none in this one.
         let lot = |m: &FleetMember| {
-            if m.in_roster { DivisionInput::of(&m.entry) } else { DivisionInput::default() }
+            if m.in_roster { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
         };
         if !self.members.iter().map(lot).eq(self.division_inputs.iter().copied()) {
             self.withdraw_inputs();

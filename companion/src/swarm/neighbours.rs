@@ -224,7 +224,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that decodes and is of our mission:
     /// what anybody can send must not make the next true one look late. Positions carry their time instead.
-    pub fn accept(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
+    pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             let contact = &mut self.contacts[at];
             let fresh = contact.sequence.accept(sequence, now);
@@ -322,7 +322,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was checked
-    /// whether it blocks the path ([`Self::found_clear`]).
+    /// whether it blocks the path ([`Self::mark_path_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));

@@ -32,7 +32,7 @@ impl Obstacles {
     }
 
     /// Forgets the obstacle at this place.
-    fn revoke(&mut self, centre: &Point) {
+    fn remove_at(&mut self, centre: &Point) {
         while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_OBSTACLE_M) {
             self.known.remove(at);
             self.avoided -= usize::from(at < self.avoided);
@@ -52,7 +52,7 @@ impl Obstacles {
         }
         let centre = frames::geodetic_to_enu(origin, &place);
         if command.param1 <= 0.0 {
-            self.revoke(&centre);
+            self.remove_at(&centre);
             return ACCEPTED;
         }
         let radius_m = command.param1 + clearance_m;

@@ -40,6 +40,6 @@ fn main() -> ! {
     let places = answers.sum();
     let routes = limits_routes::call_all(&mut answers, LENT.take());
     println!("limits {} {places:08x} {routes:08x?}", calls.0);
-    println!("stack {} {}", stack::used(), stack::size());
+    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }

@@ -40,17 +40,17 @@ fn main() -> ! {
         .expect("a roadmap lies in bank 2");
     println!("roadmap {} {} {:08x}", view.node_count(), view.half_edge_count(), view.crc());
     let scratch = SCRATCH.take();
-    plan_swarm(&view, scratch.planner());
-    steps();
-    build(scratch, 0.0);
-    build(scratch, cases::CLEARANCE_M);
+    measure_plan(&view, scratch.planner());
+    measure_steps();
+    measure_build(scratch, 0.0);
+    measure_build(scratch, cases::CLEARANCE_M);
     let ws = CASES.take();
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, ws);
         let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
         println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
     }
-    println!("stack {} {}", stack::used(), stack::size());
+    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }
 
@@ -69,21 +69,25 @@ fn print_instructions<T>(name: &str, work: impl FnOnce() -> T) -> T {
 }
 
 /// The plan of a swarm of ten, step by step.
-fn plan_swarm(view: &RoadmapView<'_>, ws: &mut Planner) {
+fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
     let plan = PLAN.take();
-    let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
-    let request = cases::request(&vehicles, &descents_m);
+    let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
+    let request = cases::plan_request(&vehicles, &descents_m);
     let mut goals = Goals::new();
     print_instructions("costs", || plan::compute_costs(view, &request, ws)).expect("a cost matrix");
     print_instructions("assign", || plan::assign_goals(&request, ws, &mut goals)).expect("an assignment");
-    print_instructions("paths", || paths(view, &goals, &mut ws.search));
+    print_instructions("paths", || measure_paths(view, &goals, &mut ws.search));
     print_instructions("schedule", || plan::schedule_flights(view, &request, &goals, ws, plan))
         .expect("a schedule");
     println!("plan {:08x}", plan.crc);
 }
 
 /// The shortest path of each vehicle to its goal.
-fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWorkspace<ROADMAP_NODES>) {
+fn measure_paths(
+    view: &RoadmapView<'_>,
+    goals: &Goals<VEHICLES>,
+    search: &mut SearchWorkspace<ROADMAP_NODES>,
+) {
     let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
     for (start, goal) in (0u16..).zip(goals) {
         let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
@@ -94,7 +98,7 @@ fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWor
 }
 
 /// One step of advice among 32 neighbours; the worst of many.
-fn steps() {
+fn measure_steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);
     for number in 0..cases::STEP_CASES {
@@ -108,9 +112,9 @@ fn steps() {
 }
 
 /// A roadmap built from the map.
-fn build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
-    let (head, words) = memory::map();
-    let grid = cases::map(&head, words);
+fn measure_build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
+    let (head, words) = memory::measurement_map();
+    let grid = cases::voxel_map(&head, words);
     let builder = scratch.builder();
     let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
     let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };

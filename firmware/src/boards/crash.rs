@@ -52,12 +52,12 @@ pub fn may_begin(work: FileWork, files: u32) -> bool {
 }
 
 /// Begins work with files; false if it brought three starts in a row down, and is not to be done.
-pub fn begin(work: FileWork, files: u32) -> bool {
+pub fn begin_work(work: FileWork, files: u32) -> bool {
     update_record(|kept| kept.begin_work(work, files))
 }
 
 /// Notes that the work has ended.
-pub fn finish() {
+pub fn finish_work() {
     update_record(CrashRecord::finish_work);
 }
 

@@ -288,7 +288,7 @@ fn measure_division(
     let (vehicles, pads) = vehicles(case.count);
     let work =
         Work { tracks, transit: &transit, vehicles: &vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint };
-    losses.begin(tracks, &transit, &[]).expect("nothing is done");
+    losses.start_plan(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
     let manner = CaptureSettings { waypoint_m: case.lane_m, ..SWARM.capture };
     let swarm = FlightInputs { pads: &pads, capture: manner, ..SWARM };

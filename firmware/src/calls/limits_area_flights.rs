@@ -73,15 +73,15 @@ pub(super) fn call_area_flights(
     let FlightWorkspaces { area, losses, out, own } = lent;
     coverage::call_coverage(to, area);
     let mut transit = ZoneTransit::empty();
-    transit.set_area(coverage::area()).expect("there is room");
-    let good = work(&area.tracks, &transit);
+    transit.set_area(coverage::test_area()).expect("there is room");
+    let good = coverage_work(&area.tracks, &transit);
     call_flight_plans(to, &good, &area.plan, schedule, out);
     let pack = &mut area.powell.pack;
     call_divisions(to, &good, &area.plan, &mut BorrowedWorkspaces { losses, pack, schedule, out });
     call_ways_home(to, &transit, own);
 }
 
-fn work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
+fn coverage_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
     Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint }
 }
 
@@ -203,7 +203,7 @@ fn call_field_plans(
     routes: &Plan<VEHICLES>,
 ) {
     let mut file = [0; 64];
-    let field = ground(&mut file);
+    let field = uneven_field(&mut file);
     for hard in HARD_NUMBERS {
         let usual = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: 0.5 };
         for following in [
@@ -218,7 +218,7 @@ fn call_field_plans(
 }
 
 /// Uneven ground under the area.
-fn ground(file: &mut [u8]) -> FieldView<'_> {
+fn uneven_field(file: &mut [u8]) -> FieldView<'_> {
     let shape = FieldShape { low: Flat::new(-20.0, -20.0), cell_m: 40.0, columns: 2, rows: 3 };
     let length = field::write(&shape, &[0, 20, 40, 10, -30, 50], file).expect("it fits");
     FieldView::parse(&file[..length]).expect("a field")
@@ -241,8 +241,8 @@ fn call_divisions(
     let all = good.tracks.waypoint_count();
     for (first, end) in [(0, 0), (1, 3), (all, all), (3, 1), (0, u32::MAX), (u32::MAX, u32::MAX), (0, all)] {
         let done = [WaypointRange { first, end }];
-        let begun = to.call("losses::Workspace::begin", || {
-            memory.losses.begin(good.tracks, good.transit, &done).is_ok()
+        let begun = to.call("losses::Workspace::start_plan", || {
+            memory.losses.start_plan(good.tracks, good.transit, &done).is_ok()
         });
         to.add_bool(begun);
         let done = to.call("losses::Workspace::done", || memory.losses.done().len());
@@ -253,7 +253,7 @@ fn call_divisions(
     for hard in HARD_NUMBERS {
         for hit in [VehicleStatus { along_m: hard, ..fate }, VehicleStatus { along_m: hard, ..lost }] {
             for fates in [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]] {
-                memory.losses.begin(good.tracks, good.transit, &[]).expect("nothing is done");
+                memory.losses.start_plan(good.tracks, good.transit, &[]).expect("nothing is done");
                 flights::plan_flights(good, routes, &SWARM, memory.schedule, memory.out).expect("as before");
                 let mut routes = routes.clone();
                 let loss = Loss { work: good, swarm: &SWARM, fates };
@@ -294,7 +294,7 @@ fn call_ways_home(
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
     let mut file = [0; 64];
-    let field = ground(&mut file);
+    let field = uneven_field(&mut file);
     let here = Point::new(30.0, 20.0, 35.0);
     let over = Point::new(-5.0, -5.0, 1.5);
     let good = DetourRequest {

@@ -82,12 +82,12 @@ fn is_good(number: f32) -> bool {
     number > 0.0 && number.is_finite()
 }
 
-/// Makes all of them. Lent are afterwards the lanes and the routes of [`area`].
+/// Makes all of them. Lent are afterwards the lanes and the routes of [`test_area`].
 pub(super) fn call_coverage(to: &mut ResultChecksum<'_, impl CallListener>, lent: &mut CoverageWorkspaces) {
     call_waypoint_sets(to);
     call_cameras(to);
     call_areas(to);
-    let area = area();
+    let area = test_area();
     let mut transit = to.call("transit::Transit::empty", ZoneTransit::empty);
     call_transits(to, &mut transit);
     call_lanes(to, &area, &transit, lent);
@@ -97,7 +97,7 @@ pub(super) fn call_coverage(to: &mut ResultChecksum<'_, impl CallListener>, lent
 }
 
 /// 40 by 30 m, around a no-fly zone.
-pub(super) fn area() -> Area<'static> {
+pub(super) fn test_area() -> Area<'static> {
     Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
 }
 
@@ -151,8 +151,8 @@ fn call_areas(to: &mut ResultChecksum<'_, impl CallListener>) {
             let found = to.call("area::Area::new", || Area::new(&vertices, &RINGS));
             to.add_bool(found.is_ok());
             let place = Flat::new(x, y);
-            let holds = to.call("area::Area::contains", || area().contains(&place));
-            let forbids = to.call("area::Area::is_in_no_fly_zone", || area().is_in_no_fly_zone(&place));
+            let holds = to.call("area::Area::contains", || test_area().contains(&place));
+            let forbids = to.call("area::Area::is_in_no_fly_zone", || test_area().is_in_no_fly_zone(&place));
             assert!(holds || !forbids, "the zone lies in the area");
             let Ok(area) = found else { continue };
             let mut hull: Vec<Flat, VERTICES> = Vec::new();
@@ -173,7 +173,7 @@ fn call_areas(to: &mut ResultChecksum<'_, impl CallListener>) {
         }
     }
     assert!(Area::new(&[], &[]).is_err());
-    let area = area();
+    let area = test_area();
     for index in [0, 1, 2, usize::MAX] {
         let ring = to.call("area::Area::ring", || area.ring(index));
         assert_eq!(ring.len(), if index < 2 { 4 } else { 0 });
@@ -187,11 +187,11 @@ fn call_areas(to: &mut ResultChecksum<'_, impl CallListener>) {
 
 fn call_transits(to: &mut ResultChecksum<'_, impl CallListener>, transit: &mut ZoneTransit<'static>) {
     let mut small = Transit::<3>::empty();
-    let full = to.call("transit::Transit::set_area", || small.set_area(area()));
+    let full = to.call("transit::Transit::set_area", || small.set_area(test_area()));
     assert_eq!(full, Err(CoverageError::NoFlyFull));
     for known in [false, true] {
         if known {
-            assert_eq!(to.call("transit::Transit::set_area", || transit.set_area(area())), Ok(()));
+            assert_eq!(to.call("transit::Transit::set_area", || transit.set_area(test_area())), Ok(()));
         }
         let corners = to.call("transit::Transit::corners", || transit.corners().len());
         assert_eq!(corners, if known { CORNERS } else { 0 });
@@ -313,7 +313,7 @@ fn call_divisions(
 }
 
 /// [`FLEET`], one of which has a hard number.
-fn fleets(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
+fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     let with = |vehicle: Vehicle| [FLEET[0], vehicle, FLEET[2]];
     [
         with(Vehicle { place: Flat::new(hard, 0.0), ..VEHICLE }),
@@ -362,7 +362,7 @@ fn call_packing(
             for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
                 pack(to, &Work { unit, heights, ..good }, ws, plan);
             }
-            for vehicles in &fleets(hard) {
+            for vehicles in &fleets_with_hard_number(hard) {
                 pack(to, &Work { unit, vehicles, ..good }, ws, plan);
             }
             for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
@@ -407,7 +407,7 @@ fn call_share_searches(
     let mut reaches = [0; 1024];
     let mut states = [(0, 0); 1 << (2 * VEHICLES)];
     for hard in HARD_NUMBERS {
-        for vehicles in &fleets(hard) {
+        for vehicles in &fleets_with_hard_number(hard) {
             let work = Work { vehicles, ..good };
             let checked = work.check::<VEHICLES>();
             let bound = to.call("bound::lower_bound_s", || bound::lower_bound_s(&work));

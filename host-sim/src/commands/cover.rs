@@ -114,8 +114,8 @@ fn add_flights(
             results.add(&format!("{name}.{kind}"), text.as_bytes())?;
         }
     }
-    results.add("waypoints.csv", export::csv(planned, flights).as_bytes())?;
-    results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())?;
+    results.add("waypoints.csv", export::flights_csv(planned, flights).as_bytes())?;
+    results.add("area.geojson", result::json(&export::area_geojson(planned, flights))?.as_bytes())?;
     Ok(written)
 }
 

@@ -172,7 +172,7 @@ fn plan_and_fly(
     let mut mission = Mission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
     let mut flight = match gateway {
-        Some(gateway) => swarm::fly_shown(&mission, &plan, command, gateway, &progress)?,
+        Some(gateway) => swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?,
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
     if let Some(kept) = &kept {

@@ -28,7 +28,7 @@ pub struct Args {
     out: PathBuf,
     /// Make files that this board holds: nucleo-h743, qemu or pico2. Of the roadmap's edges some are left out, paths lengthen
     /// little
-    #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::named)]
+    #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
     board: Option<&'static BoardCapacity>,
 }
 
@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     );
     say!("pads       where each stands, as `--home` of `host-sim autopilot`");
     for (i, task) in mission.tasks.iter().enumerate() {
-        let pad = mission.pad(i);
+        let pad = mission.pad_position(i);
         say!("{:>7}  {:.8},{:.8},{:.3}", task.id, pad.lat_deg, pad.lon_deg, pad.alt_m);
     }
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -32,7 +32,7 @@ enum Action {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
         /// Make a file that this board holds: nucleo-h743, qemu or pico2
-        #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::named)]
+        #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
         board: Option<&'static BoardCapacity>,
     },
     /// Check a roadmap file and say what it holds
@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Build { scenario, out, board } => {
             let scenario = load(scenario, None)?;
-            let mut results = ResultFiles::file(out)?;
+            let mut results = ResultFiles::single_file(out)?;
             let mission = Mission::prepare_for(scenario, *board, &Progress::on_terminal())?;
             results.add_file(out, &mission.roadmap_file)?;
             results.commit()?;

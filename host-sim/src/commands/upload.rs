@@ -34,7 +34,7 @@ pub struct Args {
     ground_station: u8,
     /// The vehicle's board: nucleo-h743, qemu or pico2. A file that it does not hold is not sent; without this option, one
     /// that no board holds
-    #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::named)]
+    #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
     board: Option<&'static BoardCapacity>,
 }
 
@@ -50,8 +50,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let file = file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
     let mut client = FtpClient::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
     let system = client.wait_for_companion()?;
-    let bar = Progress::on_terminal().steps("upload", bytes.len() as u64);
-    client.upload(file, &bytes, |done| bar.at(done)).with_context(|| format!("upload failed: {path}"))?;
+    let bar = Progress::on_terminal().begin_counted_stage("upload", bytes.len() as u64);
+    client
+        .upload(file, &bytes, |done| bar.set_position(done))
+        .with_context(|| format!("upload failed: {path}"))?;
     drop(bar);
     say!(
         "{path} is vehicle {system}'s {} from its next start on: {} bytes, CRC-32 right",

@@ -92,12 +92,16 @@ pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) ->
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
     findings.heights = heights::check_heights(planned, flights);
-    CoverageCells::finest_needed(planned).judge_coverage(planned, pictures(planned, flights), &mut findings);
+    CoverageCells::finest_needed(planned).judge_coverage(
+        planned,
+        planned_pictures(planned, flights),
+        &mut findings,
+    );
     findings
 }
 
 /// The pictures that a plan takes.
-pub fn pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Vec<Picture> {
+pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Vec<Picture> {
     let along = planned.tracks.lane_direction();
     let heading = along.y.atan2(along.x);
     let taken = |flight: &TimedFlight<'_>| {
@@ -197,7 +201,7 @@ impl CoverageCells {
         let mut cells = Self { along, low: [f64::INFINITY; 2], side: 0.0, size: [0; 2] };
         let mut high = [f64::NEG_INFINITY; 2];
         for vertex in planned.wanted.rings_of(RingKind::Outer).flatten() {
-            let place = cells.rotated(vertex);
+            let place = cells.to_lane_frame(vertex);
             for axis in 0..2 {
                 cells.low[axis] = cells.low[axis].min(place[axis]);
                 high[axis] = high[axis].max(place[axis]);
@@ -221,7 +225,7 @@ impl CoverageCells {
         cells
     }
 
-    fn rotated(&self, place: &Flat) -> [f64; 2] {
+    fn to_lane_frame(&self, place: &Flat) -> [f64; 2] {
         let (x, y) = (f64::from(place.x), f64::from(place.y));
         [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
     }
@@ -236,7 +240,7 @@ impl CoverageCells {
     ) -> Vec<bool> {
         let area = planned.wanted;
         let rings = |kind| {
-            let turned = |ring: &[Flat]| ring.iter().map(|v| self.rotated(v)).collect::<Vec<_>>();
+            let turned = |ring: &[Flat]| ring.iter().map(|v| self.to_lane_frame(v)).collect::<Vec<_>>();
             area.rings_of(kind).map(turned).collect::<Vec<_>>()
         };
         let wanted: Vec<_> = rings(RingKind::Outer).into_iter().chain(rings(RingKind::Hole)).collect();
@@ -293,7 +297,7 @@ impl CoverageCells {
     /// Corners of what a picture is judged to show, in turn, metres east and north.
     fn footprint_corners(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [[f32; 2]; 4] {
         let ([u, v], [along, across]) =
-            (self.rotated(&picture.position.xy()), self.half_footprint(planned, picture));
+            (self.to_lane_frame(&picture.position.xy()), self.half_footprint(planned, picture));
         [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[i, j]| {
             let (u, v) = (u + i * along, v + j * across);
             let [x, y] = self.along;
@@ -328,7 +332,7 @@ impl CoverageCells {
         let mut middles = vec![whole; counted.len()];
         let mut shown = vec![false; counted.len()];
         for picture in pictures {
-            let (time, place) = (picture.t_s, self.rotated(&picture.position.xy()));
+            let (time, place) = (picture.t_s, self.to_lane_frame(&picture.position.xy()));
             let half = self.half_footprint(planned, &picture);
             // Corners in the picture; a rounding beyond it is in it.
             let range = |axis: usize, most: usize| {

@@ -42,7 +42,7 @@ pub struct Item {
 }
 
 impl Item {
-    fn command(command: u16, params: [f64; 4]) -> Self {
+    fn from_command(command: u16, params: [f64; 4]) -> Self {
         Self { command, frame: FRAME_MISSION, params: params.map(Some), place: [0.0; 3] }
     }
 }
@@ -95,7 +95,7 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
     let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
     let mut items = Vec::new();
     if sortie.depart_s > 0.0 {
-        items.push(Item::command(NAV_DELAY, [f64::from(sortie.depart_s), -1.0, -1.0, -1.0]));
+        items.push(Item::from_command(NAV_DELAY, [f64::from(sortie.depart_s), -1.0, -1.0, -1.0]));
     }
     items.extend([
         Item {
@@ -104,17 +104,17 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
             params: [Some(0.0), Some(0.0), Some(0.0), None],
             place: [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(top, 1e3)],
         },
-        Item::command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
+        Item::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
     ]);
     for (index, stop) in stops.iter().enumerate().skip(2) {
         let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
         let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;
         let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
         match (stop.act, planned.wanted.trigger) {
-            (StopAction::Pad, _) => items.push(Item::command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
+            (StopAction::Pad, _) => items.push(Item::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
             (StopAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
-                items.push(Item::command(DO_DIGICAM_CONTROL, [0.0; 4]));
+                items.push(Item::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 asks for a picture.
                 if let Some(last) = items.last_mut() {
                     last.place[0] = 1.0;
@@ -132,12 +132,12 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
                     });
                     // The first picture at once, the others each so far from the last.
                     let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
-                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, trigger));
+                    items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
                     // The last one at once too: autopilots look some times a second, and by then are past the distance, so
                     // that pictures are a little further apart than asked for, and the last would be behind the end.
-                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
+                    items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
                 }
             }
             (StopAction::Transit | StopAction::Lane, _) => items.push(waypoint(index)),
@@ -217,7 +217,7 @@ pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> S
 
 /// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames, sortie,
 /// the ground there.
-pub fn csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
+pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
     let mut text =
         "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n".to_owned();
     for (sortie, stops, times) in flights {
@@ -247,7 +247,7 @@ pub fn csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
 }
 
 /// The area, its zones and every vehicle's lanes, for maps.
-pub fn geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
+pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
     let place = |x: f32, y: f32| {
         let place = planned.geodetic(&Point::new(x, y, 0.0));
         json!([round_to(place.lon_deg, 1e9), round_to(place.lat_deg, 1e9)])

@@ -23,7 +23,7 @@ pub struct FlightFindings {
 /// Judges the pictures of a flight of this scenario by this plan.
 ///
 /// # Errors
-/// As [`Planned::new`].
+/// As [`CoveragePlan::new`].
 pub fn judge_pictures<const V: usize, const W: usize>(
     scenario: &Scenario,
     plan: &SwarmPlan<V, W>,

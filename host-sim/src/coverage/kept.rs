@@ -59,7 +59,7 @@ impl PictureStore {
         let row =
             |p: &Picture| -> PictureRow { [p.t_s, p.position.x, p.position.y, p.position.z, p.heading] };
         let rows: Vec<PictureRow> = pictures.iter().map(row).collect();
-        let mut results = ResultFiles::file(&self.path)?;
+        let mut results = ResultFiles::single_file(&self.path)?;
         results.add_file(&self.path, &serde_json::to_vec(&rows)?)?;
         results.commit()
     }

@@ -44,14 +44,14 @@ pub fn report_data(
         vehicles: vehicles.collect(),
         outlines: area_outlines(planned),
         coverage: Some(parts::planned_layers(planned, flights)),
-        plots: plots(planned, flights, findings),
+        plots: coverage_plots(planned, flights, findings),
         result,
         ..ReportData::default()
     }
 }
 
 /// The share photographed, and above terrain the heights.
-fn plots(planned: &CoveragePlan<'_>, flights: &[Flight], findings: &Findings) -> Vec<Plot> {
+fn coverage_plots(planned: &CoveragePlan<'_>, flights: &[Flight], findings: &Findings) -> Vec<Plot> {
     let mut plots = vec![photographed_share_plot(findings)];
     if planned.following.is_some() {
         plots.push(height_profile_plot(planned, flights));

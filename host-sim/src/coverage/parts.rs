@@ -39,8 +39,8 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Coverag
     }
     parts.sort_by_key(|part| part.vehicle);
     let divisions = vec![Division { parts, ..Division::default() }];
-    let pictures = check::pictures(planned, &check::flights_to_check(planned, flights));
-    layers(planned, divisions, pictures)
+    let pictures = check::planned_pictures(planned, &check::flights_to_check(planned, flights));
+    coverage_layers(planned, divisions, pictures)
 }
 
 /// Data of the report page about a flight: its plan and the plan's fate, and its pictures.
@@ -79,15 +79,15 @@ pub fn flown_layers(
         shown.push(Division {
             t_s: division.t_s,
             lost,
-            parts: flights.iter().filter(|flight| flight.task.leaves_pad()).map(part).collect(),
+            parts: flights.iter().filter(|flight| flight.task.leaves_pad()).map(flight_part).collect(),
             taken: reassigned_waypoints(&before, &own),
         });
         before = own;
     }
-    Ok(layers(planned, shown, pictures))
+    Ok(coverage_layers(planned, shown, pictures))
 }
 
-fn layers(
+fn coverage_layers(
     planned: &CoveragePlan<'_>,
     divisions: Vec<Division>,
     mut pictures: Vec<Picture>,
@@ -103,7 +103,7 @@ fn layers(
     CoverageLayers { lane_m: planned.wanted.spacing.lane_m, divisions, footprints }
 }
 
-fn part(flight: &PathFlight<WAYPOINTS>) -> Part {
+fn flight_part(flight: &PathFlight<WAYPOINTS>) -> Part {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
     if let Task::Photograph(photographs) = &flight.task {

@@ -104,19 +104,20 @@ pub fn cut_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Resu
     // Sorties and seconds up to a lane, and where the last of these sorties begins.
     let mut best = vec![(0u32, 0.0f64, 0usize)];
     for end in 1..=count {
-        let parts = (0..end).rev().map(|first| (first, route_duration_s(planned, &lanes.part(first, end))));
+        let parts =
+            (0..end).rev().map(|first| (first, route_duration_s(planned, &lanes.sub_route(first, end))));
         let fitting = parts.take_while(|(_, own_s)| *own_s <= most_s);
         let all = fitting.map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
         let found = all.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         best.push(found.ok_or_else(|| LaneTooLong {
             lane: planned.tracks.lane_of(lanes.bounds[end - 1]),
-            takes_s: route_duration_s(planned, &lanes.part(end - 1, end)),
+            takes_s: route_duration_s(planned, &lanes.sub_route(end - 1, end)),
         })?);
     }
     let (mut parts, mut end) = (Vec::new(), count);
     while end > 0 {
         let first = best[end].2;
-        parts.push(lanes.part(first, end));
+        parts.push(lanes.sub_route(first, end));
         end = first;
     }
     // Now the last of the path comes first.
@@ -151,7 +152,7 @@ impl<'a> RouteLanes<'a> {
     }
 
     /// Lanes `first` up to before `end` as a route of their own.
-    fn part(&self, first: usize, end: usize) -> Route {
+    fn sub_route(&self, first: usize, end: usize) -> Route {
         let (planned, heights) = (self.planned, self.planned.wanted.heights);
         let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];
         let (from, to) = (self.bounds[first], self.bounds[end]);

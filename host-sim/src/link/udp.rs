@@ -74,7 +74,7 @@ impl UdpHub {
         Ok(Self { socket, clients: Vec::new() })
     }
 
-    fn remember(&mut self, from: SocketAddr) {
+    fn remember_peer(&mut self, from: SocketAddr) {
         let now = Instant::now();
         if let Some(client) = self.clients.iter_mut().find(|client| client.0 == from) {
             client.1 = now;
@@ -92,7 +92,7 @@ impl Link for UdpHub {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.socket.recv_from(buffer) {
             Ok((len, from)) => {
-                self.remember(from);
+                self.remember_peer(from);
                 Ok(len)
             }
             Err(error) if is_would_block(&error) => Ok(0),

@@ -205,7 +205,7 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
 fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
-        let Some(bin) = bins(boxes, axis) else { continue };
+        let Some(bin) = bin_of_box(boxes, axis) else { continue };
         let mut all: [Option<(CellBox, usize)>; SPLIT_BINS] = [None; SPLIT_BINS];
         for b in boxes.iter() {
             let one = &mut all[bin(b)];
@@ -234,7 +234,7 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
     }
     let (cost, axis, first_above) = best;
     let mut middle = 0;
-    if let Some(bin) = bins(boxes, axis).filter(|_| cost.is_finite()) {
+    if let Some(bin) = bin_of_box(boxes, axis).filter(|_| cost.is_finite()) {
         for i in 0..boxes.len() {
             if bin(&boxes[i]) < first_above {
                 boxes.swap(i, middle);
@@ -243,7 +243,7 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
         }
     } else {
         // Most are in one bin of each axis.
-        let spread = |axis: usize| extent(boxes, axis).map_or(0, |(low, high)| high - low);
+        let spread = |axis: usize| centre_extent(boxes, axis).map_or(0, |(low, high)| high - low);
         let axis = (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0);
         middle = boxes.len() / 2;
         boxes.select_nth_unstable_by_key(middle, |b| b.center(axis));
@@ -252,14 +252,14 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
 }
 
 /// Least and greatest of the boxes' centres along an axis, twice.
-fn extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
+fn centre_extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
     let centers = || boxes.iter().map(|b| b.center(axis));
     Some((centers().min()?, centers().max()?))
 }
 
 /// Which of [`SPLIT_BINS`] bins along an axis a box is in; `None` where the centres of all are at one place.
-fn bins(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
-    let (low, high) = extent(boxes, axis)?;
+fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
+    let (low, high) = centre_extent(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {
         (b.center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize
     })

@@ -43,7 +43,7 @@ struct Block {
 }
 
 /// The building at `resolution_m`; walls are never thinner than one cell.
-pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> {
+pub fn building_map(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> {
     let name = "builtin:building";
     if !(0.05..=1.0).contains(&resolution_m) {
         let why = format!("resolution_m of {resolution_m}, its walls and doors ask for 0.05 to 1");
@@ -51,8 +51,8 @@ pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> 
     }
     let cells = |metres: f32| (metres / resolution_m).round() as u32;
     let shape = GridShape { dims: SIZE_M.map(cells), min: Point::zeros(), resolution_m };
-    let mut map = OccupancyMap::unknown(shape, name)?;
-    for Block { min, max, state } in blocks(seed) {
+    let mut map = OccupancyMap::all_unknown(shape, name)?;
+    for Block { min, max, state } in building_blocks(seed) {
         let from = [0, 1, 2].map(|a| cells(min[a]).min(shape.dims[a] - 1));
         let to = [0, 1, 2].map(|a| cells(max[a]).clamp(from[a] + 1, shape.dims[a]));
         map.fill(from, to, state);
@@ -61,7 +61,7 @@ pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> 
 }
 
 /// Later blocks overwrite earlier ones.
-fn blocks(seed: u64) -> Vec<Block> {
+fn building_blocks(seed: u64) -> Vec<Block> {
     let mut plan = BlockList { blocks: Vec::new(), rng: Pcg32::seed_from_u64(seed) };
     let [length, width, height] = SIZE_M;
     plan.add_solid([0.0; 3], SIZE_M);
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn rooms_on_every_floor_are_reached_whatever_the_seed() {
         for seed in [DEFAULT_SEED, 2, 7] {
-            let map = building(seed, 0.25).unwrap();
+            let map = building_map(seed, 0.25).unwrap();
             assert_eq!(map.shape().dims, [164, 96, 196]);
             assert_eq!(map.counts().unknown, 0);
             assert_eq!(floors_reached(&map), (0..FLOORS).collect::<Vec<_>>(), "seed {seed}");
@@ -205,9 +205,9 @@ mod tests {
 
     #[test]
     fn the_seed_decides() {
-        let map = building(DEFAULT_SEED, 0.5).unwrap();
-        assert_eq!(map, building(DEFAULT_SEED, 0.5).unwrap());
-        assert_ne!(map, building(2, 0.5).unwrap());
-        assert!(building(1, 0.01).is_err() && building(1, f32::NAN).is_err());
+        let map = building_map(DEFAULT_SEED, 0.5).unwrap();
+        assert_eq!(map, building_map(DEFAULT_SEED, 0.5).unwrap());
+        assert_ne!(map, building_map(2, 0.5).unwrap());
+        assert!(building_map(1, 0.01).is_err() && building_map(1, f32::NAN).is_err());
     }
 }

@@ -27,7 +27,7 @@ pub fn level_ground_map(low: &Point, high: &Point, cell_m: f32) -> Result<Occupa
         min: Point::new(low.x, low.y, low.z - cell_m),
         resolution_m: cell_m,
     };
-    let mut map = OccupancyMap::unknown(shape, "the ground")?;
+    let mut map = OccupancyMap::all_unknown(shape, "the ground")?;
     map.fill([0, 0, 1], [x, y, z + 1], Occupancy::Free);
     map.fill([0, 0, 0], [x, y, 1], Occupancy::Occupied);
     Ok(map)

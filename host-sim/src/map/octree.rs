@@ -155,7 +155,7 @@ impl Octree {
     }
 
     /// Occupancy of a point, metres in the map's frame.
-    pub fn at(&self, point: [f64; 3]) -> Occupancy {
+    pub fn occupancy_at(&self, point: [f64; 3]) -> Occupancy {
         let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
         if key.iter().all(|k| (0.0..f64::from(KEYS_PER_AXIS)).contains(k)) {
             self.at_key(key.map(|k| k as u32))
@@ -277,11 +277,11 @@ mod tests {
         assert_eq!((counts.free_leaves, counts.occupied_leaves), (1, 1));
         assert_eq!((counts.free_m3, counts.occupied_m3), (8.0, 0.125));
         assert_eq!(tree.metric_bounds(), Some(([0.0; 3], [2.5, 2.0, 2.0])));
-        assert_eq!(tree.at([1.99, 0.0, 1.0]), Occupancy::Free);
-        assert_eq!(tree.at([2.0, 0.0, 0.0]), Occupancy::Occupied);
-        assert_eq!(tree.at([2.0, 0.6, 0.0]), Occupancy::Unknown);
-        assert_eq!(tree.at([f64::NAN, 0.0, 0.0]), Occupancy::Unknown);
-        assert_eq!(tree.at([1e30, 0.0, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.occupancy_at([1.99, 0.0, 1.0]), Occupancy::Free);
+        assert_eq!(tree.occupancy_at([2.0, 0.0, 0.0]), Occupancy::Occupied);
+        assert_eq!(tree.occupancy_at([2.0, 0.6, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.occupancy_at([f64::NAN, 0.0, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.occupancy_at([1e30, 0.0, 0.0]), Occupancy::Unknown);
     }
 
     #[test]

@@ -147,7 +147,7 @@ fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 }
 
 /// Method by which the work is divided.
-pub fn method(scenario: &Scenario) -> Method {
+pub fn division_method(scenario: &Scenario) -> Method {
     scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
 
@@ -192,7 +192,7 @@ impl Mission {
     /// Writes the mission file.
     fn encode_area(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
         let Some(area) = &self.scenario.area else { return Ok(()) };
-        let parts = match method(&self.scenario) {
+        let parts = match division_method(&self.scenario) {
             Method::PowellBinpat | Method::Exact => PartEligibility::Anyone,
             Method::SimpleBinpat | Method::Binpat => {
                 let alike = shares.iter().all(|share| share.weight == shares[0].weight);
@@ -235,7 +235,7 @@ impl Mission {
             &Request {
                 mission: &mission,
                 view,
-                field: self.field(),
+                field: self.height_field(),
                 max_gates: self.board.map_or(GATES, |board| board.gates),
                 photographed: done,
             },
@@ -249,7 +249,7 @@ impl Mission {
     }
 
     /// The heights to fly above, as a board reads them; none over level ground.
-    fn field(&self) -> Option<FieldView<'_>> {
+    fn height_field(&self) -> Option<FieldView<'_>> {
         FieldView::parse(&self.roadmap_file).ok()
     }
 
@@ -281,7 +281,7 @@ impl Mission {
         let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
         coverage::plan_detour::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, WAYPOINTS, GATES>(
             view,
-            self.field(),
+            self.height_field(),
             request,
             obstacles,
             &mut ws,

@@ -69,7 +69,7 @@ pub(super) fn height_over_ground(
     }
 }
 
-pub(super) fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
+pub(super) fn vehicle_tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
     let task = |(i, vehicle): (usize, &scenario::Vehicle)| {
         let place = scenario.vehicle_places.get(i);
         let what = format!("start of vehicle {}", vehicle.id);
@@ -84,7 +84,7 @@ pub(super) fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<V
 }
 
 /// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough apart to land in.
-pub(super) fn goals(
+pub(super) fn goal_points(
     scenario: &Scenario,
     map: &VoxelMap,
     schedule: &ScheduleConfig,
@@ -145,7 +145,7 @@ fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32
 }
 
 /// Which starts and goals are to be joined: a vehicle and its own goal, or else each of them with each.
-fn wanted(scenario: &Scenario, goals: usize) -> Vec<WantedConnection> {
+fn wanted_connections(scenario: &Scenario, goals: usize) -> Vec<WantedConnection> {
     let vehicles = scenario.vehicles.len();
     let pairs = scenario.vehicles.iter().enumerate().flat_map(|(start, vehicle)| {
         let required_m = vehicle.radius_m + scenario.roadmap.safety_margin_m;
@@ -155,7 +155,7 @@ fn wanted(scenario: &Scenario, goals: usize) -> Vec<WantedConnection> {
     pairs.collect()
 }
 
-pub(super) fn build(
+pub(super) fn build_roadmap(
     scenario: &Scenario,
     map: &VoxelMap,
     goals: &[Point],
@@ -184,7 +184,7 @@ pub(super) fn build(
     keep_apart(&mut roadmap);
     if settings.passages {
         let searching = Instant::now();
-        roadmap::add_passages(map, &mut roadmap, &config, &wanted(scenario, goals.len()))?;
+        roadmap::add_passages(map, &mut roadmap, &config, &wanted_connections(scenario, goals.len()))?;
         keep_apart(&mut roadmap);
         parts.passages_s = searching.elapsed().as_secs_f64();
     }

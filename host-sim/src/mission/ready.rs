@@ -115,7 +115,7 @@ impl Mission {
 
     /// The roadmap as a board reads it; the whole file is checked at each call.
     pub fn view(&self) -> RoadmapView<'_> {
-        parsed(&self.roadmap_file)
+        parse_roadmap(&self.roadmap_file)
     }
 
     /// Height of what a vehicle comes to stand on that sinks from a place, metres; none beside the map.
@@ -147,7 +147,7 @@ impl Mission {
     }
 
     /// Place of the centre of a vehicle's body while it stands on its pad.
-    pub fn pad(&self, index: usize) -> Geodetic {
+    pub fn pad_position(&self, index: usize) -> Geodetic {
         let start = self.scenario.vehicles[index].start;
         let pad = start - Point::new(0.0, 0.0, self.tasks[index].climb_m);
         enu_to_geodetic(&self.scenario.map.origin, &pad)
@@ -189,7 +189,7 @@ impl Mission {
     }
 }
 
-fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {
+fn parse_roadmap(roadmap_file: &[u8]) -> RoadmapView<'_> {
     RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 

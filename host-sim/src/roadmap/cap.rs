@@ -46,7 +46,8 @@ pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<E
     let rows = adjacency_lists(nodes.len(), edges, &lengths);
     let ranks = edge_ranks(&rows, edges.len());
     keep_first(&mut kept, near, &lengths, |i| ranks[i]);
-    let usages: Vec<Vec<u32>> = classes().map(|class| edge_usage(&rows, edges.len(), class)).collect();
+    let usages: Vec<Vec<u32>> =
+        clearance_classes().map(|class| edge_usage(&rows, edges.len(), class)).collect();
     let far = room - near;
     for round in 0..FAR_EDGE_ROUNDS {
         let losses = path_length_losses(&rows, &usages, &kept);
@@ -137,7 +138,7 @@ fn keep_first<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: i
 }
 
 /// The classes of vehicles, as [`OutgoingEdge::class`] has them.
-fn classes() -> impl Iterator<Item = u8> {
+fn clearance_classes() -> impl Iterator<Item = u8> {
     1..=CLEARANCE_CLASSES_M.len() as u8
 }
 
@@ -148,7 +149,7 @@ fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[b
     let kept_rows: Vec<Vec<OutgoingEdge>> =
         rows.iter().map(|row| row.iter().filter(is_kept).copied().collect()).collect();
     let mut losses = vec![0.0; kept.len()];
-    for (class, usage) in classes().zip(usages) {
+    for (class, usage) in clearance_classes().zip(usages) {
         let all = usage.iter().map(|&paths| f64::from(paths)).sum::<f64>().max(1.0) as f32;
         let found: Vec<Vec<(u32, f32)>> = (0..rows.len())
             .into_par_iter()

@@ -18,7 +18,7 @@ fn rooms(rng: &mut Pcg32, count: u32) -> VoxelMap {
     let dims = [30 * count, 40, 20];
     let shape = GridShape { dims, min: Point::zeros(), resolution_m: 0.1 };
     let doors: Vec<u32> = (0..count).map(|_| 2 + rng.next_u32() % 32).collect();
-    let mut map = OccupancyMap::unknown(shape, "rooms").unwrap();
+    let mut map = OccupancyMap::all_unknown(shape, "rooms").unwrap();
     for k in 0..dims[2] {
         for j in 0..dims[1] {
             for i in 0..dims[0] {

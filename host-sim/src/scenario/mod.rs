@@ -54,7 +54,7 @@ pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
 /// Reads a text, by the kind of mission that it is for.
 fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
     let text = reader::Text { file, text };
-    sections::root(text, |root| match (root.get("map"), root.get("area")) {
+    sections::read_root(text, |root| match (root.get("map"), root.get("area")) {
         (None, Some(_)) => sections::area::coverage(text, root, folder),
         _ => sections::goals_mission(text, root, folder),
     })

@@ -123,7 +123,7 @@ impl Board {
         match &mut self.ends {
             BoardConnection::Links { .. } => {
                 // A board that is gone is silent, as one without power.
-                let _: anyhow::Result<()> = self.exchange(now_us, lines);
+                let _: anyhow::Result<()> = self.exchange_bytes(now_us, lines);
                 Ok(())
             }
             BoardConnection::LockStep(lock_step) => {
@@ -142,7 +142,7 @@ impl Board {
     }
 
     /// Bytes that have come by now on the links.
-    fn exchange(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
+    fn exchange_bytes(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         let BoardConnection::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
         while let Some((_, bytes)) = lines.up.next_by(now_us) {
             autopilot.send(&bytes)?;

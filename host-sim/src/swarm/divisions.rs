@@ -79,7 +79,7 @@ impl DivisionLog {
             let rank = i + usize::from(roster.first);
             lots.resize(lots.len().max(rank + 1), DivisionInput::default());
             if before.get(rank).is_none_or(|lot| lot.alive) {
-                lots[rank] = DivisionInput::of(entry);
+                lots[rank] = DivisionInput::from_entry(entry);
             }
         }
     }

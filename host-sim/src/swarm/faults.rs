@@ -105,7 +105,7 @@ impl<'a> FaultScript<'a> {
     }
 
     /// Whether a fault has struck the vehicle.
-    pub fn struck(&self, vehicle: usize) -> bool {
+    pub fn is_struck(&self, vehicle: usize) -> bool {
         self.struck[vehicle]
     }
 

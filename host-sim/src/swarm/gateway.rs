@@ -33,7 +33,7 @@ impl Gateway {
     }
 
     /// Gives the vehicles their port for it.
-    pub fn attach(&self, members: &mut [SimulatedVehicle]) {
+    pub fn add_ground_ports(&self, members: &mut [SimulatedVehicle]) {
         members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
     }
 

@@ -93,7 +93,7 @@ impl GroundStation {
     }
 
     /// Whether the start was commanded.
-    pub fn started(&self) -> bool {
+    pub fn is_started(&self) -> bool {
         self.first_us.is_some()
     }
 
@@ -121,15 +121,15 @@ impl GroundStation {
         radio: &mut Radio,
         places: &[Point],
     ) {
-        let frames = self.frames(now_us, members);
+        let frames = self.due_frames(now_us, members);
         for frame in frames {
             radio.broadcast(now_us, None, places, &frame);
-            members.iter_mut().for_each(|member| member.forward(now_us, &frame));
+            members.iter_mut().for_each(|member| member.forward_to_board(now_us, &frame));
         }
     }
 
     /// Frames that the ground station sends.
-    fn frames(&mut self, now_us: u64, members: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
+    fn due_frames(&mut self, now_us: u64, members: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
         let state = |m: &SimulatedVehicle| m.state();
         if self.first_us.is_none() {
             let ready = || members.iter().filter(|m| state(m) == State::Ready);
@@ -143,7 +143,7 @@ impl GroundStation {
             }
             self.first_us = Some(now_us);
             self.last_us = now_us;
-            return vec![self.frame(&command_long(START, ALL_SYSTEMS, 0.0))];
+            return vec![self.command_frame(&command_long(START, ALL_SYSTEMS, 0.0))];
         }
         if now_us < self.last_us + COMMAND_EVERY_US {
             return Vec::new();
@@ -156,7 +156,7 @@ impl GroundStation {
         });
         let mut frames = Vec::new();
         for (centre, radius_m) in self.obstacles.clone() {
-            frames.push(self.frame(&COMMAND_INT_DATA {
+            frames.push(self.command_frame(&COMMAND_INT_DATA {
                 command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
                 target_system: ALL_SYSTEMS,
                 frame: MavFrame::MAV_FRAME_GLOBAL,
@@ -170,18 +170,18 @@ impl GroundStation {
         for (i, member) in members.iter().enumerate() {
             let id = member.system_id();
             if state(member) == State::Ready {
-                frames.push(self.frame(&command_long(START, id, 0.0)));
+                frames.push(self.command_frame(&command_long(START, id, 0.0)));
             }
             for (_, order, _) in self.orders.clone().into_iter().filter(|&(of, ..)| of == i) {
                 if order.is_still_needed(state(member)) {
-                    frames.push(self.frame(&order.command(id)));
+                    frames.push(self.command_frame(&order.command(id)));
                 }
             }
         }
         frames
     }
 
-    fn frame(&mut self, command: &impl MessageData) -> Vec<u8> {
+    fn command_frame(&mut self, command: &impl MessageData) -> Vec<u8> {
         let mut buffer = [0; frame::MAX_FRAME_LEN];
         let length = encode(command, self.system_id, self.sequence, &mut buffer);
         self.sequence = self.sequence.wrapping_add(1);

@@ -189,8 +189,8 @@ impl SimulatedVehicle {
 
     /// Changes the share of bytes that the serial link changes.
     pub fn set_serial_corruption(&mut self, share: f64) {
-        self.up.corrupt(share);
-        self.down.corrupt(share);
+        self.up.set_corruption(share);
+        self.down.set_corruption(share);
     }
 
     /// The companion's time.
@@ -330,7 +330,7 @@ impl SimulatedVehicle {
     }
 
     /// Passes on to a board without a radio what a ground station sends its companion: by the autopilot, as that forwards it.
-    pub fn forward(&mut self, now_us: u64, frame: &[u8]) {
+    pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
             self.up.write(now_us, frame);
         }

@@ -32,7 +32,7 @@ use self::member::{Planner, SimulatedVehicle, is_finished};
 use self::radio::{Radio, RadioConfig};
 use self::referee::{Referee, Sample};
 use self::step::STEP_US;
-use self::vehicles::members;
+use self::vehicles::vehicles_on_pads;
 use crate::coverage::check::Picture;
 use crate::margins;
 use crate::mission::{Mission, OwnPlan, SwarmPlan};
@@ -93,7 +93,7 @@ pub fn fly(
 ///
 /// # Errors
 /// The link to the ground station is gone.
-pub fn fly_shown(
+pub fn fly_with_ground_station(
     mission: &Mission,
     plan: &SwarmPlan,
     command: &'static str,
@@ -138,14 +138,14 @@ fn simulate(
     // The time of a board behind links is the clock's.
     let by_clock = mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
-    let bar = progress.steps("flight", settings.time_limit_s as u64);
+    let bar = progress.begin_counted_stage("flight", settings.time_limit_s as u64);
     let began = Clock::now();
     let mut put_off = Duration::ZERO;
     for step in 0..steps {
         let now_us = (step + 1) * STEP_US;
         run.step(step, now_us)?;
         if step % 250 == 0 {
-            bar.at(run.t_s as u64);
+            bar.set_position(run.t_s as u64);
             run.update_end();
         }
         if run.t_s >= run.ends_at_s {
@@ -182,7 +182,7 @@ impl<'a> SimulationRun<'a> {
     fn new(mission: &'a Mission, plan: &'a SwarmPlan, gateway: Option<Gateway>) -> anyhow::Result<Self> {
         let scenario = &mission.scenario;
         let settings = &scenario.simulation;
-        let mut members = members(mission)?;
+        let mut members = vehicles_on_pads(mission)?;
         let mut radio = Radio::new(
             RadioConfig {
                 range_m: settings.radio_range_m,
@@ -193,10 +193,10 @@ impl<'a> SimulationRun<'a> {
             scenario.seed,
         );
         if let Some(gateway) = &gateway {
-            gateway.attach(&mut members);
+            gateway.add_ground_ports(&mut members);
         }
         if gateway.is_some() || scenario.area.is_some() {
-            radio.overhear();
+            radio.start_recording();
         }
         let vehicles: Vec<(u8, f32)> = scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
@@ -262,7 +262,7 @@ impl<'a> SimulationRun<'a> {
             }
         }
         self.ground_station.step(now_us, members, radio, places);
-        let overheard = radio.overheard();
+        let overheard = radio.take_recorded();
         self.divisions.handle_packets(self.t_s as f32, &overheard);
         if let Some(gateway) = &mut self.gateway {
             gateway.step(now_us, members, radio, places, &overheard).context("link lost: --qgc")?;
@@ -275,7 +275,7 @@ impl<'a> SimulationRun<'a> {
     /// Sets the end of the simulation once no vehicle will move any more.
     fn update_end(&mut self) {
         let (members, plan) = (&self.members, self.plan);
-        let started = self.ground_station.started();
+        let started = self.ground_station.is_started();
         let done = |i: usize| {
             let at_rest = is_finished(members[i].state()) || members[i].is_powerless();
             at_rest || (!plan.flights[i].task.leaves_pad() && started) || is_left_to_pilot(&members[i])
@@ -346,7 +346,7 @@ impl<'a> SimulationRun<'a> {
     /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row of the table.
     fn is_disabled_by_fault(&self, i: usize) -> bool {
         let member = &self.members[i];
-        self.script.struck(i)
+        self.script.is_struck(i)
             && (member.is_powerless()
                 || member.took_off_s.is_none()
                 || is_finished(member.state())

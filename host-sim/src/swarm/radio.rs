@@ -47,13 +47,13 @@ impl Radio {
         Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way, overheard: None }
     }
 
-    /// Keeps the packets that stations send from now on, for [`Self::overheard`].
-    pub fn overhear(&mut self) {
+    /// Keeps the packets that stations send from now on, for [`Self::take_recorded`].
+    pub fn start_recording(&mut self) {
         self.overheard = Some(Vec::new());
     }
 
     /// Packets that stations sent since the last call, at once and without loss.
-    pub fn overheard(&mut self) -> Vec<Rc<[u8]>> {
+    pub fn take_recorded(&mut self) -> Vec<Rc<[u8]>> {
         self.overheard.as_mut().map(core::mem::take).unwrap_or_default()
     }
 

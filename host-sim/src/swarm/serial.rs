@@ -135,7 +135,7 @@ impl SerialLink {
     }
 
     /// Sets the share of bytes that arrive corrupted.
-    pub fn corrupt(&mut self, corruption: f64) {
+    pub fn set_corruption(&mut self, corruption: f64) {
         self.config.corruption = corruption;
     }
 

@@ -23,7 +23,7 @@ const MIN_RANGE_M: f32 = 1.0;
 ///
 /// # Errors
 /// The configuration of a vehicle names what is wrong.
-pub fn members(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicle>> {
+pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicle>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let serial = SerialConfig {

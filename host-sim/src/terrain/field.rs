@@ -86,7 +86,7 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
     for row in 0..rows {
         for column in 0..columns {
             let place = low + Flat::new(column as f32, row as f32) * cell_m;
-            let found = grid.highest(&(place - around), &(place + around));
+            let found = grid.heights_in_box(&(place - around), &(place + around));
             let height_m = match found.highest_m {
                 Some(height_m) if !found.holes => height_m,
                 _ => return Err(FieldError::Hole(place.x, place.y)),
@@ -149,7 +149,7 @@ mod tests {
         ) {
             let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
             for (index, height_m) in heights.iter().enumerate() {
-                grid.raise_cell(&grid.middle([index % 40, index / 40]), *height_m);
+                grid.raise_cell(&grid.cell_centre([index % 40, index / 40]), *height_m);
             }
             let area = [Flat::new(-30.0, -20.0), Flat::new(35.0, 28.0)];
             let config = FieldConfig { area, reach_m, slope };
@@ -175,13 +175,13 @@ mod tests {
         let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
         for index in 0..1600 {
             if index != 20 * 40 + 22 {
-                grid.raise_cell(&grid.middle([index % 40, index / 40]), 10.0);
+                grid.raise_cell(&grid.cell_centre([index % 40, index / 40]), 10.0);
             }
         }
         let area = [Flat::repeat(-20.0), Flat::repeat(20.0)];
         let config = FieldConfig { area, reach_m: 0.5, slope: 0.5 };
         assert!(matches!(encode_field(&grid, &config), Err(FieldError::Hole(..))));
-        grid.raise_cell(&grid.middle([22, 20]), 4000.0);
+        grid.raise_cell(&grid.cell_centre([22, 20]), 4000.0);
         assert_eq!(encode_field(&grid, &config), Err(FieldError::High(4000.0)));
     }
 }

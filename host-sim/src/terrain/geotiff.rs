@@ -73,7 +73,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let missing = decoder.find_tag(Tag::GdalNodata).map_err(malformed)?;
     let missing = missing.and_then(|value| value.into_string().ok());
     let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
-    let (corner, cell) = georeference(&mut decoder, keys.points())?;
+    let (corner, cell) = georeference(&mut decoder, keys.is_pixel_point())?;
     let value_m = |value: f64| match missing.is_some_and(|missing| is_missing_value(value, missing))
         || !value.is_finite()
     {
@@ -89,7 +89,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         let (own_wide, own_tall) = (own_wide as usize, own_tall as usize);
         let values = decoder.read_chunk(chunk as u32).map_err(malformed)?;
         let (left, top) = (chunk % across * wide, chunk / across * tall);
-        let mut values = numbers(values)?;
+        let mut values = values_as_f64(values)?;
         for row in top..(top + own_tall).min(rows) {
             for column in left..left + own_wide {
                 let Some(value) = values.next() else {
@@ -145,7 +145,7 @@ fn georeference<R: Read + Seek>(
     Ok((corner, cell))
 }
 
-fn numbers(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, TerrainError> {
+fn values_as_f64(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, TerrainError> {
     Ok(match values {
         DecodingResult::U8(v) => Box::new(v.into_iter().map(f64::from)),
         DecodingResult::I8(v) => Box::new(v.into_iter().map(f64::from)),

@@ -127,7 +127,7 @@ fn reduce_rows(costs: &CostMatrix<'_>, state: &mut MatchingState<'_>, rows_in: u
     while at < rows_in {
         let row = state.free[at];
         at += 1;
-        let two = TwoCheapestColumns::cheapest(costs.row_costs(row, state.row), state.price);
+        let two = TwoCheapestColumns::of_row(costs.row_costs(row, state.row), state.price);
         if two.least == f64::INFINITY {
             return None;
         }
@@ -172,7 +172,7 @@ struct TwoCheapestColumns {
 }
 
 impl TwoCheapestColumns {
-    fn cheapest(line: &[f32], price: &[f64]) -> Self {
+    fn of_row(line: &[f32], price: &[f64]) -> Self {
         let mut two =
             Self { least: f64::INFINITY, second: f64::INFINITY, col: UNASSIGNED, second_col: UNASSIGNED };
         // The first few decide the second cheapest roughly; after them most chunks hold nothing below it, which eight

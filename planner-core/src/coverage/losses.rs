@@ -61,7 +61,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
     ///
     /// # Errors
     /// Those of [`divide::remaining_lanes`]; [`CoverageError::LanesFull`] for too many ranges.
-    pub fn begin<'a, const N: usize>(
+    pub fn start_plan<'a, const N: usize>(
         &'a mut self,
         tracks: &'a Tracks<L>,
         transit: &Transit<'_, N>,

@@ -34,7 +34,7 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
                 let from = low + part as f32 * wide;
                 let span = [from, from + wide];
                 compute_uncovered(strips, span, out, ws)?;
-                strips.lay_lanes(strip as u16, strips.middle(span), ws, out)?;
+                strips.lay_lanes(strip as u16, strips.centre_line(span), ws, out)?;
             }
         }
         let wide = (high - low) / STRIP_PARTS as f32;
@@ -84,7 +84,7 @@ fn lay_single_pictures<const L: usize, const V: usize>(
 /// Lines beside the middle of an eighth, half an eighth apart, from number `first` on; as far as pictures along them
 /// show all of it.
 fn candidate_lines(strips: &Strips<'_>, span: Span, first: u32) -> impl Iterator<Item = f32> {
-    let (middle, half) = (strips.middle(span), (span[1] - span[0]) / 2.0);
+    let (middle, half) = (strips.centre_line(span), (span[1] - span[0]) / 2.0);
     let both = move |step: u32| [-1.0, 1.0].map(|side| middle + side * half * step as f32);
     (first..=STRIP_PARTS).flat_map(both).take_while(move |v| covers_band(strips, *v, span))
 }
@@ -101,7 +101,7 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
 /// Whether a no-fly zone comes between two `v`.
 fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
     strips.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly).any(|(_, ring)| {
-        let across = ring.iter().map(|corner| strips.rotated(corner).1);
+        let across = ring.iter().map(|corner| strips.to_lane_frame(corner).1);
         let (first, last) = across
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), v| (fminf(first, v), fmaxf(last, v)));
         first <= high + ZONE_CLEARANCE_M && last >= low - ZONE_CLEARANCE_M
@@ -119,7 +119,7 @@ fn compute_uncovered<const L: usize, const V: usize>(
     strips.subtract_no_fly_zones(span, ws)?;
     let along = strips.picture_half_width();
     for lane in tracks.lanes() {
-        let ((from, v), (to, _)) = (strips.rotated(&lane.from), strips.rotated(&lane.to));
+        let ((from, v), (to, _)) = (strips.to_lane_frame(&lane.from), strips.to_lane_frame(&lane.to));
         if covers_band(strips, v, span) {
             ws.needed.remove([fminf(from, to) - along, fmaxf(from, to) + along])?;
         }

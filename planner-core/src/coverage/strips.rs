@@ -86,18 +86,18 @@ impl<'a> Strips<'a> {
         [low, low + self.strip_width_m]
     }
 
-    pub(super) fn middle(&self, [low, high]: Span) -> f32 {
+    pub(super) fn centre_line(&self, [low, high]: Span) -> f32 {
         (low + high) / 2.0
     }
 
     /// A place in the lanes' frame.
-    pub(super) fn rotated(&self, place: &Flat) -> (f32, f32) {
+    pub(super) fn to_lane_frame(&self, place: &Flat) -> (f32, f32) {
         let from_base = place - self.base;
         (self.direction.along.dot(&from_base), self.direction.across.dot(&from_base))
     }
 
     /// The place of a point of the lanes' frame.
-    fn place(&self, u: f32, v: f32) -> Flat {
+    fn from_lane_frame(&self, u: f32, v: f32) -> Flat {
         self.base + self.direction.along * u + self.direction.across * v
     }
 
@@ -110,7 +110,7 @@ impl<'a> Strips<'a> {
     ) -> Result<(), CoverageError> {
         out.clear();
         for (a, b) in edges {
-            let ((au, av), (bu, bv)) = (self.rotated(&a), self.rotated(&b));
+            let ((au, av), (bu, bv)) = (self.to_lane_frame(&a), self.to_lane_frame(&b));
             if (av <= v) != (bv <= v) {
                 let u = au + (v - av) * (bu - au) / (bv - av);
                 out.push(u).map_err(|_| CoverageError::LanesFull)?;
@@ -190,7 +190,7 @@ impl<'a> Strips<'a> {
 
     /// Range of an edge between two `v`; none where it does not reach them.
     fn clip_edge(&self, (a, b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
-        let (mut a, mut b) = (self.rotated(&a), self.rotated(&b));
+        let (mut a, mut b) = (self.to_lane_frame(&a), self.to_lane_frame(&b));
         if a.1 > b.1 {
             core::mem::swap(&mut a, &mut b);
         }
@@ -273,7 +273,7 @@ impl<'a> Strips<'a> {
         [from, to]: Span,
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
-        let (from, to) = (self.place(from, v), self.place(to, v));
+        let (from, to) = (self.from_lane_frame(from, v), self.from_lane_frame(to, v));
         let lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip };
         out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
     }

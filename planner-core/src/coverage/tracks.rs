@@ -48,7 +48,7 @@ pub fn build<const L: usize, const V: usize, const N: usize>(
     for strip in 0..strips.count {
         let span = strips.strip_borders(strip);
         strips.compute_needed(span, ws)?;
-        strips.lay_lanes(strip as u16, strips.middle(span), ws, out)?;
+        strips.lay_lanes(strip as u16, strips.centre_line(span), ws, out)?;
     }
     if area.has_no_fly() {
         patches::lay_missing_lanes(&strips, ws, out)?;

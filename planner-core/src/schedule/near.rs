@@ -26,12 +26,12 @@ pub(super) struct SegmentGrid {
 
 impl SegmentGrid {
     pub(super) const fn new() -> Self {
-        // All zero; `sort` sets the size before a piece is looked for.
+        // All zero; `sort_into_cells` sets the size before a piece is looked for.
         Self { min: [0.0; 2], cell_m: 0.0, half_m: 0.0, starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1] }
     }
 
     /// Sorts `pieces`, at most `u16::MAX` of them, into cells.
-    pub(super) fn sort(&mut self, pieces: &mut [TimedSegment]) {
+    pub(super) fn sort_into_cells(&mut self, pieces: &mut [TimedSegment]) {
         let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         self.half_m = 0.0;
         for piece in &*pieces {
@@ -121,7 +121,7 @@ mod tests {
             let cfg = ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
             let mut pieces: Vec<TimedSegment, 200> = others.into_iter().map(piece).collect();
             let mut cells = SegmentGrid::new();
-            cells.sort(&mut pieces);
+            cells.sort_into_cells(&mut pieces);
             let own = piece(own);
             let all = pieces.iter().filter(|q| is_conflict(&cfg, &own, q)).count();
             let found = cells.candidates_near(&pieces, &own, 2.0).filter(|q| is_conflict(&cfg, &own, q)).count();

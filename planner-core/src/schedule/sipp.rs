@@ -242,7 +242,7 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
         };
         ws.pieces.push(for_ever).map_err(|_| ScheduleError::PiecesFull)?;
     }
-    ws.cells.sort(&mut ws.pieces);
+    ws.cells.sort_into_cells(&mut ws.pieces);
     Ok(())
 }
 
@@ -341,7 +341,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             at = state.next;
             let leave_s = fmaxf(from_s, state.from_s - duration_s);
             let fits = leave_s <= until_s && leave_s + duration_s <= state.until_s;
-            if fits && leave_s + duration_s < state.arrive_s && self.heap.place(index) != SETTLED {
+            if fits && leave_s + duration_s < state.arrive_s && self.heap.entry_index(index) != SETTLED {
                 return true;
             }
         }
@@ -389,7 +389,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             let index = at - 1;
             let state = self.states[usize::from(index)];
             at = state.next;
-            if self.heap.place(index) == SETTLED {
+            if self.heap.entry_index(index) == SETTLED {
                 continue;
             }
             let leave_s = first_allowed(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));

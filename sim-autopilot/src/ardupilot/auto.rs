@@ -59,7 +59,7 @@ impl Copter {
     pub(super) fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if self.mode != Mode::Auto {
             if self.auto.leg.take().is_some() {
-                platform.missions.progress.interrupt();
+                platform.missions.progress.restart_item();
             }
             return;
         }

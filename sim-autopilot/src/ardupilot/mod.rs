@@ -156,7 +156,7 @@ pub struct Copter {
 impl Copter {
     /// ArduCopter as it boots: disarmed in STABILIZE, without a position until `ready_s`.
     pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
-        let params = params::defaults(system_id, limits);
+        let params = params::default_params(system_id, limits);
         Self {
             tuning: Tuning::new(&params),
             params,

@@ -71,7 +71,7 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
 ];
 
 /// The defaults, with the airframe's limits in the parameters that carry them.
-pub fn defaults(system_id: u8, limits: &VehicleLimits) -> Params {
+pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
     let own = [
         ("SYSID_THISMAV", Int16(i16::from(system_id))),
         ("WPNAV_SPEED", Real(100.0 * limits.speed_max_mps.min(10.0))),
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; of these only the battery's and the GCS failsafe are 0 by default.
-        let t = Tuning::new(&defaults(3, &VehicleLimits::default()));
+        let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
         let positive = [t.speed, t.speed_up, t.speed_down, t.land_speed, t.land_slow_below, t.stick_sink];
         assert!(positive.iter().all(|v| *v > 0.1));
         let positive = [t.disarm_delay_s, t.return_height, t.return_cone, t.return_loiter_s, t.gcs_timeout_s];

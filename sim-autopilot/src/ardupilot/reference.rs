@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn it_arrives_within_every_limit_and_does_not_overshoot() {
-        let tuning = Tuning::new(&params::defaults(1, &VehicleLimits::default()));
+        let tuning = Tuning::new(&params::default_params(1, &VehicleLimits::default()));
         let mut reference = Reference::new(Point::zeros(), Point::zeros());
         let goal = Goal::hold(Point::new(12.0, 16.0, 10.0));
         let dt = 0.004;

@@ -38,7 +38,7 @@ pub struct Px4 {
 impl Px4 {
     /// PX4 as it boots, with the airframe's limits in its parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
-        let params = params::defaults(system_id, limits);
+        let params = params::default_params(system_id, limits);
         Self { commander: Commander::new(), tuning: Tuning::new(&params), params, pending_mode: None }
     }
 
@@ -72,7 +72,7 @@ impl Px4 {
         }
         if self.commander.mode() != Mode::Mission {
             if self.commander.mission.leg.take().is_some() {
-                platform.missions.progress.interrupt();
+                platform.missions.progress.restart_item();
             }
             return;
         }

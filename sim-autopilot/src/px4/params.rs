@@ -106,7 +106,7 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
 ];
 
 /// The defaults, with the airframe's limits in the parameters that carry them.
-pub fn defaults(system_id: u8, limits: &VehicleLimits) -> Params {
+pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
     let own = [
         ("MAV_SYS_ID", Int(i32::from(system_id))),
         ("MPC_XY_VEL_MAX", Real(limits.speed_max_mps)),
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
-        let t = Tuning::new(&defaults(3, &VehicleLimits::default()));
+        let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
         for value in [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height] {
             assert!(value > 0.0);
         }

@@ -460,7 +460,7 @@ impl Model for FleetModel {
             for (rank, number) in vehicles.iter_mut().enumerate().take(self.count) {
                 let stands = stands >> rank & 1 != 0;
                 let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
-                vehicle.fleet.begin(NOW);
+                vehicle.fleet.begin_flight(NOW);
                 vehicle.fleet.move_to_clock(NOW, NOW);
                 *number = self.number(known, vehicle);
             }

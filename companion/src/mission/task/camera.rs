@@ -42,14 +42,14 @@ enum CameraCommand {
 }
 
 impl CameraCommand {
-    fn command(self) -> u16 {
+    fn mav_command(self) -> u16 {
         match self {
             Self::Every(_) | Self::Off => DO_SET_CAM_TRIGG_DIST,
             Self::Picture => DO_DIGICAM_CONTROL,
         }
     }
 
-    fn message(self) -> Outgoing {
+    fn to_message(self) -> Outgoing {
         match self {
             Self::Every(step_m) => Outgoing::TriggerEvery { step_m, at_once: true },
             Self::Off => Outgoing::TriggerEvery { step_m: 0.0, at_once: false },
@@ -178,7 +178,7 @@ impl CameraControl {
             }
             return;
         }
-        links.push(Link::Autopilot, order.message());
+        links.push(Link::Autopilot, order.to_message());
         self.tries += 1;
         self.sent_at = Some(now);
     }
@@ -190,7 +190,7 @@ impl CameraControl {
 
     pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
         let waits =
-            self.sent_at.is_some() && self.commands.front().is_some_and(|o| o.command() == ack.command);
+            self.sent_at.is_some() && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
         if !waits {
             return;
         }

@@ -140,7 +140,7 @@ impl Request {
         &path[start..]
     }
 
-    pub fn file(&self) -> Option<File> {
+    pub fn requested_file(&self) -> Option<File> {
         File::ALL.into_iter().find(|file| file.name().as_bytes() == self.path())
     }
 }

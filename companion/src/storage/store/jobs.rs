@@ -54,11 +54,11 @@ impl Store {
                 FlashRequest::Program { at, bytes: &self.program_word }
             }
             FlashJob::Flush(slot) => FlashRequest::Program {
-                at: slot.data_offset(layout) + self.reassembly.front(),
+                at: slot.data_offset(layout) + self.reassembly.flushed_len(),
                 bytes: &self.buffer,
             },
             FlashJob::FlushRest { slot, done } => {
-                let at = self.reassembly.front() + done;
+                let at = self.reassembly.flushed_len() + done;
                 let left = self.reassembly.file_len() - at;
                 let count = left.next_multiple_of(WORD as u32).min(MAX_PROGRAM as u32) as usize;
                 FlashRequest::Program { at: slot.data_offset(layout) + at, bytes: &self.buffer[..count] }
@@ -141,7 +141,7 @@ impl Store {
                         return Some(FlashJob::Flush(slot));
                     }
                     if state == UploadState::Closing {
-                        let all = self.reassembly.front() >= self.reassembly.file_len();
+                        let all = self.reassembly.flushed_len() >= self.reassembly.file_len();
                         return Some(if all {
                             self.begin_crc_check(slot)
                         } else {
@@ -155,8 +155,8 @@ impl Store {
         if let Some(job) = self.choose_record(erasing) {
             return Some(job);
         }
-        if let FlashJob::Erase { .. } = self.paused {
-            return Some(core::mem::replace(&mut self.paused, FlashJob::None));
+        if let FlashJob::Erase { .. } = self.paused_job {
+            return Some(core::mem::replace(&mut self.paused_job, FlashJob::None));
         }
         let uploads = matches!(self.upload, Some((_, UploadState::Taking | UploadState::Closing)));
         let area = self.next_area_to_erase().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
@@ -169,7 +169,7 @@ impl Store {
 
     pub(super) fn erase_job(&mut self, area: FlashArea) -> FlashJob {
         *self.condition_mut(area) = AreaCondition::Dirty;
-        self.paused = FlashJob::None;
+        self.paused_job = FlashJob::None;
         FlashJob::Erase { area, at: area.offset(&self.layout) }
     }
 
@@ -206,7 +206,7 @@ impl Store {
             (FlashJob::Flush(_), Ok(_)) => self.reassembly.drop_first_block(),
             (FlashJob::FlushRest { slot, done }, Ok(_)) => {
                 let done = done + MAX_PROGRAM as u32;
-                let more = self.reassembly.front() + done < self.reassembly.file_len();
+                let more = self.reassembly.flushed_len() + done < self.reassembly.file_len();
                 self.job = if more { FlashJob::FlushRest { slot, done } } else { self.begin_crc_check(slot) };
             }
             (FlashJob::Check { slot, done, sum, tail }, Ok(bytes)) => {

@@ -43,7 +43,7 @@ impl UploadReassembly {
     }
 
     /// Bytes of the file that are no longer here.
-    pub fn front(&self) -> u32 {
+    pub fn flushed_len(&self) -> u32 {
         self.front
     }
 

@@ -63,11 +63,11 @@ impl Detours {
     }
 
     /// Notes that a detour, or a path aside, is requested of the shell.
-    pub(crate) fn request(&mut self, aim: DetourPurpose) {
+    pub(crate) fn note_request(&mut self, aim: DetourPurpose) {
         self.detour_aside = matches!(aim, DetourPurpose::Aside | DetourPurpose::Landing);
         self.lands_at_end = aim == DetourPurpose::Landing;
         if aim != DetourPurpose::Beyond {
-            self.field_detour.end();
+            self.field_detour.abort();
         }
         self.obstacles.mark_requested();
         self.detour_ready = false;

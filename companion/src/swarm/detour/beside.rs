@@ -63,7 +63,7 @@ pub(crate) struct FieldDetour {
 impl FieldDetour {
     /// Starts to seek a path back to the plan: to the place that the vehicle was flying to if it was stopped on such a path, else to
     /// `rejoin_m`, metres along the plan. False where there is no such place.
-    pub(crate) fn seek(&mut self, back_m: Option<f32>) -> bool {
+    pub(crate) fn start_seeking(&mut self, back_m: Option<f32>) -> bool {
         self.phase = match self.phase {
             FieldDetourPhase::Flies(back_m) | FieldDetourPhase::SeeksAgain(back_m) => {
                 FieldDetourPhase::SeeksAgain(back_m)
@@ -97,7 +97,7 @@ impl FieldDetour {
     }
 
     /// The state that remains where the vehicle turns to another task.
-    pub(crate) fn end(&mut self) {
+    pub(crate) fn abort(&mut self) {
         self.phase = FieldDetourPhase::Off;
     }
 

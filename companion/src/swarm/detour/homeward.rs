@@ -38,7 +38,7 @@ impl HomewardFlight {
     }
 
     /// The vehicle flies back another way.
-    pub(crate) fn forget(&mut self) {
+    pub(crate) fn cancel(&mut self) {
         *self = Self { attempts: self.attempts, ..Self::default() };
     }
 

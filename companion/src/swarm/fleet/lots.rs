@@ -20,7 +20,7 @@ impl DivisionInput {
     pub const WHOLE_PATH: u16 = u16::MAX;
 
     /// The inputs of a vehicle of the roster.
-    pub fn of(entry: &RosterReportEntry) -> Self {
+    pub fn from_entry(entry: &RosterReportEntry) -> Self {
         let along_dm = match entry.status {
             MemberStatus::Alive => entry.commitment_dm.unwrap_or(entry.progress_dm),
             MemberStatus::Lost | MemberStatus::Left => entry.progress_dm,

@@ -157,7 +157,7 @@ impl NeighbourEntry {
 impl<const V: usize> Neighbours<V> {
     /// Reports of vehicles that neighbours do not hear themselves, beginning where the last message
     /// was full.
-    pub(crate) fn relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
+    pub(crate) fn next_relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));

@@ -52,7 +52,7 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
     measure_fleet_agreement(meter);
     values(meter);
     let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
-    let flash = RamFlash(memory::spare().expect("it is taken once"));
+    let flash = RamFlash(memory::take_spare_memory().expect("it is taken once"));
     GroundedCompanion {
         companion,
         flash,
@@ -162,7 +162,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
     let mut fleet = Fleet::<VEHICLES>::new(0, VEHICLES, FleetTimeouts::of_flight(Duration::from_secs(60)));
     let bytes = size_of_val(&fleet);
     let mut now = Instant::ZERO;
-    fleet.begin(now);
+    fleet.begin_flight(now);
     for round in 0..120_u16 {
         now = now + Duration::from_secs(1);
         // The last ones fall silent one by one, those before them promise and hold.

@@ -61,7 +61,7 @@ fn main() -> ! {
     for (name, bytes, count) in &meter.rows {
         println!("call {count} {bytes} {name}");
     }
-    println!("stack {} {}", stack::used(), stack::size());
+    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }
 

@@ -76,8 +76,8 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     measure_largest_swarm(meter, &view, scratch.planner(), &mut beside.plan);
     measure_detours(meter, &view, &mut scratch.planner().search);
     measure_paths(meter);
-    let (head, words) = memory::map();
-    let grid = cases::map(&head, words);
+    let (head, words) = memory::measurement_map();
+    let grid = cases::voxel_map(&head, words);
     let shape = *grid.shape();
     // The shape is sound: it was checked before.
     let _ = meter.call("voxel::VoxelGrid::new", size_of::<VoxelGrid<'_>>(), || {
@@ -172,8 +172,8 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
 /// The demo's ten vehicles.
 fn measure_plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
     let bytes = size_of::<Planner>();
-    let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
-    let request = cases::request(&vehicles, &descents_m);
+    let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
+    let request = cases::plan_request(&vehicles, &descents_m);
     let mut goals = Goals::new();
     let good = "the demo has a plan";
     meter

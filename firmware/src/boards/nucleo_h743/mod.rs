@@ -89,7 +89,7 @@ pub fn start() -> Parts {
     let has_hse = start::try_hse();
     let p = embassy_stm32::init(clock_config(revision, has_hse));
     let mut watchdog = Watchdog::new(p.IWDG1, Output::new(p.PB0, Level::Low, Speed::Low));
-    watchdog.wake();
+    watchdog.start();
     configure_mpu_and_caches();
     let mut warnings = Vec::new();
     let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
@@ -140,7 +140,7 @@ impl Watchdog {
         Self { device: IndependentWatchdog::new(device, WATCHDOG_TIMEOUT_US), light }
     }
 
-    fn wake(&mut self) {
+    fn start(&mut self) {
         self.device.unleash();
     }
 

@@ -90,9 +90,9 @@ pub(super) fn configure_mpu_and_caches() {
         Some(h743::BANK2),
         None,
         Some(h743::NULL),
-        Some(mpu::guard()),
+        Some(mpu::stack_guard_region()),
     ];
-    mpu::enable(&regions);
+    mpu::enable_regions(&regions);
     // SAFETY: the caches are this function's alone, which is called once. Code is never written,
     // and what the DMA reaches is not cached.
     let mut core = unsafe { cortex_m::Peripherals::steal() };

@@ -110,7 +110,7 @@ pub fn start() -> Parts {
     guard_stack();
     let p = embassy_rp::init(embassy_rp::config::Config::default());
     let mut watchdog = Watchdog::new(p.WATCHDOG, Output::new(p.PIN_25, Level::Low));
-    watchdog.wake();
+    watchdog.start();
     interrupt::SWI_IRQ_0.set_priority(LINKS_AT);
     interrupt::SWI_IRQ_1.set_priority(Priority::P2);
     let serial = |baudrate| {
@@ -203,7 +203,7 @@ impl Watchdog {
     }
 
     /// Wakes it; it stands still while a debugger has a processor halted.
-    fn wake(&mut self) {
+    fn start(&mut self) {
         self.device.pause_on_debug(true);
         self.device.start(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         set_watchdog_resets();

@@ -66,7 +66,7 @@ impl Flash {
 fn readable_address(at: u32, len: usize) -> Option<*const u8> {
     let at = at as usize;
     let end = at.checked_add(len).filter(|end| *end <= LEN)?;
-    let torn = (at / WORD..end.div_ceil(WORD)).any(|word| mark(word) == TORN);
+    let torn = (at / WORD..end.div_ceil(WORD)).any(|word| word_mark(word) == TORN);
     (!torn).then_some((BANK_ADDRESS + at) as *const u8)
 }
 
@@ -98,7 +98,7 @@ impl crate::flash::Flash for Flash {
         }
         for (i, word) in bytes.chunks(WORD).enumerate() {
             let place = at / WORD + i;
-            if mark(place) != ERASED {
+            if word_mark(place) != ERASED {
                 return Err(FlashFault);
             }
             set_mark(place, TORN);
@@ -122,7 +122,7 @@ impl ReadFlash for Flash {
     }
 }
 
-fn mark(word: usize) -> u8 {
+fn word_mark(word: usize) -> u8 {
     // SAFETY: the callers keep `word` below the number of words, and each has a mark.
     unsafe { ((WORD_MARKS + word) as *const u8).read_volatile() }
 }

@@ -39,10 +39,10 @@ pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
-    mpu::enable(&[Some(mpu::guard())]);
+    mpu::enable_regions(&[Some(mpu::stack_guard_region())]);
     clock::start();
     let mut watchdog = Watchdog(());
-    watchdog.wake();
+    watchdog.start();
     let parts = Parts {
         links: vectors::start_links(),
         plans: vectors::start_plans(),

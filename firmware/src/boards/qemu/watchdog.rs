@@ -48,7 +48,7 @@ pub struct Watchdog(pub(super) ());
 
 impl Watchdog {
     /// Starts the watchdog.
-    pub(super) fn wake(&mut self) {
+    pub(super) fn start(&mut self) {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
         Register::new(WATCHDOG, LOAD).write(RELOAD_COUNTS);
         Register::new(WATCHDOG, CTRL).write(ENABLED);

@@ -2,7 +2,7 @@
 //!
 //! All boxes of a node are treated alike, by vector instructions where the machine has them: branches that depend on distances
 //! cannot be foreseen, and cost more than arithmetic. The results are the same bits with any of them. What calculates with
-//! [`Lanes`] is inlined into [`Search::with_simd`], and closures are not: so there are none.
+//! [`SimdLanes`] is inlined into [`Search::with_simd`], and closures are not: so there are none.
 
 use pulp::{Simd, WithSimd};
 

@@ -4,12 +4,12 @@ use companion::config::SAFETY_DISTANCE_M;
 use planner_core::deconflict::Method;
 use sim_autopilot::Estimator;
 
-use super::values::{MAX_ID, point};
+use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
 /// The table of a mission in which vehicles deviate from their paths by `stray_m` together, unless it says otherwise.
-pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
+pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.one_of("method", Method::Priority, &methods)?;
     // Companions refuse a distance of 0.
@@ -22,7 +22,7 @@ pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconflic
 }
 
 /// The table of a mission that is given up after `limit_s`, unless it says otherwise.
-pub(super) fn simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
+pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
     let simulation = Simulation {
         wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
         gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
@@ -43,7 +43,7 @@ pub(super) fn simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> 
     Ok(simulation)
 }
 
-pub(super) fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
+pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
         FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
     let kind = table.required("kind", "what happens, for example \"kill\"")?.one_of(&words)?;
@@ -62,8 +62,8 @@ pub(super) fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
         vehicle,
         kind,
         direction: direction.transpose()?.map(str::to_owned),
-        offset_m: table.get("offset_m").map(|v| point(&v)).transpose()?,
-        position: table.get("position").map(|v| point(&v)).transpose()?,
+        offset_m: table.get("offset_m").map(|v| read_point(&v)).transpose()?,
+        position: table.get("position").map(|v| read_point(&v)).transpose()?,
         radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
     };
     table.finish()?;

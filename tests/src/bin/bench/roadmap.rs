@@ -60,7 +60,7 @@ struct Theirs {
 
 /// A row for the roadmap on one core and on two, for ten A* and for the 10 × 10 cost matrix, milliseconds.
 pub fn rows(peer: &Path) -> Result<Vec<Row>> {
-    let map = building::building(building::DEFAULT_SEED, RESOLUTION_M)?;
+    let map = building::building_map(building::DEFAULT_SEED, RESOLUTION_M)?;
     let dir = tempfile::tempdir()?;
     let files = ["building.bt", "starts.txt", "goals.txt"].map(|name| dir.path().join(name));
     bt::write(&map.to_octree("builtin:building")?, &files[0])?;

@@ -79,7 +79,7 @@ impl Swarm {
                 heard_bits: self.tables[from].heard_bits(self.now),
                 ..Intent::default()
             };
-            let relay = self.tables[from].relay(self.now, MISSION, PLAN);
+            let relay = self.tables[from].next_relay(self.now, MISSION, PLAN);
             for to in [from.wrapping_sub(1), from + 1] {
                 let Some(table) = self.tables.get_mut(to).filter(|_| !lost[from]) else { continue };
                 table.handle_intent(self.now, to as u16, &intent, MISSION, Some(PLAN));
