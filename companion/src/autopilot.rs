@@ -8,4 +8,4 @@ pub mod px4;
 pub(crate) mod requests;
 pub mod telemetry;
 
-pub use self::kind::Kind;
+pub use self::kind::AutopilotKind;

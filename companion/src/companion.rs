@@ -14,14 +14,14 @@ use core::mem::MaybeUninit;
 use heapless::Deque;
 use planner_core::flight::VehiclePlan;
 
-use crate::autopilot::Kind;
-use crate::autopilot::requests::{Requests, Situation};
+use crate::autopilot::AutopilotKind;
+use crate::autopilot::requests::{RequestContext, Requests};
 use crate::autopilot::telemetry::Telemetry;
-use crate::config::{Checked, Config, ConfigError, PlanFailure};
-use crate::events::{Event, Link, Wanted};
-use crate::guidance::{Guidance, Scene, Stats};
+use crate::config::{CheckedConfig, Config, ConfigError, PlanFailure};
+use crate::events::{Event, Link, PlanKind};
+use crate::guidance::{Guidance, GuidanceInputs, SetpointStats};
 use crate::link::frame::Counters;
-use crate::link::{Fresh, Links};
+use crate::link::{Links, OnDemandMessage};
 use crate::margins;
 use crate::mission::State;
 use crate::mission::course::Mission;
@@ -76,23 +76,23 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// # Errors
     /// As [`Config::checked`].
     pub fn new(config: Config<V>) -> Result<Self, ConfigError> {
-        config.checked().map(Self::of)
+        config.checked().map(Self::from_checked)
     }
 
     /// As `new`, for settings that were checked, made where the companion stays: on a board there
     /// is no room for a copy on the stack.
     #[inline(never)]
-    pub fn make_in(place: &mut MaybeUninit<Self>, settings: Checked<V>) -> &mut Self {
-        place.write(Self::of(settings))
+    pub fn init_in_place(place: &mut MaybeUninit<Self>, settings: CheckedConfig<V>) -> &mut Self {
+        place.write(Self::from_checked(settings))
     }
 
     #[inline(always)]
-    fn of(Checked { config, start }: Checked<V>) -> Self {
+    fn from_checked(CheckedConfig { config, start }: CheckedConfig<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
         let mut neighbours =
             Neighbours::new(&config.roster, config.system_id, config.cruise_mps.max(config.climb_mps));
         if let Some(down_s) = config.division {
-            let stray_m = margins::stray_m(config.required_clearance_m, config.radius_m);
+            let stray_m = margins::pair_position_error_m(config.required_clearance_m, config.radius_m);
             neighbours.form_fleet(down_s, config.ground, stray_m);
         }
         Self {
@@ -104,7 +104,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             detours: Detours::default(),
             requests: Requests::default(),
             mission: Mission::new(start),
-            guidance: Guidance::new(&config, &Kind::default().default_limits()),
+            guidance: Guidance::new(&config, &AutopilotKind::default().default_limits()),
             services: Services::new(&config),
             events: Deque::new(),
             config,
@@ -117,7 +117,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether setpoints are to go out, one each 50 ms.
-    pub fn streams(&self) -> bool {
+    pub fn streams_setpoints(&self) -> bool {
         self.mission.state().streams_setpoints()
     }
 
@@ -127,7 +127,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Which autopilot flies the vehicle; PX4 while none was heard.
-    pub(crate) fn kind(&self) -> Kind {
+    pub(crate) fn kind(&self) -> AutopilotKind {
         self.telemetry.kind()
     }
 
@@ -140,36 +140,36 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Number of times that the safety filter stopped the vehicle.
-    pub fn filter_stops(&self) -> u32 {
-        self.guidance.filter.activations()
+    pub fn filter_stop_count(&self) -> u32 {
+        self.guidance.filter.activation_count()
     }
 
     /// The vehicle that the safety filter stops for at this moment, as each step asks it; 0 for
     /// none. Nothing changes by the call; the filter's cost is counted so.
-    pub fn ask_filter(&mut self, now: Instant) -> u8 {
-        let scene = Scene::new(
+    pub fn query_filter(&mut self, now: Instant) -> u8 {
+        let scene = GuidanceInputs::new(
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
-            self.detours.is_flying(),
+            self.detours.is_on_detour(),
         );
-        self.guidance.ask_filter(self.mission.state(), &scene, &self.neighbours, now)
+        self.guidance.query_filter(self.mission.state(), &scene, &self.neighbours, now)
     }
 
     /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
-    pub fn stops_urgently(&self) -> bool {
-        self.guidance.smoother.stops_urgently()
+    pub fn is_in_urgent_stop(&self) -> bool {
+        self.guidance.smoother.is_in_urgent_stop()
     }
 
-    /// Way made along the own path, metres.
+    /// Progress along the own path, metres.
     pub fn progress_m(&self) -> f32 {
         // The length of a detour comes on top of the place where the vehicle left the plan.
-        let left_at_m = if self.detours.is_flying() { self.detours.left_at_m() } else { 0.0 };
-        self.guidance.progress_m(self.mission.state(), &self.scene()) + left_at_m.max(0.0)
+        let left_at_m = if self.detours.is_on_detour() { self.detours.left_at_m() } else { 0.0 };
+        self.guidance.progress_m(self.mission.state(), &self.guidance_inputs()) + left_at_m.max(0.0)
     }
 
     /// Greatest values of the setpoints since the start.
-    pub fn setpoint_stats(&self) -> Stats {
+    pub fn setpoint_stats(&self) -> SetpointStats {
         self.guidance.smoother.stats
     }
 
@@ -179,8 +179,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Messages dropped because a link's queue was full.
-    pub fn dropped(&self, link: Link) -> u32 {
-        self.links.dropped(link)
+    pub fn dropped_messages(&self, link: Link) -> u32 {
+        self.links.dropped_messages(link)
     }
 
     /// Takes bytes of a link in, all received by `now`.
@@ -192,7 +192,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             relevant |= self.handle_frame(link, &frame);
         }
         if relevant {
-            self.run_table();
+            self.run_mission_table();
         }
     }
 
@@ -206,42 +206,42 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.timers.is_due(Timer::Step, now) {
             self.step();
         }
-        if self.timers.take(Timer::Heartbeat, now, HEARTBEAT_EVERY) {
-            self.links.set_due(Link::Autopilot, Fresh::Heartbeat, true);
-            self.links.set_due(Link::Swarm, Fresh::Heartbeat, true);
-            self.links.set_due(Link::Swarm, Fresh::Relay, true);
+        if self.timers.take_due(Timer::Heartbeat, now, HEARTBEAT_EVERY) {
+            self.links.set_due(Link::Autopilot, OnDemandMessage::Heartbeat, true);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Heartbeat, true);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Relay, true);
         }
         let every = Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
-        if self.timers.take(Timer::Swarm, now, every) {
-            self.links.set_due(Link::Swarm, Fresh::Position, self.telemetry.position_at.is_some());
-            self.links.set_due(Link::Swarm, Fresh::Intent, true);
+        if self.timers.take_due(Timer::Swarm, now, every) {
+            self.links.set_due(Link::Swarm, OnDemandMessage::Position, self.telemetry.position_at.is_some());
+            self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
             if let Some(fleet) = self.neighbours.fleet() {
                 let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
-                let due = self.timers.take(Timer::Roster, now, every);
-                self.links.set_due(Link::Swarm, Fresh::Roster, due);
+                let due = self.timers.take_due(Timer::Roster, now, every);
+                self.links.set_due(Link::Swarm, OnDemandMessage::Roster, due);
             }
         }
     }
 
-    /// Takes the planner's answer in. Ignored unless it was asked for.
+    /// Handles the planner's answer. An answer that was not requested is ignored.
     pub fn handle_plan(
         &mut self,
         now: Instant,
-        wanted: Wanted,
+        wanted: PlanKind,
         outcome: Result<&VehiclePlan<W, G>, PlanFailure>,
     ) {
         self.now = now;
         match (wanted, self.mission.state(), outcome) {
-            (Wanted::Mission, State::Planning, Ok(plan)) => self.mission.take_plan(plan),
-            (Wanted::Mission, State::Planning, Err(failure)) => self.mission.fail(failure),
-            (Wanted::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
-            (Wanted::Detour, State::Replanning | State::PadReplanning, Err(failure)) => {
-                self.miss_detour(failure);
+            (PlanKind::Mission, State::Planning, Ok(plan)) => self.mission.set_plan(plan),
+            (PlanKind::Mission, State::Planning, Err(failure)) => self.mission.set_failure(failure),
+            (PlanKind::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => self.begin_detour(plan),
+            (PlanKind::Detour, State::Replanning | State::PadReplanning, Err(failure)) => {
+                self.handle_detour_failure(failure);
             }
-            (Wanted::Division, _, outcome) => self.take_division(outcome),
+            (PlanKind::Division, _, outcome) => self.handle_division_plan(outcome),
             _ => return,
         }
-        self.run_table();
+        self.run_mission_table();
     }
 
     /// The next event.
@@ -251,40 +251,40 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// When [`Self::handle_timeout`] is due.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        Some(self.timers.next())
+        Some(self.timers.next_due())
     }
 
-    pub(crate) fn scene(&self) -> Scene<'_, W, G> {
-        Scene::new(
+    pub(crate) fn guidance_inputs(&self) -> GuidanceInputs<'_, W, G> {
+        GuidanceInputs::new(
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
-            self.detours.is_flying(),
+            self.detours.is_on_detour(),
         )
     }
 
     /// The situation that requests to the autopilot follow from.
-    fn situation(&self) -> Situation {
-        let in_state = self.mission.in_state(self.now);
+    fn request_context(&self) -> RequestContext {
+        let in_state = self.mission.time_in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
         let timeout_s =
             (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_RANGE_S.0, GUID_TIMEOUT_RANGE_S.1);
-        let column_clear = self.guidance.filter.column_clear() && !self.guidance.leads();
-        Situation {
+        let column_clear = self.guidance.filter.column_clear() && !self.guidance.is_guiding_landing();
+        RequestContext {
             now: self.now,
             state: self.mission.state(),
             in_state,
             climb_m: self.mission.climb_m(),
             guided_timeout_s: timeout_s,
-            may_land: Situation::may_land(in_state, column_clear, self.must_land()),
+            may_land: RequestContext::may_request_landing(in_state, column_clear, self.must_land()),
         }
     }
 
     /// Requests the streams, and on the ground the limits.
-    fn connect(&mut self) {
-        let situation = self.situation();
-        if self.requests.begin(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
-            self.guidance.tune(&self.config, self.requests.limits());
+    fn request_streams(&mut self) {
+        let situation = self.request_context();
+        if self.requests.start_on_connect(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
+            self.guidance.set_limits(&self.config, self.requests.limits());
         }
     }
 }

@@ -84,12 +84,12 @@ pub const REACHES_ALL_M: f32 = 10_000.0;
 
 /// Settings that can be flown, and where the vehicle's own path starts.
 #[derive(Clone, Debug)]
-pub struct Checked<const V: usize> {
+pub struct CheckedConfig<const V: usize> {
     pub(crate) config: Config<V>,
     pub(crate) start: Point,
 }
 
-/// Why a configuration was refused.
+/// Reason why a configuration was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
     /// The vehicle's own system id is not in the roster, or 0.
@@ -109,7 +109,7 @@ pub enum ConfigError {
 }
 
 /// Whether a place is inside a box; its faces are.
-pub(crate) fn holds((low, high): &(Point, Point), place: &Point) -> bool {
+pub(crate) fn box_contains((low, high): &(Point, Point), place: &Point) -> bool {
     (0..3).all(|axis| (low[axis]..=high[axis]).contains(&place[axis]))
 }
 
@@ -146,7 +146,7 @@ impl<const V: usize> Config<V> {
     }
 
     /// The entry of this vehicle and its rank by system id.
-    pub fn own(&self) -> Option<(u16, &RosterEntry)> {
+    pub fn own_roster_entry(&self) -> Option<(u16, &RosterEntry)> {
         let at = self.roster.iter().position(|e| e.system_id == self.system_id)?;
         Some((at as u16, &self.roster[at]))
     }
@@ -165,7 +165,7 @@ pub struct Ground {
     pub high_m: f32,
 }
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFailure {
     /// The roadmap is absent or damaged.

@@ -13,10 +13,10 @@ pub enum Link {
 
 /// The plan that the shell is to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
+pub enum PlanKind {
     /// The mission's plan.
     Mission,
-    /// A way around, or aside: [`crate::Companion::detour`] says from where and around what.
+    /// A detour, or aside: [`crate::Companion::detour_request`] says from where and around what.
     Detour,
     /// The mission's plan after losses: [`crate::Companion::losses`] says which.
     Division,
@@ -26,7 +26,7 @@ pub enum Wanted {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// Plan this, and answer with [`crate::Companion::handle_plan`].
-    PlanRequested(Wanted),
+    PlanRequested(PlanKind),
     /// Send what waits, then start the companion again, from the newest roadmap, mission and parameters.
     RestartRequested,
     /// The mission moved on.

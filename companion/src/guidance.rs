@@ -2,9 +2,9 @@
 //! makes the setpoint of it.
 //!
 //! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's start, the path, the
-//! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it goes on
+//! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it continues
 //! where it was. A stop slows the smoother's clock, so the raw point stays where it is. Once the setpoint stands, the raw point
-//! is taken back to it, and going on begins with a straight way back to where the phase was left.
+//! is taken back to it, and continuing begins with a straight way back to where the phase was left.
 
 mod brakes;
 pub(crate) mod evade;
@@ -27,28 +27,28 @@ mod smoother;
 mod waypoints;
 
 use planner_core::Point;
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Own};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, OwnVehicle};
 use planner_core::flight::Path;
 use planner_core::track::{TrackConfig, Tracker};
 
-use self::filter::Filter;
+use self::filter::SafetyFilter;
 use self::hold::Hold;
-use self::limits::{Limits, Settings};
-use self::nearest::nearest_m;
+use self::limits::{MotionLimits, Settings};
+use self::nearest::nearest_arc_length_m;
 use self::phase::Phase;
-use self::setpoint::correction;
-use self::smoother::{Pace, Smoother, TICK_S};
-use self::waypoints::Waypoints;
+use self::setpoint::position_correction;
+use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
+use self::waypoints::Algorithm2Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
 use crate::config::Config;
-use crate::guidance::evade::Search;
+use crate::guidance::evade::EvadeSearch;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
-pub use self::scene::Scene;
+pub use self::scene::GuidanceInputs;
 pub use self::setpoint::Setpoint;
-pub use self::smoother::Stats;
+pub use self::smoother::SetpointStats;
 
 /// The end of a climb or of a path is reached within this distance, metres.
 const ARRIVED_M: f32 = 0.35;
@@ -87,7 +87,7 @@ const SETTLE_WINDOW_M: f32 = 3.0;
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Least movement along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
-/// Distance that the raw point keeps from the geofence, metres: the setpoint may stray by this much
+/// Distance that the raw point keeps from the geofence, metres: the setpoint may deviate by this much
 /// from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Greatest height over the ground, however wide the margin, at which a guided descent becomes
@@ -98,7 +98,7 @@ const TOUCHDOWN_MPS: f32 = 0.5;
 /// Shortest leg that is flown, metres.
 const MIN_LEG_M: f32 = 1e-3;
 
-/// Advice before the neighbours were looked at: wait.
+/// Advice before the neighbours are evaluated: wait.
 const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// The raw point's course, and the smoother that makes setpoints of it.
@@ -111,45 +111,44 @@ pub struct Guidance {
     /// Share of the speed that the estimate allows: 0 stops.
     pub pace: f32,
     /// The smoother, which makes setpoints of raw points.
-    pub smoother: Smoother,
+    pub smoother: SetpointSmoother,
     phase: Phase,
     tracker: Tracker,
     /// The straight way of a climb, a join or a descent; none while it is to be made from where the setpoint stands.
     leg: Option<Path<2>>,
     leg_tracker: Tracker,
     /// Which waypoint it flies to, by Algorithm 2.
-    waypoints: Waypoints,
+    waypoints: Algorithm2Waypoints,
     /// Whether the raw point is where the setpoint stands.
-    settled: bool,
+    raw_point_at_rest: bool,
     /// The position was unknown: no place was sent.
-    lost: bool,
+    position_unknown: bool,
     /// The autopilot flew by itself or by its pilot: setpoints followed the vehicle.
-    taken: bool,
+    autopilot_took_over: bool,
     /// Time since a place was sent, seconds.
     unsent_s: f32,
     /// Last advice of the neighbours.
     pub advice: Advice,
     /// Number of gates, from the first on, that are open for good.
-    opened: usize,
+    gates_open: usize,
     on_path: bool,
     lead_m: f32,
     /// Place of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
-    /// Place along the path where the vehicle will stop for now, whatever the safety filter does,
-    /// metres.
+    /// Place along the path where the vehicle will stop for now, whatever the safety filter does, metres.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
-    pub(crate) filter: Filter,
+    pub(crate) filter: SafetyFilter,
     /// Whether it holds its place for others to pass.
     pub(crate) hold: Hold,
     /// Whether that has changed since the last intent that was sent.
-    pub(crate) turned: bool,
+    pub(crate) hold_changed: bool,
     /// Whether a descent goes back up its column.
-    up: bool,
+    climbing_back: bool,
     /// Whether it leads a landing down from the path, before the autopilot lands.
-    leads: bool,
+    guides_landing: bool,
     /// The path leads out of the geofence from here.
-    fenced: bool,
+    stopped_at_fence: bool,
     progress_m: f32,
     progress_at: Instant,
     /// When the vehicle last moved, or was at its setpoint.
@@ -157,26 +156,25 @@ pub struct Guidance {
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
-    /// Place along the path that others at least heard of, metres; ∞ where no vehicle has heard of
-    /// any.
-    linked_m: f32,
-    evade_search: Search,
+    /// Place along the path that others at least heard of, metres; ∞ where no vehicle has heard of any.
+    heard_by_others_m: f32,
+    evade_search: EvadeSearch,
     /// Whether it keeps out from under a vehicle that comes down.
     pub evading: bool,
     /// Distance ahead at which the vehicle waits for neighbours, metres.
-    waits_m: f32,
+    wait_distance_m: f32,
     /// Place along the path beyond which the vehicle does not fly for now, metres.
     halt_m: f32,
     /// Place along the path to which the vehicle flies back.
     back_to_m: Option<f32>,
     /// No place along its path is better.
-    nowhere: bool,
+    no_better_place: bool,
     /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
     trapped_since: Option<Instant>,
     /// Whether its path leads aside only: it does not land at its end.
-    pub aside: bool,
+    pub ends_aside: bool,
     /// Height over the ground from which a descent is slow, or an autopilot that is not led to the ground lands by itself, metres.
-    low_m: f32,
+    low_height_m: f32,
     /// The lowest ground between pads, metres; infinite where those say how low.
     lowest_ground_m: f32,
     /// Acceleration sent last, with what holds the vehicle on the reference.
@@ -185,7 +183,7 @@ pub struct Guidance {
 
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let smoother = Smoother::new(Limits::new(config, autopilot), config.geofence);
+        let smoother = SetpointSmoother::new(MotionLimits::new(config, autopilot), config.geofence);
         let Settings { track, leg_track, deconflict } = Settings::new(config, autopilot);
         Self {
             track,
@@ -197,86 +195,86 @@ impl Guidance {
             tracker: Tracker::default(),
             leg: None,
             leg_tracker: Tracker::default(),
-            waypoints: Waypoints::default(),
-            settled: true,
-            lost: false,
-            taken: false,
+            waypoints: Algorithm2Waypoints::default(),
+            raw_point_at_rest: true,
+            position_unknown: false,
+            autopilot_took_over: false,
             unsent_s: 0.0,
             advice: NO_ADVICE_YET,
-            opened: 0,
+            gates_open: 0,
             on_path: false,
             lead_m: LEG_LEAD_M,
             setpoint_m: 0.0,
             stops_at_m: f32::NEG_INFINITY,
-            filter: Filter::default(),
+            filter: SafetyFilter::default(),
             hold: Hold::default(),
-            turned: false,
-            up: false,
-            leads: false,
-            fenced: false,
+            hold_changed: false,
+            climbing_back: false,
+            guides_landing: false,
+            stopped_at_fence: false,
             progress_m: 0.0,
             progress_at: Instant::ZERO,
             followed_at: Instant::ZERO,
             reported_m: f32::NEG_INFINITY,
             returning: false,
-            linked_m: f32::INFINITY,
-            evade_search: Search::default(),
+            heard_by_others_m: f32::INFINITY,
+            evade_search: EvadeSearch::default(),
             evading: false,
-            waits_m: f32::INFINITY,
+            wait_distance_m: f32::INFINITY,
             halt_m: f32::INFINITY,
             back_to_m: None,
-            nowhere: false,
+            no_better_place: false,
             trapped_since: None,
-            aside: false,
+            ends_aside: false,
             lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
-            low_m: libm::fminf(config.required_clearance_m - config.radius_m, MAX_LAND_HANDOVER_M),
+            low_height_m: libm::fminf(config.required_clearance_m - config.radius_m, MAX_LAND_HANDOVER_M),
             sent_acceleration: Point::zeros(),
         }
     }
 
-    /// Takes other limits.
-    pub fn tune<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
+    /// Sets other limits.
+    pub fn set_limits<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
         let Self { track, leg_track, deconflict, .. } = Self::new(config, autopilot);
         (self.track, self.leg_track, self.deconflict) = (track, leg_track, deconflict);
-        self.smoother.tune(Limits::new(config, autopilot), config.geofence);
+        self.smoother.set_limits(MotionLimits::new(config, autopilot), config.geofence);
     }
 
-    /// Forgets a former flight.
+    /// Clears the state of an earlier flight.
     pub fn reset(&mut self) {
         self.tracker = Tracker::default();
         self.phase = Phase::Hold;
         self.leg = None;
-        self.waypoints = Waypoints::default();
+        self.waypoints = Algorithm2Waypoints::default();
         self.on_path = false;
         self.returning = false;
-        self.aside = false;
+        self.ends_aside = false;
         self.reported_m = f32::NEG_INFINITY;
         self.advice = NO_ADVICE_YET;
-        self.opened = 0;
+        self.gates_open = 0;
         self.filter.reset();
     }
 
     /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was sent.
     pub fn hold_at(&mut self, point: Point) {
         // A vehicle whose position is known again brakes from its last place.
-        let lost = core::mem::take(&mut self.lost) && self.unsent_s > 0.0;
-        if lost || !self.smoother.is_live() {
+        let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
+        if lost || !self.smoother.has_setpoint() {
             self.smoother.resume_at(point, self.unsent_s);
-            self.settle();
+            self.forget_leg();
         }
     }
 
-    /// Holds where the setpoint followed the pilot's vehicle to, until that is resumed; where the flight was interrupted is kept.
+    /// Holds at the place to which the pilot flew, until the mission resumes; the place of interruption is kept.
     pub fn hold_after_pilot(&mut self, point: Point) {
         self.hold_at(point);
-        self.settle();
+        self.forget_leg();
     }
 
     /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing was sent.
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
         self.phase = Phase::Climb;
-        if !self.smoother.is_live() {
+        if !self.smoother.has_setpoint() {
             self.smoother.begin_at(*position, self.unsent_s);
         }
     }
@@ -287,13 +285,13 @@ impl Guidance {
     }
 
     /// Whether the setpoint stands, and is not on its way down.
-    pub fn stands(&self) -> bool {
-        self.pauses() && self.phase != Phase::Descent
+    pub fn is_standing(&self) -> bool {
+        self.is_setpoint_still() && self.phase != Phase::Descent
     }
 
     /// Whether it stands where its path leaves the geofence.
-    pub fn stands_at_fence(&self) -> bool {
-        self.fenced && self.stands()
+    pub fn is_standing_at_fence(&self) -> bool {
+        self.stopped_at_fence && self.is_standing()
     }
 
     /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one that
@@ -301,7 +299,7 @@ impl Guidance {
     pub fn step<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         neighbours: &mut Neighbours<V>,
         now: Instant,
         dt_s: f32,
@@ -312,31 +310,32 @@ impl Guidance {
         let asks = matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
         if let Some(plan) = scene.plan.filter(|_| asks) {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
-            let own = Own { rank: scene.rank, position, along_m, path: &plan.path, detours: scene.detours };
-            self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
+            let own =
+                OwnVehicle { rank: scene.rank, position, along_m, path: &plan.path, detours: scene.detours };
+            self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.states_at(now));
             if self.on_path {
                 self.advice.stop_within_m = self.advice.stop_within_m.min((self.halt_m - along_m).max(0.0));
             }
         }
         if let Some(plan) = scene.plan {
-            let next = plan.gates.get(self.opened);
+            let next = plan.gates.get(self.gates_open);
             if next.is_some_and(|gate| neighbours.has_passed(gate, now)) {
-                self.opened += 1;
+                self.gates_open += 1;
             }
             let place = self.smoother.position();
             let along_m = self.tracker.along_m;
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // The safety filter goes on checking the neighbour that stopped the vehicle.
+                // The safety filter continues checking the neighbour that stopped the vehicle.
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }
-                _ => self.setpoint_m + self.smoother.braking_m(false),
+                _ => self.setpoint_m + self.smoother.stopping_distance_m(false),
             };
         }
         self.filter(state, scene, neighbours, now);
-        let urgent = self.filter.stops(now);
+        let urgent = self.filter.is_stopping(now);
         let known = scene.telemetry.position_at.is_some();
         if !state.streams_setpoints() {
             self.smoother.stop();
@@ -345,91 +344,92 @@ impl Guidance {
         let kind = scene.telemetry.kind();
         let taken = matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
-        self.lost |= !known || state == State::PositionLost;
+        self.position_unknown |= !known || state == State::PositionLost;
         let flies = scene.telemetry.on_ground == Some(false);
-        let taken_before = core::mem::replace(&mut self.taken, taken);
-        if known && (taken || taken_before || !self.smoother.is_live()) {
+        let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
+        if known && (taken || taken_before || !self.smoother.has_setpoint()) {
             // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
             if taken {
-                self.smoother.go_with(position, self.unsent_s);
-            } else if !self.smoother.is_live() {
+                self.smoother.follow_vehicle(position, self.unsent_s);
+            } else if !self.smoother.has_setpoint() {
                 self.smoother.resume_at(position, self.unsent_s);
             } else if flies {
-                self.smoother.move_on(&scene.telemetry.velocity);
+                self.smoother.hold_with_velocity(&scene.telemetry.velocity);
             }
-            self.settle();
-            self.lost = false;
+            self.forget_leg();
+            self.position_unknown = false;
         }
         let sends = known && state != State::PositionLost;
-        if !self.smoother.is_live() || taken {
-            self.leads = false;
+        if !self.smoother.has_setpoint() || taken {
+            self.guides_landing = false;
             self.sent_acceleration = Point::zeros();
-            self.count_unsent(sends);
+            self.finish_step(sends);
             return true;
         }
         let up = state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
-        let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.up;
-        let leads = self.leads_down(state, scene, now);
+        let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.climbing_back;
+        let leads = self.update_guided_landing(state, scene, now);
         let goes =
             known && !turns && (leads || matches!(state, State::Climb | State::Follow)) && (!urgent || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
-        advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
+        advice.speed_scale = advice.speed_scale.min(self.filter.speed_scale(now));
         let path = scene.plan.map(|plan| &plan.path);
         if let (Some(path), true) = (path, known && self.on_path && !self.is_algorithm2()) {
             self.evade(state, path, &mut advice, neighbours, now);
         }
         if self.leg.is_none() {
-            self.up = up;
+            self.climbing_back = up;
         }
         let wanted = goes || (self.back_to_m.is_some() && !urgent);
-        let back_up = up && self.leg_done();
+        let back_up = up && self.is_leg_done();
         let holds = (!wanted || back_up)
             && self.on_path
             && matches!(self.phase, Phase::Path | Phase::Join | Phase::Descent)
             && state.holds_place()
-            && self.smoother.stands();
-        let yields = self.filter.yields() || state != State::Follow;
-        let late_s = if holds { neighbours.latest_s() } else { 0.0 };
-        self.turned |= self.hold.step(holds, yields, late_s, now);
-        let moves = wanted && !self.hold.binds(now);
-        if !moves && self.smoother.stands() && !self.settled {
+            && self.smoother.is_standing();
+        let yields = self.filter.is_yielding() || state != State::Follow;
+        let late_s = if holds { neighbours.max_message_delay_s() } else { 0.0 };
+        self.hold_changed |= self.hold.step(holds, yields, late_s, now);
+        let moves = wanted && !self.hold.is_binding(now);
+        if !moves && self.smoother.is_standing() && !self.raw_point_at_rest {
             if let (Some(path), Phase::Path) = (path, self.phase) {
                 let near_m = self.tracker.along_m;
-                self.tracker.along_m = nearest_m(path, &self.smoother.position(), near_m, SETTLE_WINDOW_M);
+                self.tracker.along_m =
+                    nearest_arc_length_m(path, &self.smoother.position(), near_m, SETTLE_WINDOW_M);
             }
-            self.smoother.rest();
-            self.settle();
+            self.smoother.forget_curve();
+            self.forget_leg();
         }
         let share = self.lag_share(scene.telemetry, moves, now);
         let mut blocked = false;
-        let dt_s = if self.smoother.resumes() { self.unsent_s } else { dt_s };
+        let dt_s = if self.smoother.resumes_from_last() { self.unsent_s } else { dt_s };
         // The place where the vehicle stops stays the same, however many raw points this step
         // takes.
         let stops_at_m = advised_at_m + advice.stop_within_m;
-        self.fenced &= !moves;
-        for _ in 0..self.smoother.begin(Pace { share, urgent }, dt_s) {
+        self.stopped_at_fence &= !moves;
+        for _ in 0..self.smoother.begin_step(ClockPace { speed_share: share, urgent }, dt_s) {
             if self.phase == Phase::Path && !self.is_algorithm2() {
                 advice.stop_within_m = (stops_at_m - self.tracker.along_m).max(0.0);
             }
             let raw = match scene.plan {
                 Some(plan) if moves => {
-                    self.next_raw(state, scene, plan, &advice, neighbours, now, &mut blocked)
+                    self.next_raw_point(state, scene, plan, &advice, neighbours, now, &mut blocked)
                 }
                 _ if matches!(state, State::Streaming | State::Engaging | State::Arming) && known => {
-                    let away = position - self.smoother.raw();
+                    let away = position - self.smoother.raw_point();
                     let most = MAX_PAD_DRIFT_MPS * TICK_S;
                     let share = most / away.norm().max(most);
-                    self.smoother.raw() + away * share
+                    self.smoother.raw_point() + away * share
                 }
-                Some(plan) if sends && !self.settled => self.braked_raw(&plan.path),
-                _ => self.smoother.raw(),
+                Some(plan) if sends && !self.raw_point_at_rest => self.next_braked_raw_point(&plan.path),
+                _ => self.smoother.raw_point(),
             };
-            self.smoother.push(raw);
+            self.smoother.push_raw_point(raw);
         }
         self.mark_trapped(blocked, now);
-        let sound = self.smoother.finish();
+        let sound = self.smoother.make_setpoint();
         let correction = if flies && state != State::PilotControl && known {
-            correction(&self.smoother.position(), &self.smoother.velocity(), scene.telemetry)
+            position_correction(&self.smoother.position(), &self.smoother.velocity(), scene.telemetry)
         } else {
             Point::zeros()
         };
@@ -443,13 +443,13 @@ impl Guidance {
         if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {
             self.reported_m = self.progress_m(state, scene);
         }
-        self.count_unsent(sends);
+        self.finish_step(sends);
         sound
     }
 
     /// Ends a step: `sends` says whether its setpoint has a place.
-    fn count_unsent(&mut self, sends: bool) {
-        if sends && self.smoother.is_live() {
+    fn finish_step(&mut self, sends: bool) {
+        if sends && self.smoother.has_setpoint() {
             self.smoother.mark_sent();
             self.unsent_s = 0.0;
         }
@@ -457,10 +457,10 @@ impl Guidance {
 
     /// The vehicle that the safety filter stops for at this moment; 0 for none. Nothing changes by
     /// the call.
-    pub fn ask_filter<const V: usize, const W: usize, const G: usize>(
+    pub fn query_filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
         now: Instant,
     ) -> u8 {
@@ -475,7 +475,7 @@ impl Guidance {
     }
 
     /// Whether it leads the vehicle down.
-    pub(crate) fn descends(&self) -> bool {
+    pub(crate) fn is_descending(&self) -> bool {
         self.phase == Phase::Descent
     }
 
@@ -485,12 +485,12 @@ impl Guidance {
     }
 
     /// The time in a trap counts from now on.
-    pub(crate) fn forget_trap(&mut self) {
+    pub(crate) fn reset_trap_timer(&mut self) {
         self.trapped_since = None;
     }
 
     /// Time since the reference last moved on.
-    pub fn progress_at(&self) -> Instant {
+    pub fn last_progress_at(&self) -> Instant {
         self.progress_at
     }
 }

@@ -3,7 +3,7 @@
 //! **Contract.** The shell owns links, clock and planner. It calls [`Companion::handle_bytes`] with what a link received,
 //! [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and [`Companion::handle_plan`] with the answer to
 //! [`Event::PlanRequested`]. After *each* `handle_*` call it drains [`Companion::poll_transmit`] for both links until 0
-//! and [`Companion::poll_event`] until `None`; with a flash ([`Companion::mount`]) also [`Companion::poll_flash`], and answers
+//! and [`Companion::poll_event`] until `None`; with a flash ([`Companion::attach_store`]) also [`Companion::poll_flash`], and answers
 //! each by [`Companion::handle_flash`], whenever it is done. Times never go back. Every call does bounded work.
 //!
 //! ```
@@ -13,7 +13,7 @@
 //! use planner_core::frames::Geodetic;
 //!
 //! let origin = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-//! let config = Config::new(1, Point::new(0.0, 0.0, 2.0), origin);
+//! let config = PowellConfig::new(1, Point::new(0.0, 0.0, 2.0), origin);
 //! let mut companion: Companion<8, 64, 64> = Companion::new(config)?; // vehicles, waypoints, gates
 //! let now = Instant::from_millis(200);
 //! let mut sent = 0;
@@ -36,10 +36,10 @@
 //!
 //! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link that is not polled
 //! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`link::outbox::QUEUE_DEPTH`]; when it is full
-//! the newest is dropped and counted ([`Companion::dropped`]).
+//! the newest is dropped and counted ([`Companion::dropped_messages`]).
 //!
 //! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are in [`autopilot::px4`] and
-//! [`autopilot::ardupilot`]; [`autopilot::Kind`] chooses between them by HEARTBEAT.
+//! [`autopilot::ardupilot`]; [`autopilot::AutopilotKind`] chooses between them by HEARTBEAT.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -62,7 +62,7 @@ mod timers;
 
 pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
-pub use events::{Event, Link, Wanted};
+pub use events::{Event, Link, PlanKind};
 pub use mission::State;
 pub use mission::photographed::MAX_DONE_RANGES;
 pub use time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! The two links, to the autopilot and to the swarm: what comes in as frames, what waits to go out, and who is answered how often.
+//! The two links, to the autopilot and to the swarm: incoming frames, outgoing queues, and rate limits of answers.
 
 pub(crate) mod answer_limits;
 pub mod commands;
@@ -10,9 +10,9 @@ pub mod outbox;
 pub mod rate_limit;
 pub mod roster;
 
-use self::answer_limits::{Kind, Rates, Sender};
-use self::commands::{Command, Repeats};
-use self::echo::{Echo, Sent};
+use self::answer_limits::{AnswerKind, AnswerTokenBuckets, SenderKind};
+use self::commands::{Command, CommandHistory};
+use self::echo::{IntentEcho, SentIntents};
 use self::frame::{Counters, Frame, Framer, Header};
 use self::outbox::{Outbox, Outgoing};
 use self::rate_limit::RateLimit;
@@ -30,7 +30,7 @@ const BOTH_LINKS: [Link; 2] = [Link::Autopilot, Link::Swarm];
 /// A message that is made from the newest state when its link is polled, instead of waiting in a
 /// queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fresh {
+pub(crate) enum OnDemandMessage {
     /// A setpoint.
     Setpoint,
     /// HEARTBEAT.
@@ -56,12 +56,12 @@ pub(crate) enum Fresh {
 pub(crate) struct Links {
     framers: [Framer; 2],
     outboxes: [Outbox; 2],
-    /// Bits of [`Fresh`].
+    /// Bits of [`OnDemandMessage`].
     due: [u16; 2],
     radio: RateLimit,
-    sent: Sent,
-    rates: Rates,
-    repeats: Repeats,
+    sent: SentIntents,
+    rates: AnswerTokenBuckets,
+    repeats: CommandHistory,
 }
 
 impl Links {
@@ -76,19 +76,19 @@ impl Links {
     }
 
     /// Messages dropped because a link's queue was full.
-    pub(crate) fn dropped(&self, link: Link) -> u32 {
+    pub(crate) fn dropped_messages(&self, link: Link) -> u32 {
         self.outboxes[link as usize].dropped()
     }
 
     /// Sets whether the message `what` is to be made at the next poll.
-    pub(crate) fn set_due(&mut self, link: Link, what: Fresh, due: bool) {
+    pub(crate) fn set_due(&mut self, link: Link, what: OnDemandMessage, due: bool) {
         let bit = 1 << what as u8;
         let bits = &mut self.due[link as usize];
         *bits = if due { *bits | bit } else { *bits & !bit };
     }
 
-    /// Whether it is to be made; it is no longer.
-    pub(crate) fn take_due(&mut self, link: Link, what: Fresh) -> bool {
+    /// Clears the due flag of a message. Returns whether it was set.
+    pub(crate) fn take_due(&mut self, link: Link, what: OnDemandMessage) -> bool {
         let due = self.due[link as usize] & 1 << what as u8 != 0;
         self.set_due(link, what, false);
         due
@@ -100,91 +100,116 @@ impl Links {
     }
 
     /// Sends a person a text by STATUSTEXT on both links, at most 50 bytes.
-    pub(crate) fn say(&mut self, warning: bool, text: &'static str) {
+    pub(crate) fn send_text(&mut self, warning: bool, text: &'static str) {
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
-    /// As `say`, with numbers: each `#` of the text stands for one.
-    pub(crate) fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+    /// As `send_text`, with numbers: each `#` of the text stands for one.
+    pub(crate) fn send_text_with_numbers(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
         let numbers = [numbers[0], numbers[1], 0];
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
     }
 
     /// Whether an answer may be queued now; if so, it is counted.
-    pub(crate) fn may_answer(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind) -> bool {
+    pub(crate) fn take_answer_token(
+        &mut self,
+        now: Instant,
+        link: Link,
+        sender: SenderKind,
+        kind: AnswerKind,
+    ) -> bool {
         let kept = match sender {
-            Sender::GroundStation => KEPT_FREE,
-            Sender::Autopilot | Sender::Other => KEPT_FREE + KEPT_FOR_GROUND,
+            SenderKind::GroundStation => KEPT_FREE,
+            SenderKind::Autopilot | SenderKind::Other => KEPT_FREE + KEPT_FOR_GROUND,
         };
-        self.outboxes[link as usize].room() > kept && self.rates.take(now, link, sender, kind)
+        self.outboxes[link as usize].free_entries() > kept && self.rates.take_token(now, link, sender, kind)
     }
 
     /// Queues an answer, unless its rate or the queue is used up.
-    pub(crate) fn answer(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind, answer: Outgoing) {
-        if self.may_answer(now, link, sender, kind) {
+    pub(crate) fn queue_answer(
+        &mut self,
+        now: Instant,
+        link: Link,
+        sender: SenderKind,
+        kind: AnswerKind,
+        answer: Outgoing,
+    ) {
+        if self.take_answer_token(now, link, sender, kind) {
             self.push(link, answer);
         }
     }
 
-    /// Says on both links what a sender did: each `#` of the text stands for a number.
-    pub(crate) fn say_of(
+    /// Sends on both links a text about a sender's action; each `#` of the text stands for a number.
+    pub(crate) fn send_sender_text(
         &mut self,
         now: Instant,
-        sender: Sender,
+        sender: SenderKind,
         warning: bool,
         text: &'static str,
         numbers: [u32; 3],
     ) {
         for link in BOTH_LINKS {
-            self.answer(now, link, sender, Kind::Text, Outgoing::Count { warning, text, numbers });
+            self.queue_answer(
+                now,
+                link,
+                sender,
+                AnswerKind::Text,
+                Outgoing::Count { warning, text, numbers },
+            );
         }
     }
 
-    /// Says who did something.
-    pub(crate) fn log_sender(&mut self, now: Instant, sender: Sender, text: &'static str, from: (u8, u8)) {
-        self.say_of(now, sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
+    /// Sends a text that names the sender of a message.
+    pub(crate) fn log_sender(
+        &mut self,
+        now: Instant,
+        sender: SenderKind,
+        text: &'static str,
+        from: (u8, u8),
+    ) {
+        self.send_sender_text(now, sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
     }
 
-    /// Says by whom a command was given that took effect.
-    pub(crate) fn log_command(&mut self, now: Instant, sender: Sender, command: &Command) {
+    /// Sends a text that names the sender of a command that took effect.
+    pub(crate) fn log_command(&mut self, now: Instant, sender: SenderKind, command: &Command) {
         self.log_sender(now, sender, command.log_text(), command.from);
     }
 
     /// The answer that this very command frame got lately, `Some(None)` if none yet; `None` for a
     /// frame not seen.
-    pub(crate) fn answered(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
-        self.repeats.answered(frame, now)
+    pub(crate) fn previous_answer(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
+        self.repeats.previous_answer(frame, now)
     }
 
     /// Remembers a command frame and its answer.
-    pub(crate) fn remember(&mut self, frame: &Frame, result: Option<u8>, now: Instant) {
+    pub(crate) fn remember_answer(&mut self, frame: &Frame, result: Option<u8>, now: Instant) {
         self.repeats.remember(frame, result, now);
     }
 
     /// Whether the radio's rate limit lets another frame out.
-    pub(crate) fn radio_allows(&mut self, now: Instant, armed: bool) -> bool {
-        self.radio.allows(now, armed)
+    pub(crate) fn may_send_by_radio(&mut self, now: Instant, armed: bool) -> bool {
+        self.radio.may_send(now, armed)
     }
 
     /// Whether half of the radio's rate limit is left.
-    pub(crate) fn radio_half_full(&self) -> bool {
+    pub(crate) fn is_radio_bucket_half_full(&self) -> bool {
         self.radio.is_half_full()
     }
 
-    /// Bytes that went out by radio beside the state.
-    pub(crate) fn spend(&mut self, bytes: usize) {
-        self.radio.spend(bytes);
+    /// Counts bytes sent by radio in addition to the state messages.
+    pub(crate) fn count_radio_bytes(&mut self, bytes: usize) {
+        self.radio.count_bytes(bytes);
     }
 
     /// The header of the next frame of a link.
-    pub(crate) fn header(&mut self, link: Link, system: u8) -> Header {
-        self.outboxes[link as usize].header(system)
+    pub(crate) fn next_header(&mut self, link: Link, system: u8) -> Header {
+        self.outboxes[link as usize].next_header(system)
     }
 
     /// The header of an intent: its number is remembered, so that an echo of it shows how late messages are.
     pub(crate) fn intent_header(&mut self, system: u8, now: Instant) -> Header {
-        let header = self.header(Link::Swarm, system);
-        self.sent.note(header.sequence, now);
+        let header = self.next_header(Link::Swarm, system);
+        self.sent.note_sent(header.sequence, now);
         header
     }
 
@@ -194,12 +219,12 @@ impl Links {
     }
 
     /// Time that a message takes one way, seconds, by an echo of an own intent.
-    pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
-        self.sent.delay_s(echo, now)
+    pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
+        self.sent.message_delay_s(echo, now)
     }
 
     /// Writes the first message that waits on a link; 0 if none does.
-    pub(crate) fn transmit(&mut self, link: Link, system: u8, out: &mut [u8]) -> usize {
-        self.outboxes[link as usize].transmit(system, out)
+    pub(crate) fn write_queued(&mut self, link: Link, system: u8, out: &mut [u8]) -> usize {
+        self.outboxes[link as usize].write_first(system, out)
     }
 }

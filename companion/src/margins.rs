@@ -8,7 +8,7 @@
 //! | tracking, at a crawl | [`CRAWL_TRACKING_M`] | m | the same of a vehicle that flies so slowly that it could as well hover |
 //! | estimate | [`ACCURACY_FACTOR`] × the reported accuracy, at least `FLK_EST_M` | m | how far the estimate is from the truth |
 //! | accuracy's age | [`MAX_ACCURACY_AGE`] | s | three reports of a stream at 1 Hz |
-//! | gust | scenario | m | the desk adds what a gust is announced to push ([`room_m`]'s caller); on board it is part of the margin |
+//! | gust | scenario | m | the desk adds what a gust is announced to push ([`estimate_margin_m`]'s caller); on board it is part of the margin |
 //!
 //! What is left for the estimate is compared with its bound. A bound worse than what is left at cruise refuses the start and
 //! slows the vehicle in flight; one worse than what is left at a crawl stops it. A bound of at most [`MIN_ESTIMATE_ERROR_M`] refuses
@@ -17,7 +17,8 @@
 //! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights PX4's SIH reported 0.25 m while
 //! the estimate was 0.7 m off: a receiver's bias and a barometer's drift look to the filter like the truth. Three times
 //! the reported accuracy covers that case, and no proof says that it covers the next. ArduCopter reports ratios and no metres: a
-//! consistent estimate with a constant error looks sound. So whoever flies near walls vouches for the receiver by `FLK_EST_M`.
+//! consistent estimate with a constant error looks sound. An operator who flies near walls vouches for the receiver by
+//! `FLK_EST_M`.
 
 use crate::time::Duration;
 
@@ -36,31 +37,33 @@ pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 /// Distance by which two vehicles over an area may be nearer than they believe, metres: the part of
 /// the clearance left to each for its estimate. Both are kept apart by this beside the safety
 /// distance, where no gates separate them.
-pub(crate) fn stray_m(clearance_m: f32, radius_m: f32) -> f32 {
-    2.0 * libm::fmaxf(room_m(clearance_m, radius_m, TRACKING_M), 0.0)
+pub(crate) fn pair_position_error_m(clearance_m: f32, radius_m: f32) -> f32 {
+    2.0 * libm::fmaxf(estimate_margin_m(clearance_m, radius_m, TRACKING_M), 0.0)
 }
 
 /// The part of the clearance that hull and tracking leave for the estimate and for gusts, metres;
 /// negative if nothing.
-pub fn room_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f32 {
+pub fn estimate_margin_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f32 {
     clearance_m - radius_m - tracking_m
 }
 
-/// Whether a bound fits into a room. Both are sums of decimal fractions: a rounding error is no metre.
-pub fn fits(bound_m: f32, room_m: f32) -> bool {
+/// Whether a bound is within a margin, with a tolerance for rounding.
+pub fn is_bound_within(bound_m: f32, room_m: f32) -> bool {
     bound_m <= room_m + 1e-4
 }
 
 /// Share of the cruise speed at which the estimate's bound fits beside the tracking error: 1 where it fits at cruise, 0 where it
 /// does not even fit at a crawl.
-pub fn pace(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
-    let (cruise_m, crawl_m) =
-        (room_m(clearance_m, radius_m, TRACKING_M), room_m(clearance_m, radius_m, CRAWL_TRACKING_M));
-    if fits(bound_m, cruise_m) {
+pub fn speed_share_for_bound(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
+    let (cruise_m, crawl_m) = (
+        estimate_margin_m(clearance_m, radius_m, TRACKING_M),
+        estimate_margin_m(clearance_m, radius_m, CRAWL_TRACKING_M),
+    );
+    if is_bound_within(bound_m, cruise_m) {
         return 1.0;
     }
     // NaN and infinity stop it.
-    if !fits(bound_m, crawl_m) {
+    if !is_bound_within(bound_m, crawl_m) {
         return 0.0;
     }
     // At the end of it the vehicle still moves, so that it comes to where the estimate is better.
@@ -76,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_vehicle_slows_as_its_estimate_gets_worse_and_stops() {
-        let of = |bound_m| pace(bound_m, 0.8, 0.3);
+        let of = |bound_m| speed_share_for_bound(bound_m, 0.8, 0.3);
         assert_eq!((of(0.1), of(0.25), of(0.41), of(f32::INFINITY), of(f32::NAN)), (1.0, 1.0, 0.0, 0.0, 0.0));
         assert!(of(0.3) < 1.0 && of(0.35) < of(0.3) && of(0.4) >= MIN_SPEED_SHARE);
     }
@@ -85,7 +88,7 @@ mod tests {
         #[test]
         fn pace_never_grows_with_the_bound(a in 0f32..3.0, b in 0f32..3.0, clearance_m in 0.1f32..4.0, radius_m in 0.05f32..2.0) {
             let (good, bad) = (a.min(b), a.max(b));
-            let [fast, slow] = [good, bad].map(|bound_m| pace(bound_m, clearance_m, radius_m));
+            let [fast, slow] = [good, bad].map(|bound_m| speed_share_for_bound(bound_m, clearance_m, radius_m));
             proptest::prop_assert!(fast >= slow && (0.0..=1.0).contains(&fast));
             // A moving vehicle keeps its hull inside the clearance.
             let tracking_m = |pace: f32| if pace == 1.0 { TRACKING_M } else { CRAWL_TRACKING_M };

@@ -1,6 +1,6 @@
 //! The mission as an ordered transition table and a pure update function.
 //!
-//! [`update`] goes through [`TABLE`] from the top and takes the first row whose `from` holds the state and whose guard has
+//! [`first_applicable_row`] goes through [`TABLE`] from the top and takes the first row whose `from` holds the state and whose guard has
 //! held for the row's limit. Order is rank: the pilot and the failsafe come first. `docs/table.md` prints the same table, and
 //! a test compares the two.
 
@@ -19,20 +19,20 @@ pub(crate) use self::table::UNFOLLOWED_MOST;
 
 pub use self::guard::Guard;
 pub(crate) use self::guard::MAX_POSITION_AGE;
-pub use self::inputs::Inputs;
-use self::row::bits;
-pub use self::row::{Action, Row};
-pub use self::state::{Interrupted, State, To};
+pub use self::inputs::GuardInputs;
+use self::row::state_mask;
+pub use self::row::{Action, TransitionRow};
+pub use self::state::{InterruptedStates, State, TargetState};
 
 /// Whether some row of `state` waits for `guard`: a command that none waits for is refused.
-pub fn awaits(state: State, guard: Guard) -> bool {
-    TABLE.iter().any(|row| row.guard == guard && row.states & bits(&[state]) != 0)
+pub fn has_row_for(state: State, guard: Guard) -> bool {
+    TABLE.iter().any(|row| row.guard == guard && row.states & state_mask(&[state]) != 0)
 }
 
 /// The first row that applies.
-pub fn update(state: State, inputs: &Inputs) -> Option<&'static Row> {
-    let here = bits(&[state]);
-    TABLE.iter().find(|row| row.states & here != 0 && row.guard.holds(inputs, row.limit))
+pub fn first_applicable_row(state: State, inputs: &GuardInputs) -> Option<&'static TransitionRow> {
+    let here = state_mask(&[state]);
+    TABLE.iter().find(|row| row.states & here != 0 && row.guard.is_met(inputs, row.min_duration))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::storage::mission_file::MissionView;
 
 /// A step of a plan with goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum PlanStep {
     /// Lengths of the shortest paths from starts to goals.
     Search,
     /// Which vehicle flies to which goal.
@@ -28,36 +28,36 @@ pub enum Step {
 /// desk measures their times.
 ///
 /// # Errors
-/// Why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or goals.
-pub fn goals<const N: usize, const V: usize, const W: usize, const P: usize>(
+/// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or goals.
+pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize>(
     mission: &MissionView<'_>,
     roadmap: &RoadmapView<'_>,
     gates_most: usize,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
-    mut done: impl FnMut(Step),
+    mut done: impl FnMut(PlanStep),
 ) -> Result<(), PlanError> {
     let (mut tasks, mut descents_m) = (Vec::<_, V>::new(), Vec::<_, V>::new());
     let request =
-        mission.request(&mut tasks, &mut descents_m, gates_most).map_err(|_| PlanError::SwarmFull)?;
+        mission.plan_request(&mut tasks, &mut descents_m, gates_most).map_err(|_| PlanError::SwarmFull)?;
     let mut goals = plan::Goals::new();
-    plan::costs(roadmap, &request, ws)?;
-    done(Step::Search);
-    plan::assign(&request, ws, &mut goals)?;
-    done(Step::Assignment);
-    plan::schedule(roadmap, &request, &goals, ws, out)?;
-    done(Step::Schedule);
+    plan::compute_costs(roadmap, &request, ws)?;
+    done(PlanStep::Search);
+    plan::assign_goals(&request, ws, &mut goals)?;
+    done(PlanStep::Assignment);
+    plan::schedule_flights(roadmap, &request, &goals, ws, out)?;
+    done(PlanStep::Schedule);
     Ok(())
 }
 
 impl From<PlanError> for PlanFailure {
     fn from(error: PlanError) -> Self {
-        failure(&error)
+        plan_failure(&error)
     }
 }
 
 /// The companion's failure for an error of the planner.
-fn failure(error: &PlanError) -> PlanFailure {
+fn plan_failure(error: &PlanError) -> PlanFailure {
     match error {
         PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,
         PlanError::Config(_) | PlanError::BadTask(_) | PlanError::BadDescent(_) | PlanError::SameGoal(_) => {

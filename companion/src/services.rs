@@ -12,39 +12,39 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use self::ftp::Ftp;
-use self::parameters::{Parameters, Refused};
+use self::parameters::{ParameterError, Parameters};
 use crate::config::Config;
 use crate::events::Link;
 use crate::link::Links;
-use crate::link::answer_limits::{Kind, Sender};
+use crate::link::answer_limits::{AnswerKind, SenderKind};
 use crate::link::frame::Frame;
 use crate::link::outbox::Outgoing;
-use crate::storage::store::{self, Erasing, Fault, FlashRequest, Store};
+use crate::storage::store::{self, ErasePermission, FlashFault, FlashRequest, Store};
 use crate::time::Instant;
 
 /// `MAV_PARAM_TYPE_REAL32`.
 const PARAM_TYPE_REAL32: u8 = 9;
 
-/// A frame, from which link and sender it came, and when.
+/// A received frame with its link, its sender and its time of arrival.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Heard<'a> {
+pub(crate) struct ReceivedFrame<'a> {
     pub(crate) link: Link,
-    pub(crate) sender: Sender,
+    pub(crate) sender: SenderKind,
     pub(crate) frame: &'a Frame,
     pub(crate) now: Instant,
     /// System id of this vehicle.
     pub(crate) own: u8,
 }
 
-impl Heard<'_> {
+impl ReceivedFrame<'_> {
     /// System and component of the sender.
-    fn from(&self) -> (u8, u8) {
+    fn sender_ids(&self) -> (u8, u8) {
         (self.frame.system, self.frame.component)
     }
 
     /// Queues an answer, unless its rate or the queue is used up.
-    fn answer(&self, links: &mut Links, kind: Kind, answer: Outgoing) {
-        links.answer(self.now, self.link, self.sender, kind, answer);
+    fn queue_answer(&self, links: &mut Links, kind: AnswerKind, answer: Outgoing) {
+        links.queue_answer(self.now, self.link, self.sender, kind, answer);
     }
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct Services {
     /// Cruise, climb and descent of the mission, m/s, which parameters may limit.
     nominal_mps: [f32; 3],
     /// A parameter was set that is not in use yet.
-    untuned: bool,
+    unapplied: bool,
 }
 
 impl Services {
@@ -66,11 +66,11 @@ impl Services {
     pub(crate) fn new<const V: usize>(config: &Config<V>) -> Self {
         let nominal_mps = [config.cruise_mps, config.climb_mps, config.descend_mps];
         let (parameters, ftp) = (Parameters::default(), Ftp::default());
-        Self { store: None, parameters, ftp, nominal_mps, untuned: false }
+        Self { store: None, parameters, ftp, nominal_mps, unapplied: false }
     }
 
     /// Keeps files and parameters in a flash from now on.
-    pub(crate) fn mount(&mut self, store: Store) {
+    pub(crate) fn attach_store(&mut self, store: Store) {
         self.store = Some(store);
     }
 
@@ -79,21 +79,21 @@ impl Services {
         self.store.as_ref().map_or(&[], Store::photographed)
     }
 
-    /// Keeps that.
-    pub(crate) fn keep_photographed(&mut self, photographed: store::Photographed) {
+    /// Stores them in flash.
+    pub(crate) fn store_photographed(&mut self, photographed: store::Photographed) {
         if let Some(store) = &mut self.store {
-            store.keep_photographed(photographed);
+            store.store_photographed(photographed);
         }
     }
 
     /// Whether a parameter was set that is not in use yet.
-    pub(crate) fn is_untuned(&self) -> bool {
-        self.untuned
+    pub(crate) fn has_unapplied_parameters(&self) -> bool {
+        self.unapplied
     }
 
-    /// Puts the parameters to use.
-    pub(crate) fn tune<const V: usize>(&mut self, config: &mut Config<V>) {
-        self.untuned = false;
+    /// Applies the parameters to the settings.
+    pub(crate) fn apply_parameters<const V: usize>(&mut self, config: &mut Config<V>) {
+        self.unapplied = false;
         [config.cruise_mps, config.climb_mps, config.descend_mps] = self.nominal_mps;
         self.parameters().apply(config);
     }
@@ -102,52 +102,57 @@ impl Services {
     pub(crate) fn poll_flash(
         &mut self,
         now: Instant,
-        erasing: Erasing,
+        erasing: ErasePermission,
         links: &mut Links,
     ) -> Option<FlashRequest<'_>> {
         let store = self.store.as_mut()?;
-        self.ftp.advance(store, now, erasing);
-        if let Some((warning, text)) = self.ftp.text() {
-            links.say(warning, text);
+        self.ftp.continue_work(store, now, erasing);
+        if let Some((warning, text)) = self.ftp.take_text() {
+            links.send_text(warning, text);
         }
-        store.poll(erasing)
+        store.poll_request(erasing)
     }
 
-    /// Takes in how the flash did it: the bytes read, none for an erasure or a program.
-    pub(crate) fn handle_flash(&mut self, outcome: Result<&[u8], Fault>) {
-        if let Some(answer) = self.store.as_mut().and_then(|store| store.handle(outcome)) {
-            self.ftp.answer(answer);
+    /// Handles how the flash did it: the bytes read, none for an erasure or a program.
+    pub(crate) fn handle_flash(&mut self, outcome: Result<&[u8], FlashFault>) {
+        if let Some(answer) = self.store.as_mut().and_then(|store| store.handle_outcome(outcome)) {
+            self.ftp.handle_read_outcome(answer);
         }
     }
 
     /// The next FTP packet for a link.
     pub(crate) fn poll_ftp(&mut self, link: Link) -> Option<[u8; ftp::PAYLOAD_LEN]> {
-        self.ftp.poll(link as usize)
+        self.ftp.poll_reply(link as usize)
     }
 
-    /// Serves a frame, if it is one for the services; whether it was.
-    pub(crate) fn serve(&mut self, heard: &Heard<'_>, links: &mut Links) -> bool {
+    /// Handles a frame that is addressed to the services. Returns whether it was.
+    pub(crate) fn handle_frame(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) -> bool {
         let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPANION_COMPONENT));
-        if heard.from() == own {
+        if heard.sender_ids() == own {
             return false;
         }
         let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
         match heard.frame.message_id {
             ftp::MESSAGE if (p[1], p[2]) == own => {
                 // A request of another sender is not even answered: sessions are scarce.
-                if self.store.is_some() && heard.sender == Sender::GroundStation {
+                if self.store.is_some() && heard.sender == SenderKind::GroundStation {
                     if ftp::changes_files(p) {
-                        links.log_sender(heard.now, heard.sender, "File request from #/#", heard.from());
+                        links.log_sender(
+                            heard.now,
+                            heard.sender,
+                            "File request from #/#",
+                            heard.sender_ids(),
+                        );
                     }
-                    self.ftp.handle(heard.link as usize, heard.now, heard.frame);
+                    self.ftp.queue_request(heard.link as usize, heard.now, heard.frame);
                 }
             }
             PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
-                (0..parameters::PARAMETER_COUNT).for_each(|index| self.tell_parameter(heard, index, links));
+                (0..parameters::PARAMETER_COUNT).for_each(|index| self.send_parameter(heard, index, links));
             }
-            PARAM_REQUEST_READ_DATA::ID if for_us(2) => self.read_parameter(heard, links),
-            PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(heard, links),
-            TIMESYNC_DATA::ID => answer_time(heard, links),
+            PARAM_REQUEST_READ_DATA::ID if for_us(2) => self.handle_parameter_read(heard, links),
+            PARAM_SET_DATA::ID if for_us(4) => self.handle_parameter_set(heard, links),
+            TIMESYNC_DATA::ID => answer_timesync(heard, links),
             _ => return false,
         }
         true
@@ -157,15 +162,15 @@ impl Services {
         self.store.as_ref().map_or(&self.parameters, Store::parameters)
     }
 
-    fn read_parameter(&self, heard: &Heard<'_>, links: &mut Links) {
+    fn handle_parameter_read(&self, heard: &ReceivedFrame<'_>, links: &mut Links) {
         let p = heard.frame.padded();
         let index = i16::from_le_bytes([p[0], p[1]]);
         let found = match usize::try_from(index) {
             Ok(index) => Some(index).filter(|index| *index < parameters::PARAMETER_COUNT),
-            Err(_) => Parameters::index_of(name(&p[4..20])),
+            Err(_) => Parameters::index_of(parameter_name(&p[4..20])),
         };
         match found {
-            Some(index) => self.tell_parameter(heard, index, links),
+            Some(index) => self.send_parameter(heard, index, links),
             None if p[3] == crate::COMPANION_COMPONENT => {
                 let why = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
                 refuse_parameter(heard, index, &p[4..20], why, links);
@@ -174,44 +179,44 @@ impl Services {
         }
     }
 
-    fn tell_parameter(&self, heard: &Heard<'_>, index: usize, links: &mut Links) {
+    fn send_parameter(&self, heard: &ReceivedFrame<'_>, index: usize, links: &mut Links) {
         if let Some((name, value)) = self.parameters().get(index) {
             let count = parameters::PARAMETER_COUNT as u16;
             let answer = Outgoing::ParameterValue { index, count, name, value };
-            heard.answer(links, Kind::Parameter, answer);
+            heard.queue_answer(links, AnswerKind::Parameter, answer);
         }
     }
 
-    /// Sets a parameter; it is in use from the next [`Self::tune`] on.
-    pub(crate) fn set(&mut self, index: usize, value: f32) -> Result<(), Refused> {
+    /// Sets a parameter; it is in use from the next [`Self::apply_parameters`] on.
+    pub(crate) fn set_parameter_value(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
         match &mut self.store {
             Some(store) => store.set_parameter(index, value),
             None => self.parameters.set(index, value).map(|_| ()),
         }
     }
 
-    fn set_parameter(&mut self, heard: &Heard<'_>, links: &mut Links) {
+    fn handle_parameter_set(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) {
         let p = heard.frame.padded();
         let (value, kind) = (f32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[22]);
-        let found = Parameters::index_of(name(&p[6..22]));
+        let found = Parameters::index_of(parameter_name(&p[6..22]));
         let result = match found {
             None => Err(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST),
-            Some(_) if heard.sender != Sender::GroundStation => {
+            Some(_) if heard.sender != SenderKind::GroundStation => {
                 Err(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED)
             }
             Some(_) if kind != PARAM_TYPE_REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
-            Some(index) => self.set(index, value).map_err(|why| match why {
-                Refused::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
-                Refused::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
+            Some(index) => self.set_parameter_value(index, value).map_err(|why| match why {
+                ParameterError::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+                ParameterError::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
             }),
         };
-        self.untuned |= result.is_ok();
+        self.unapplied |= result.is_ok();
         if result.is_ok() {
-            links.log_sender(heard.now, heard.sender, "Parameter set from #/#", heard.from());
+            links.log_sender(heard.now, heard.sender, "Parameter set from #/#", heard.sender_ids());
         }
         // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
         if let Some(index) = found {
-            self.tell_parameter(heard, index, links);
+            self.send_parameter(heard, index, links);
         }
         if let Err(why) = result
             && p[5] == crate::COMPANION_COMPONENT
@@ -221,31 +226,41 @@ impl Services {
     }
 }
 
-fn refuse_parameter(heard: &Heard<'_>, index: i16, name: &[u8], why: MavParamError, links: &mut Links) {
+fn refuse_parameter(
+    heard: &ReceivedFrame<'_>,
+    index: i16,
+    name: &[u8],
+    why: MavParamError,
+    links: &mut Links,
+) {
     let mut id = [0; 16];
     id.copy_from_slice(name);
-    let error = Outgoing::ParameterError { index, id, why: why as u8, to: heard.from() };
-    heard.answer(links, Kind::Parameter, error);
+    let error = Outgoing::ParameterError { index, id, why: why as u8, to: heard.sender_ids() };
+    heard.queue_answer(links, AnswerKind::Parameter, error);
 }
 
 /// TIMESYNC: bytes 16 and 17 name an addressee, 0 for all.
-fn answer_time(heard: &Heard<'_>, links: &mut Links) {
+fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     let p = heard.frame.padded();
     let to_us = (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPANION_COMPONENT);
     let request = heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_us);
     if let Some(request) = request {
-        let tc1 = heard.now.micros() as i64 * 1000;
-        heard.answer(links, Kind::Time, Outgoing::Timesync { tc1, ts1: request.ts1, to: heard.from() });
+        let tc1 = heard.now.as_micros() as i64 * 1000;
+        heard.queue_answer(
+            links,
+            AnswerKind::Time,
+            Outgoing::Timesync { tc1, ts1: request.ts1, to: heard.sender_ids() },
+        );
     }
 }
 
 /// A parameter's name as it travels: a zero ends a shorter one.
-fn name(field: &[u8]) -> &[u8] {
+fn parameter_name(field: &[u8]) -> &[u8] {
     field.split(|b| *b == 0).next().unwrap_or_default()
 }
 
 /// AUTOPILOT_VERSION: what it can do, and the version of this crate.
-pub(crate) fn version(system_id: u8) -> AUTOPILOT_VERSION_DATA {
+pub(crate) fn autopilot_version(system_id: u8) -> AUTOPILOT_VERSION_DATA {
     let [major, minor, patch] =
         [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")]
             .map(|part| part.parse::<u8>().unwrap_or(0));

@@ -1,4 +1,4 @@
-//! The other vehicles: what is heard of them, and ways around them.
+//! The other vehicles: what is heard of them, and detours around them.
 
 pub(crate) mod detour;
 pub mod fleet;

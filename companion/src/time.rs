@@ -25,12 +25,12 @@ impl Instant {
     }
 
     /// Microseconds since the start.
-    pub const fn micros(self) -> u64 {
+    pub const fn as_micros(self) -> u64 {
         self.0
     }
 
     /// Milliseconds since the start, wrapped to the 32 bits of MAVLink's `time_boot_ms`.
-    pub const fn boot_ms(self) -> u32 {
+    pub const fn as_boot_ms(self) -> u32 {
         (self.0 / 1000) as u32
     }
 
@@ -57,17 +57,17 @@ impl Duration {
     }
 
     /// In microseconds.
-    pub const fn micros(self) -> u64 {
+    pub const fn as_micros(self) -> u64 {
         self.0
     }
 
     /// Time by which this duration is longer than `other`; zero where it is shorter.
-    pub const fn beyond(self, other: Self) -> Self {
+    pub const fn saturating_sub(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
     }
 
     /// In seconds.
-    pub const fn secs_f32(self) -> f32 {
+    pub const fn as_secs_f32(self) -> f32 {
         // A board converts 32 bits in one instruction, 64 bits by software.
         let (high, low) = ((self.0 >> 32) as u32, self.0 as u32);
         (high as f32 * 4_294_967_296.0 + low as f32) * 1e-6

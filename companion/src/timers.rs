@@ -1,11 +1,11 @@
 //! The one table of what is due when.
 //!
-//! Three timers wake the shell ([`Timers::next`]): the step of the control loop, heartbeats, and the swarm's state. The rest are looked
+//! Three timers wake the shell ([`Timers::next_due`]): the step of the control loop, heartbeats, and the swarm's state. The rest are looked
 //! at in each step: what they name happens in the first step at or after their time.
 
 use crate::time::{Duration, Instant};
 
-/// Actions that can be due.
+/// Periodic and delayed actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Timer {
     /// A step of the control loop.
@@ -52,7 +52,7 @@ impl Timers {
     }
 
     /// Due at this time, or earlier if it already was.
-    pub(crate) fn hasten(&mut self, timer: Timer, at: Instant) {
+    pub(crate) fn set_no_later(&mut self, timer: Timer, at: Instant) {
         let due_at = &mut self.due_at[timer as usize];
         *due_at = (*due_at).min(at);
     }
@@ -63,7 +63,7 @@ impl Timers {
     }
 
     /// Whether it is due; if so, it is next due after `every`.
-    pub(crate) fn take(&mut self, timer: Timer, now: Instant, every: Duration) -> bool {
+    pub(crate) fn take_due(&mut self, timer: Timer, now: Instant, every: Duration) -> bool {
         let due = self.is_due(timer, now);
         if due {
             self.set(timer, now + every);
@@ -71,19 +71,19 @@ impl Timers {
         due
     }
 
-    /// Due again `every` after it was due: a rhythm, which begins again after a gap instead of catching up.
-    pub(crate) fn repeat(&mut self, timer: Timer, now: Instant, every: Duration) {
+    /// Sets the next due time to `every` after the last one. After a gap the period starts again instead of catching up.
+    pub(crate) fn schedule_next(&mut self, timer: Timer, now: Instant, every: Duration) {
         let due = self.due_at[timer as usize] + every;
         self.set(timer, if due > now { due } else { now + every });
     }
 
     /// Time since the step before, seconds; this is the next.
     pub(crate) fn step_s(&mut self, now: Instant) -> f32 {
-        (now - core::mem::replace(&mut self.stepped_at, now)).secs_f32()
+        (now - core::mem::replace(&mut self.stepped_at, now)).as_secs_f32()
     }
 
     /// When the shell is to call again.
-    pub(crate) fn next(&self) -> Instant {
+    pub(crate) fn next_due(&self) -> Instant {
         WAKING_TIMERS
             .iter()
             .fold(self.due_at[Timer::Step as usize], |next, timer| next.min(self.due_at[*timer as usize]))

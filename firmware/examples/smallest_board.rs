@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 use std::task::Waker;
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
-use companion::storage::store::{Fault, Layout, ReadFlash, Store};
+use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, Store};
 use companion::{AUTOPILOT_COMPONENT, Config, Link};
 use embassy_futures::block_on;
 use embassy_futures::join::{join, join5};
@@ -20,9 +20,9 @@ use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Timer};
 use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
 use firmware::flash::Flash;
-use firmware::planner::{Memory, Own, Planner};
-use firmware::scratch::Scratch;
-use firmware::shell::{Shell, hear_system_id};
+use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
+use firmware::scratch::WorkspaceOverlay;
+use firmware::shell::{Shell, wait_for_system_id};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -53,26 +53,26 @@ static FROM_RADIO: Line = Line::new();
 static TO_RADIO: Line = Line::new();
 
 /// A flash that forgets: erased, its bytes are 0xff.
-const LAYOUT: Layout = Layout::PICO2;
+const LAYOUT: FlashLayout = FlashLayout::PICO2;
 struct Ram(Vec<u8>);
 
 impl ReadFlash for Ram {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        let bytes = self.0.get(at as usize..at as usize + out.len()).ok_or(Fault)?;
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
+        let bytes = self.0.get(at as usize..at as usize + out.len()).ok_or(FlashFault)?;
         out.copy_from_slice(bytes);
         Ok(())
     }
 }
 
 impl Flash for Ram {
-    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+    async fn erase(&mut self, at: u32) -> Result<(), FlashFault> {
         let sector = at as usize..(at + LAYOUT.sector_len) as usize;
-        self.0.get_mut(sector).ok_or(Fault)?.fill(0xff);
+        self.0.get_mut(sector).ok_or(FlashFault)?.fill(0xff);
         Ok(())
     }
 
-    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
-        let words = self.0.get_mut(at as usize..at as usize + bytes.len()).ok_or(Fault)?;
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), FlashFault> {
+        let words = self.0.get_mut(at as usize..at as usize + bytes.len()).ok_or(FlashFault)?;
         words.copy_from_slice(bytes);
         Ok(())
     }
@@ -81,31 +81,31 @@ impl Flash for Ram {
 // All that is large lies in statics.
 static SHELL: Shell = Shell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
-static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static SWARM: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
-static OWN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
+static OWN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
 
 /// Brings a companion up and runs it; nothing is uploaded, so it has no mission.
 async fn board() {
     let mut flash = Ram(vec![0xff; LAYOUT.len() as usize]);
     let store = Store::mount(LAYOUT, &mut flash);
-    let system_id = hear_system_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
+    let system_id = wait_for_system_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
     let nowhere = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
     let settings =
         Config::new(system_id, Point::zeros(), nowhere).checked().expect("these settings are sound");
-    let companion = BoardCompanion::make_in(COMPANION.uninit(), settings);
-    companion.mount(store);
+    let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
+    companion.attach_store(store);
     SHELL.start(companion);
-    let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM.take(), own: OWN.take() };
+    let memory = PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM.take(), own: OWN.take() };
     let mut planner = Planner { roadmap: None, field: None, mission: None, system_id, files: 0, memory };
     let links = join5(
         SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, false),
         SHELL.receive(Link::Swarm, &FROM_RADIO, false),
         SHELL.transmit(Link::Autopilot, &TO_AUTOPILOT),
         SHELL.transmit(Link::Swarm, &TO_RADIO),
-        SHELL.keep_time(),
+        SHELL.run_timers(),
     );
-    join(links, SHELL.work(&mut planner, &mut flash)).await;
+    join(links, SHELL.run_planner_and_flash(&mut planner, &mut flash)).await;
 }
 
 /// The far end of the autopilot's line: a HEARTBEAT each second, and what the board sends is counted.

@@ -6,7 +6,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
 use planner_core::flight::{Gate, Path};
 use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::prm::{Config, Sampling};
@@ -38,7 +38,7 @@ pub const CLEARANCE_M: f32 = 0.8;
 pub const ASSIGNMENT_MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
 
 /// A swarm for the terminals of a roadmap: one vehicle a start.
-pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
+pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
     let starts = view.header().starts.min(VEHICLES as u16);
     let task = |i: u16| VehicleTask {
         id: 1 + i as u8,
@@ -50,13 +50,13 @@ pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
 }
 
 /// Height of every goal above its ground, metres.
-pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
+pub fn goal_descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
     (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
 }
 
 /// The plan request for that swarm.
-pub fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
-    PlanRequest { vehicles, descents_m, mode: ASSIGNMENT_MODE, schedule: SCHEDULE, gates_most: GATES }
+pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
+    PlanRequest { vehicles, descents_m, mode: ASSIGNMENT_MODE, schedule: SCHEDULE, max_gates: GATES }
 }
 
 /// Scratch of [`plan_case`].
@@ -66,7 +66,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self { search: SearchWorkspace::new(), assignment: AssignmentWorkspace::new() }
     }
@@ -95,14 +95,15 @@ pub struct PlanCase {
 pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> PlanCase {
     let mut rng = Pcg32::seed_from_u64(number);
     let nodes = view.node_count();
-    let swarm = 1 + below(&mut rng, MAX_SWARM);
-    let draw =
-        |rng: &mut Pcg32| -> Vec<u16, MAX_SWARM> { (0..swarm).map(|_| below(rng, nodes) as u16).collect() };
+    let swarm = 1 + random_below(&mut rng, MAX_SWARM);
+    let draw = |rng: &mut Pcg32| -> Vec<u16, MAX_SWARM> {
+        (0..swarm).map(|_| random_below(rng, nodes) as u16).collect()
+    };
     let (starts, goals) = (draw(&mut rng), draw(&mut rng));
-    let required_m = uniform(&mut rng, 0.1, 1.0);
-    let blocked = below(&mut rng, nodes) as u16;
+    let required_m = random_between(&mut rng, 0.1, 1.0);
+    let blocked = random_below(&mut rng, nodes) as u16;
     let passable = |from: u16, edge: &HalfEdge| {
-        view.clears(edge, required_m) && from % 97 != blocked % 97 && edge.target != blocked
+        view.has_clearance(edge, required_m) && from % 97 != blocked % 97 && edge.target != blocked
     };
     let mut case = [CRC32.digest(), CRC32.digest(), CRC32.digest(), CRC32.digest()];
     let [costs_crc, assignment_crc, paths_crc, scales_crc] = &mut case;
@@ -133,23 +134,23 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
             let numbers = waypoint.position.iter().chain([&waypoint.along_m, &waypoint.clearance_m]);
             numbers.for_each(|number| paths_crc.update(&number.to_bits().to_le_bytes()));
         }
-        (0..ADVICE_PER_PATH).for_each(|_| look(&mut rng, &path, scales_crc));
+        (0..ADVICE_PER_PATH).for_each(|_| add_advice_along_path(&mut rng, &path, scales_crc));
     }
-    let [costs, assignment, paths, scales] = case.map(finished);
+    let [costs, assignment, paths, scales] = case.map(digest_value);
     PlanCase { costs, assignment, paths, scales }
 }
 
 /// Value of the digest by its type: the crate has one of each width.
-fn finished(digest: Digest<'_, u32, Table<1>>) -> u32 {
+fn digest_value(digest: Digest<'_, u32, Table<1>>) -> u32 {
     digest.finalize()
 }
 
-fn look(rng: &mut Pcg32, path: &Path<WAYPOINTS>, scales: &mut Digest<'_, u32, Table<1>>) {
-    let along_m = uniform(rng, 0.0, path.length_m());
+fn add_advice_along_path(rng: &mut Pcg32, path: &Path<WAYPOINTS>, scales: &mut Digest<'_, u32, Table<1>>) {
+    let along_m = random_between(rng, 0.0, path.length_m());
     let Some(position) = path.point_at(along_m) else { return };
     let neighbours: Vec<Neighbour, VEHICLES> =
-        (0..VEHICLES).map(|k| neighbour(rng, k, &position, 12.0)).collect();
-    let own = Own { rank: 3, position, along_m, path, detours: false };
+        (0..VEHICLES).map(|k| random_neighbour(rng, k, &position, 12.0)).collect();
+    let own = OwnVehicle { rank: 3, position, along_m, path, detours: false };
     for method in [Method::Priority, Method::Algorithm2] {
         let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
         let advice = deconflict::advise(&cfg, &own, &[], &neighbours);
@@ -159,13 +160,13 @@ fn look(rng: &mut Pcg32, path: &Path<WAYPOINTS>, scales: &mut Digest<'_, u32, Ta
     }
 }
 
-fn neighbour(rng: &mut Pcg32, k: usize, around: &Point, reach_m: f32) -> Neighbour {
+fn random_neighbour(rng: &mut Pcg32, k: usize, around: &Point, reach_m: f32) -> Neighbour {
     Neighbour {
         id: 2 + k as u8,
         rank: 1 + k as u16,
-        position: around + anywhere(rng, reach_m),
-        velocity: anywhere(rng, 3.0),
-        age_s: uniform(rng, 0.0, 2.0),
+        position: around + random_point(rng, reach_m),
+        velocity: random_point(rng, 3.0),
+        age_s: random_between(rng, 0.0, 2.0),
         ..Neighbour::default()
     }
 }
@@ -186,37 +187,39 @@ impl StepCase {
     pub fn new(rng: &mut Pcg32, neighbours: usize, hard: bool) -> Self {
         let cfg = DeconflictConfig {
             method: Method::Priority,
-            safety_distance_m: uniform(rng, 0.5, 3.0),
-            cruise_mps: uniform(rng, 0.5, 5.0),
+            safety_distance_m: random_between(rng, 0.5, 3.0),
+            cruise_mps: random_between(rng, 0.5, 5.0),
             accel_mps2: 1.5,
         };
         let mut path = Path::new();
         let mut at = Point::zeros();
-        for _ in 0..2 + below(rng, WAYPOINTS - 1) {
+        for _ in 0..2 + random_below(rng, WAYPOINTS - 1) {
             path.push(at, 1.0).expect("there is room");
-            at += anywhere(rng, 5.0);
+            at += random_point(rng, 5.0);
         }
-        let along_m = uniform(rng, -1.0, path.length_m());
-        let position = path.point_at(along_m).expect("a path") + anywhere(rng, 0.2);
+        let along_m = random_between(rng, -1.0, path.length_m());
+        let position = path.point_at(along_m).expect("a path") + random_point(rng, 0.2);
         let reach_m = if hard { 3.0 } else { path.length_m() };
         let gate = |rng: &mut Pcg32| Gate {
-            at_m: along_m + uniform(rng, 0.0, reach_m),
-            id: 2 + below(rng, neighbours.max(1)) as u8,
-            until_m: uniform(rng, 0.0, 60.0),
+            at_m: along_m + random_between(rng, 0.0, reach_m),
+            id: 2 + random_below(rng, neighbours.max(1)) as u8,
+            until_m: random_between(rng, 0.0, 60.0),
         };
-        let mut gates: Vec<_, GATES> = (0..below(rng, GATES + 1)).map(|_| gate(rng)).collect();
+        let mut gates: Vec<_, GATES> = (0..random_below(rng, GATES + 1)).map(|_| gate(rng)).collect();
         gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
-        let unplanned = if hard { 1.0 } else { uniform(rng, 0.0, 1.0) };
+        let unplanned = if hard { 1.0 } else { random_between(rng, 0.0, 1.0) };
         // Half of the hard cases pass all gates, the other half have nobody's progress.
         let passed = hard && rng.next_u32().is_multiple_of(2);
         let neighbours = (0..neighbours.min(VEHICLES))
             .map(|k| Neighbour {
                 progress_m: match passed {
                     true => Some(100.0),
-                    false => (uniform(rng, 0.0, 1.0) > unplanned).then(|| uniform(rng, 0.0, 60.0)),
+                    false => {
+                        (random_between(rng, 0.0, 1.0) > unplanned).then(|| random_between(rng, 0.0, 60.0))
+                    }
                 },
                 grounded: !hard && rng.next_u32().is_multiple_of(8),
-                ..neighbour(rng, k, &position, if hard { 12.0 } else { 40.0 })
+                ..random_neighbour(rng, k, &position, if hard { 12.0 } else { 40.0 })
             })
             .collect();
         Self { cfg, position, along_m, path, gates, neighbours }
@@ -225,24 +228,24 @@ impl StepCase {
     /// The call that is counted.
     pub fn advise(&self, method: Method) -> Advice {
         let Self { position, along_m, path, .. } = self;
-        let own = Own { rank: 0, position: *position, along_m: *along_m, path, detours: false };
+        let own = OwnVehicle { rank: 0, position: *position, along_m: *along_m, path, detours: false };
         deconflict::advise(&DeconflictConfig { method, ..self.cfg }, &own, &self.gates, &self.neighbours)
     }
 }
 
 /// A random number below `limit`.
-pub fn below(rng: &mut Pcg32, limit: usize) -> usize {
+pub fn random_below(rng: &mut Pcg32, limit: usize) -> usize {
     rng.next_u32() as usize % limit
 }
 
 /// A random number between two.
-pub fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
+pub fn random_between(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
     low + (rng.next_u32() >> 8) as f32 / (1u32 << 24) as f32 * (high - low)
 }
 
 /// A random point of a cube about zero.
-pub fn anywhere(rng: &mut Pcg32, reach_m: f32) -> Point {
-    Point::from_fn(|_, _| uniform(rng, -reach_m, reach_m))
+pub fn random_point(rng: &mut Pcg32, reach_m: f32) -> Point {
+    Point::from_fn(|_, _| random_between(rng, -reach_m, reach_m))
 }
 
 /// Configuration of the roadmap built on board: P3D's building with 2300 nodes.
@@ -260,7 +263,7 @@ pub const ROADMAP_CONFIG: Config = Config {
 ///
 /// # Panics
 /// It is none.
-pub fn map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
+pub fn voxel_map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
     let word =
         |i: usize| u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]]);
     let shape = GridShape {

@@ -27,10 +27,10 @@ const UNKNOWN_RESTART: &str = "Restarted: watchdog, reset key or brown-out";
 /// Checksum of the kept record: a few bytes at a start and at an end need no table.
 static RECORD_CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// How a start ended.
+/// How a run of the firmware ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
-enum End {
+enum RunEnd {
     /// No run before this one: the memory was not kept.
     #[default]
     None = 0,
@@ -45,7 +45,7 @@ enum End {
 /// Work on uploaded files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Work {
+pub enum FileWork {
     /// No work on files.
     #[default]
     None = 0,
@@ -58,57 +58,57 @@ pub enum Work {
 }
 
 /// Work with certain files, identified by a checksum.
-type Task = (Work, u32);
+type Task = (FileWork, u32);
 
 /// The record that is kept over a restart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Kept {
-    end: End,
+pub struct CrashRecord {
+    end: RunEnd,
     text: String<TEXT>,
     /// Under way.
     task: Task,
     /// For each kind of work: the files with which it brought starts down, and how many in a row.
-    failed: [(u32, u32); WORK_KINDS],
+    failed_work: [(u32, u32); WORK_KINDS],
     /// A bit for each kind that came to its end in this start, with those files.
     done: u32,
 }
 
-impl Kept {
+impl CrashRecord {
     /// Result of a start: `kept` is the record that the memory holds, `cause` why the chip started.
     /// Returns the record to keep from now on, and the report of the end before.
-    pub fn start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<TEXT>>) {
+    pub fn on_start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<TEXT>>) {
         let mut kept = kept.filter(|_| cause != ResetCause::Power).unwrap_or_default();
-        let crashed = kept.end == End::Crashed;
+        let crashed = kept.end == RunEnd::Crashed;
         let said = match (kept.end, cause) {
-            (End::Crashed, _) => kept.text.as_str(),
+            (RunEnd::Crashed, _) => kept.text.as_str(),
             (_, ResetCause::Watchdog) => "Restarted: watchdog",
             (_, ResetCause::BrownOut) => "Restarted: brown-out",
-            (End::Runs, ResetCause::Key) => "Restarted: reset key",
-            (End::Runs, ResetCause::Request) => "Restarted: debugger",
-            (End::Runs, ResetCause::Unknown) => UNKNOWN_RESTART,
+            (RunEnd::Runs, ResetCause::Key) => "Restarted: reset key",
+            (RunEnd::Runs, ResetCause::Request) => "Restarted: debugger",
+            (RunEnd::Runs, ResetCause::Unknown) => UNKNOWN_RESTART,
             _ => "",
         };
         let said = String::try_from(said).ok().filter(|said| !said.is_empty());
         let by_itself = matches!(cause, ResetCause::Watchdog | ResetCause::Unknown);
         let (work, files) = kept.task;
-        for (i, failed) in kept.failed.iter_mut().enumerate() {
+        for (i, failed) in kept.failed_work.iter_mut().enumerate() {
             if work as usize != i + 1 {
                 // All such work of that start came to its end: the row is broken.
                 if kept.done >> i & 1 == 1 {
                     failed.1 = 0;
                 }
-            } else if crashed || kept.end == End::Runs && by_itself {
+            } else if crashed || kept.end == RunEnd::Runs && by_itself {
                 let before = if failed.0 == files { failed.1 } else { 0 };
                 *failed = (files, before.saturating_add(1));
             }
         }
-        (kept.task, kept.done, kept.end) = (Task::default(), 0, End::Runs);
+        (kept.task, kept.done, kept.end) = (Task::default(), 0, RunEnd::Runs);
         (kept, said)
     }
 
     /// The program ends by a panic or a fault, of which the next start reports `text`.
-    pub fn crash(&mut self, text: &str) {
-        self.end = End::Crashed;
+    pub fn note_crash(&mut self, text: &str) {
+        self.end = RunEnd::Crashed;
         self.text.clear();
         // A text too long is cut.
         let _ = text.chars().try_for_each(|c| self.text.push(c));
@@ -116,22 +116,22 @@ impl Kept {
 
     /// Whether it has ended.
     pub fn has_crashed(&self) -> bool {
-        self.end == End::Crashed
+        self.end == RunEnd::Crashed
     }
 
-    /// The program ends because a person requested that.
-    pub fn ask(&mut self) {
-        self.end = End::Asked;
+    /// Notes that an operator requested the restart.
+    pub fn note_requested_restart(&mut self) {
+        self.end = RunEnd::Asked;
     }
 
     /// Whether work with files may begin: it did not bring three starts in a row down.
-    pub fn may_begin(&self, work: Work, files: u32) -> bool {
-        let failed = (work as usize).checked_sub(1).map(|i| self.failed[i]);
+    pub fn may_begin(&self, work: FileWork, files: u32) -> bool {
+        let failed = (work as usize).checked_sub(1).map(|i| self.failed_work[i]);
         failed.is_none_or(|(of, times)| of != files || times < MAX_CRASHED_STARTS)
     }
 
     /// Begins work with files; false, and nothing begins, if it may not.
-    pub fn begin(&mut self, work: Work, files: u32) -> bool {
+    pub fn begin_work(&mut self, work: FileWork, files: u32) -> bool {
         let may = self.may_begin(work, files);
         if may {
             self.task = (work, files);
@@ -139,11 +139,11 @@ impl Kept {
         may
     }
 
-    /// The work came to its end.
-    pub fn finish(&mut self) {
+    /// Notes that the work has ended.
+    pub fn finish_work(&mut self) {
         let (work, files) = core::mem::take(&mut self.task);
         if let Some(i) = (work as usize).checked_sub(1)
-            && self.failed[i].0 == files
+            && self.failed_work[i].0 == files
         {
             self.done |= 1 << i;
         }
@@ -155,23 +155,24 @@ impl Kept {
         text[..self.text.len()].copy_from_slice(self.text.as_bytes());
         let mut words = [0; RECORD_WORDS];
         let head = [self.end as u32, self.text.len() as u32, self.task.0 as u32, self.task.1, self.done];
-        let failed = self.failed.iter().flat_map(|(files, times)| [*files, *times]);
+        let failed = self.failed_work.iter().flat_map(|(files, times)| [*files, *times]);
         let text = text.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let all = head.into_iter().chain(failed).chain(text);
         words.iter_mut().zip(all).for_each(|(word, value)| *word = value);
-        words[RECORD_WORDS - 1] = sum(&words);
+        words[RECORD_WORDS - 1] = checksum(&words);
         words
     }
 
     /// The record from words of memory; `None` where the checksum is wrong.
     pub fn from_words(words: &[u32; RECORD_WORDS]) -> Option<Self> {
-        let end =
-            [End::None, End::Runs, End::Crashed, End::Asked].into_iter().find(|e| *e as u32 == words[0])?;
-        if sum(words) != words[RECORD_WORDS - 1] {
+        let end = [RunEnd::None, RunEnd::Runs, RunEnd::Crashed, RunEnd::Asked]
+            .into_iter()
+            .find(|e| *e as u32 == words[0])?;
+        if checksum(words) != words[RECORD_WORDS - 1] {
             return None;
         }
         let work = |word: u32| {
-            let all = [Work::None, Work::CheckRoadmap, Work::ReadMission, Work::Plan];
+            let all = [FileWork::None, FileWork::CheckRoadmap, FileWork::ReadMission, FileWork::Plan];
             all.into_iter().find(|work| *work as u32 == word)
         };
         let mut bytes = [0; 4 * TEXT_WORDS];
@@ -183,14 +184,14 @@ impl Kept {
             end,
             text: String::try_from(text).ok()?,
             task: (work(words[2])?, words[3]),
-            failed: array::from_fn(|i| (words[5 + 2 * i], words[6 + 2 * i])),
+            failed_work: array::from_fn(|i| (words[5 + 2 * i], words[6 + 2 * i])),
             done: words[4],
         })
     }
 }
 
 /// The checksum of all words but the last.
-fn sum(words: &[u32; RECORD_WORDS]) -> u32 {
+fn checksum(words: &[u32; RECORD_WORDS]) -> u32 {
     let mut digest = RECORD_CRC.digest();
     words[..RECORD_WORDS - 1].iter().for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
@@ -203,34 +204,34 @@ mod tests {
     use super::*;
 
     /// A start from what the one before left.
-    fn start(kept: &Kept, cause: ResetCause) -> (Kept, Option<String<TEXT>>) {
+    fn start(kept: &CrashRecord, cause: ResetCause) -> (CrashRecord, Option<String<TEXT>>) {
         let words = kept.to_words();
-        let read = Kept::from_words(&words);
+        let read = CrashRecord::from_words(&words);
         assert_eq!(read.as_ref(), Some(kept), "as it was written");
-        Kept::start(read, cause)
+        CrashRecord::on_start(read, cause)
     }
 
     #[test]
     fn any_flipped_bit_is_noticed_and_so_is_memory_of_one_kind() {
-        let (mut kept, _) = Kept::start(None, ResetCause::Unknown);
-        kept.begin(Work::Plan, 7);
-        kept.crash("Restarted: panic at machine.rs:123");
+        let (mut kept, _) = CrashRecord::on_start(None, ResetCause::Unknown);
+        kept.begin_work(FileWork::Plan, 7);
+        kept.note_crash("Restarted: panic at machine.rs:123");
         let words = kept.to_words();
         for bit in 0..32 * RECORD_WORDS {
             let mut flipped = words;
             flipped[bit / 32] ^= 1 << (bit % 32);
-            assert_eq!(Kept::from_words(&flipped), None, "bit {bit}");
+            assert_eq!(CrashRecord::from_words(&flipped), None, "bit {bit}");
         }
         for word in [0, u32::MAX, 0xAAAA_AAAA, 0xcccc_cccc] {
-            assert_eq!(Kept::from_words(&[word; RECORD_WORDS]), None);
+            assert_eq!(CrashRecord::from_words(&[word; RECORD_WORDS]), None);
         }
     }
 
     #[test]
     fn each_end_is_said_as_it_was() {
-        let (fresh, said) = Kept::start(None, ResetCause::Unknown);
+        let (fresh, said) = CrashRecord::on_start(None, ResetCause::Unknown);
         assert_eq!(said, None, "nothing was before");
-        let says = |kept: &Kept, cause| start(kept, cause).1;
+        let says = |kept: &CrashRecord, cause| start(kept, cause).1;
         let rows = [
             (ResetCause::Power, None),
             (ResetCause::BrownOut, Some("Restarted: brown-out")),
@@ -243,20 +244,20 @@ mod tests {
             assert_eq!(says(&fresh, cause).as_deref(), said, "{cause:?}");
         }
         let mut asked = fresh.clone();
-        asked.ask();
+        asked.note_requested_restart();
         assert_eq!((says(&asked, ResetCause::Request), says(&asked, ResetCause::Unknown)), (None, None));
         let mut crashed = fresh;
-        crashed.crash("Restarted: panic at a_file_whose_name_is_so_long.rs:12345");
+        crashed.note_crash("Restarted: panic at a_file_whose_name_is_so_long.rs:12345");
         let cut = "Restarted: panic at a_file_whose_name_is_so_long.r";
         assert_eq!(says(&crashed, ResetCause::Request).as_deref(), Some(cut));
         assert_eq!(says(&crashed, ResetCause::Power), None, "memory of another day");
     }
 
     /// A start that ends amid a plan with these files; false if they are set aside.
-    fn fails(kept: &mut Kept, files: u32, cause: ResetCause, panics: bool) -> bool {
-        let begun = kept.begin(Work::Plan, files);
+    fn fails(kept: &mut CrashRecord, files: u32, cause: ResetCause, panics: bool) -> bool {
+        let begun = kept.begin_work(FileWork::Plan, files);
         if panics {
-            kept.crash("Restarted: panic");
+            kept.note_crash("Restarted: panic");
         }
         *kept = start(kept, cause).0;
         begun
@@ -267,38 +268,41 @@ mod tests {
         for (cause, panics) in
             [(ResetCause::Request, true), (ResetCause::Unknown, true), (ResetCause::Watchdog, false)]
         {
-            let mut kept = Kept::start(None, ResetCause::Power).0;
+            let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
             assert!((0..3).all(|_| fails(&mut kept, 7, cause, panics)));
-            assert!(!kept.begin(Work::Plan, 7), "three times");
+            assert!(!kept.begin_work(FileWork::Plan, 7), "three times");
             let again = start(&kept, ResetCause::Key).0;
-            assert!(!again.clone().begin(Work::Plan, 7), "still after a reset");
-            assert!(again.clone().begin(Work::Plan, 8), "others may be tried");
-            assert!(again.clone().begin(Work::CheckRoadmap, 7), "and other work");
-            assert!(start(&again, ResetCause::Power).0.begin(Work::Plan, 7), "not after the power was off");
+            assert!(!again.clone().begin_work(FileWork::Plan, 7), "still after a reset");
+            assert!(again.clone().begin_work(FileWork::Plan, 8), "others may be tried");
+            assert!(again.clone().begin_work(FileWork::CheckRoadmap, 7), "and other work");
+            assert!(
+                start(&again, ResetCause::Power).0.begin_work(FileWork::Plan, 7),
+                "not after the power was off"
+            );
         }
     }
 
     #[test]
     fn a_roadmap_that_was_set_aside_stays_so_while_a_mission_fails() {
-        let mut kept = Kept::start(None, ResetCause::Power).0;
+        let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
         for _ in 0..3 {
-            assert!(kept.begin(Work::CheckRoadmap, 1));
-            kept.crash("Restarted: fault");
+            assert!(kept.begin_work(FileWork::CheckRoadmap, 1));
+            kept.note_crash("Restarted: fault");
             kept = start(&kept, ResetCause::Request).0;
         }
         for _ in 0..3 {
-            assert!(!kept.begin(Work::CheckRoadmap, 1));
-            assert!(kept.begin(Work::CheckRoadmap, 2));
-            kept.finish();
+            assert!(!kept.begin_work(FileWork::CheckRoadmap, 1));
+            assert!(kept.begin_work(FileWork::CheckRoadmap, 2));
+            kept.finish_work();
             assert!(fails(&mut kept, 7, ResetCause::Request, true));
         }
-        assert!(!kept.begin(Work::CheckRoadmap, 1) && !kept.begin(Work::Plan, 7));
+        assert!(!kept.begin_work(FileWork::CheckRoadmap, 1) && !kept.begin_work(FileWork::Plan, 7));
     }
 
     #[test]
     fn only_starts_in_a_row_count_and_only_those_that_the_planner_brought_down() {
-        let fail = |kept: &mut Kept| assert!(fails(kept, 7, ResetCause::Request, true));
-        let mut kept = Kept::start(None, ResetCause::Power).0;
+        let fail = |kept: &mut CrashRecord| assert!(fails(kept, 7, ResetCause::Request, true));
+        let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
         (0..2).for_each(|_| fail(&mut kept));
         // A start in which nothing is planned changes nothing, nor one that somebody else ended.
         kept = start(&kept, ResetCause::Watchdog).0;
@@ -306,18 +310,18 @@ mod tests {
             assert!(fails(&mut kept, 7, cause, false));
         }
         // A plan that came to its end, after which another brought the start down, does not help.
-        assert!(kept.begin(Work::Plan, 7));
-        kept.finish();
+        assert!(kept.begin_work(FileWork::Plan, 7));
+        kept.finish_work();
         fail(&mut kept);
-        assert!(!kept.clone().begin(Work::Plan, 7));
+        assert!(!kept.clone().begin_work(FileWork::Plan, 7));
         // A start whose plans all came to their ends begins the count again.
-        let mut kept = Kept::start(None, ResetCause::Power).0;
+        let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
         (0..2).for_each(|_| fail(&mut kept));
-        assert!(kept.begin(Work::Plan, 7));
-        kept.finish();
-        kept.crash("Restarted: fault, not the planner's");
+        assert!(kept.begin_work(FileWork::Plan, 7));
+        kept.finish_work();
+        kept.note_crash("Restarted: fault, not the planner's");
         kept = start(&kept, ResetCause::Request).0;
         (0..3).for_each(|_| fail(&mut kept));
-        assert!(!kept.begin(Work::Plan, 7));
+        assert!(!kept.begin_work(FileWork::Plan, 7));
     }
 }

@@ -3,11 +3,11 @@
 
 use core::ops::{Deref, Range};
 
-/// Bytes of the flash that stay as they are. Whoever drops it leaves them lent for good.
+/// Bytes of the flash that stay as they are. If this is dropped, they stay lent for good.
 #[derive(Debug)]
-pub struct Lent(&'static [u8]);
+pub struct LentFlash(&'static [u8]);
 
-impl Deref for Lent {
+impl Deref for LentFlash {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -17,27 +17,27 @@ impl Deref for Lent {
 
 /// The ranges that a flash has lent: one at a time.
 #[derive(Debug, Default)]
-pub struct Lender {
+pub struct FlashLender {
     lent: Option<Range<u32>>,
 }
 
-impl Lender {
+impl FlashLender {
     /// A flash that has lent nothing.
     pub const fn new() -> Self {
         Self { lent: None }
     }
 
     /// Lends the bytes at this offset of the flash; `None` where others are lent.
-    pub fn lend(&mut self, at: u32, bytes: &'static [u8]) -> Option<Lent> {
+    pub fn lend(&mut self, at: u32, bytes: &'static [u8]) -> Option<LentFlash> {
         if self.lent.is_some() {
             return None;
         }
         self.lent = Some(at..at + bytes.len() as u32);
-        Some(Lent(bytes))
+        Some(LentFlash(bytes))
     }
 
     /// The lent bytes are not used any more.
-    pub fn take_back(&mut self, _lent: Lent) {
+    pub fn take_back(&mut self, _lent: LentFlash) {
         self.lent = None;
     }
 
@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn what_is_lent_is_not_changed_until_it_is_given_back() {
         static BYTES: [u8; 100] = [0; 100];
-        let mut lender = Lender::new();
+        let mut lender = FlashLender::new();
         assert!(lender.allows(0, u32::MAX));
         let lent = lender.lend(1000, &BYTES).expect("nothing else is lent");
         assert_eq!(lent.len(), 100);

@@ -18,11 +18,11 @@ use firmware::boards::chosen::{self, Flash, LAYOUT, Parts, Receiver, Transmitter
 use firmware::boards::parts::MAX_WARNINGS;
 use firmware::boards::{crash, sleep};
 use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
-use firmware::kept::Work;
-use firmware::lent::Lent;
-use firmware::planner::{Memory, Own, Planner};
-use firmware::scratch::Scratch;
-use firmware::shell::{CHECK_IN_EVERY, ID_WITHOUT_AUTOPILOT, Shell, hear_system_id};
+use firmware::kept::FileWork;
+use firmware::lent::LentFlash;
+use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
+use firmware::scratch::WorkspaceOverlay;
+use firmware::shell::{CHECK_IN_EVERY, ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id};
 use heapless::{String, Vec};
 use planner_core::Point;
 use planner_core::field::FieldView;
@@ -45,9 +45,9 @@ const MISSION_SET_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row
 // `memory.x` names these: each lies where it says. Their first values are all zeros.
 static SHELL: StaticCell<Shell> = StaticCell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
-static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
-static OWN_PLAN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
+static OWN_PLAN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
 static MISSION_BYTES: ConstStaticCell<[u8; MISSION_LEN]> = ConstStaticCell::new([0; MISSION_LEN]);
 static CRASH: StaticCell<String<50>> = StaticCell::new();
 static REFUSED: StaticCell<String<50>> = StaticCell::new();
@@ -70,49 +70,51 @@ fn main() -> ! {
     #[cfg(any(feature = "nucleo-h743", feature = "qemu"))]
     // SAFETY: nothing runs yet, and the chip's memories do since it was asked for the cause.
     unsafe {
-        firmware::boards::sections::zero();
+        firmware::boards::sections::zero_sections();
     }
-    let crashed = crash::take(cause);
+    let crashed = crash::take_report(cause);
     let parts = chosen::start();
     let shell: &'static Shell = SHELL.init_with(Shell::new);
     let Parts { links, plans, autopilot, swarm, flash, watchdog, warnings } = parts;
-    links.spawn(watch(shell, watchdog).expect("there is one such task"));
-    let said = Said { crashed, warnings };
-    plans.spawn(work(shell, links, autopilot, swarm, flash, said).expect("there is one such task"));
+    links.spawn(watchdog_task(shell, watchdog).expect("there is one such task"));
+    let said = StartReport { crashed, warnings };
+    plans.spawn(
+        planner_and_flash_task(shell, links, autopilot, swarm, flash, said).expect("there is one such task"),
+    );
     loop {
         sleep();
     }
 }
 
 /// A line's two ends.
-type Ends = (Receiver, Transmitter);
+type UartEnds = (Receiver, Transmitter);
 
-/// Reports of the start.
-struct Said {
+/// Messages that the start leaves for the operator.
+struct StartReport {
     crashed: Option<String<50>>,
     warnings: Vec<&'static str, MAX_WARNINGS>,
 }
 
 /// Brings the companion up, then plans and keeps the flash.
 #[task]
-async fn work(
+async fn planner_and_flash_task(
     shell: &'static Shell,
     links: SendSpawner,
-    mut autopilot: Ends,
-    swarm: Ends,
+    mut autopilot: UartEnds,
+    swarm: UartEnds,
     mut flash: Flash,
-    said: Said,
+    said: StartReport,
 ) {
     let mut store = Store::mount(LAYOUT, &mut flash);
     let (lent, roadmap_aside) = find_roadmap(&mut store, &mut flash);
     let roadmap = lent.as_deref().and_then(|bytes| RoadmapView::parse(bytes).ok());
     let field = lent.as_deref().and_then(|bytes| FieldView::parse(bytes).ok());
     let map_crc = roadmap.as_ref().map(RoadmapView::crc).or(field.as_ref().map(FieldView::crc)).unwrap_or(0);
-    let FoundMission { mission, files, aside: mission_aside, refused } =
+    let FoundMission { mission, files, set_aside: mission_aside, refused } =
         find_mission(&store, &mut flash, roadmap.as_ref(), map_crc);
     let known = match store.parameters().system_id() {
         Some(id) => Some(id),
-        None => hear_system_id(&mut autopilot.0).await,
+        None => wait_for_system_id(&mut autopilot.0).await,
     };
     let system_id = known.unwrap_or(ID_WITHOUT_AUTOPILOT);
     defmt::info!(
@@ -123,7 +125,7 @@ async fn work(
     );
     let aside = [(roadmap_aside, ROADMAP_SET_ASIDE), (mission_aside, MISSION_SET_ASIDE)];
     let aside = aside.into_iter().filter_map(|(is, text)| is.then_some(text));
-    let own = mission.as_ref().map(|mission| mission.config(system_id));
+    let own = mission.as_ref().map(|mission| mission.companion_config(system_id));
     let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
     let unfit = own.as_ref().and_then(|own| own.as_ref().err().copied());
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
@@ -132,40 +134,40 @@ async fn work(
     // Neither the stack nor the task's own memory has room for another.
     // `expect` would print the error, and printing one that has a name in it takes 3 kB of flash.
     let Ok(settings) = config.checked() else { panic!("every setting was checked") };
-    let companion = BoardCompanion::make_in(COMPANION.uninit(), settings);
-    companion.mount(store);
+    let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
+    companion.attach_store(store);
     if let Some(text) = said.crashed {
-        companion.say(true, CRASH.init(text).as_str());
+        companion.send_text(true, CRASH.init(text).as_str());
     }
-    said.warnings.iter().copied().chain(aside).for_each(|text| companion.say(true, text));
+    said.warnings.iter().copied().chain(aside).for_each(|text| companion.send_text(true, text));
     if is_stranger {
-        companion.say(true, NOT_IN_MISSION);
+        companion.send_text(true, NOT_IN_MISSION);
     }
     if let Some(error) = refused {
         let mut text = String::new();
         // Text without room is left out; a test checks that all of it has room.
         let _ = write!(text, "Mission: {error}");
-        companion.say(true, REFUSED.init(text).as_str());
+        companion.send_text(true, REFUSED.init(text).as_str());
     }
     shell.start(companion);
     start_links(links, shell, known.is_none(), autopilot, swarm);
-    let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
+    let memory = PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
     let mut planner = Planner { roadmap, field, mission, system_id, files, memory };
-    shell.work(&mut planner, &mut flash).await
+    shell.run_planner_and_flash(&mut planner, &mut flash).await
 }
 
 /// The newest roadmap or field that is one, as long as it may be used; and whether one was set aside.
-fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
+fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, bool) {
     let mut aside = false;
     loop {
         let lies = store.roadmap();
         if let Some(lent) = lies.and_then(|r| flash.lend(r.start, (r.end - r.start) as usize)) {
             // A file ends with its checksum.
             let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
-            let begun = crash::begin(Work::CheckRoadmap, sum);
+            let begun = crash::begin_work(FileWork::CheckRoadmap, sum);
             aside |= !begun;
             let is_one = begun && (RoadmapView::parse(&lent).is_ok() || FieldView::parse(&lent).is_ok());
-            crash::finish();
+            crash::finish_work();
             if is_one {
                 return (Some(lent), aside);
             }
@@ -185,8 +187,8 @@ struct FoundMission {
     /// A checksum of both.
     files: u32,
     /// Whether it was set aside.
-    aside: bool,
-    /// Why it is none.
+    set_aside: bool,
+    /// Reason why it is none.
     refused: Option<MissionError>,
 }
 
@@ -207,46 +209,52 @@ fn find_mission(
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
     let files = map_crc ^ sum.rotate_left(1);
     // The crash may have come from reading the mission, or from a plan.
-    if !crash::may_begin(Work::Plan, files) || !crash::begin(Work::ReadMission, files) {
-        return FoundMission { files, aside: true, ..FoundMission::default() };
+    if !crash::may_begin(FileWork::Plan, files) || !crash::begin_work(FileWork::ReadMission, files) {
+        return FoundMission { files, set_aside: true, ..FoundMission::default() };
     }
     let read = MissionView::parse(bytes);
-    crash::finish();
+    crash::finish_work();
     let refused = read.err();
-    let mission = read.ok().filter(|mission| mission.fits(roadmap));
-    FoundMission { mission, files, refused, aside: false }
+    let mission = read.ok().filter(|mission| mission.can_be_planned_with(roadmap));
+    FoundMission { mission, files, refused, set_aside: false }
 }
 
-fn start_links(links: SendSpawner, shell: &'static Shell, for_autopilot: bool, autopilot: Ends, swarm: Ends) {
+fn start_links(
+    links: SendSpawner,
+    shell: &'static Shell,
+    for_autopilot: bool,
+    autopilot: UartEnds,
+    swarm: UartEnds,
+) {
     let once = "there is one such task for each link";
-    links.spawn(receive(shell, Link::Autopilot, autopilot.0, for_autopilot).expect(once));
-    links.spawn(receive(shell, Link::Swarm, swarm.0, false).expect(once));
-    links.spawn(transmit(shell, Link::Autopilot, autopilot.1).expect(once));
-    links.spawn(transmit(shell, Link::Swarm, swarm.1).expect(once));
-    links.spawn(keep_time(shell).expect(once));
+    links.spawn(receive_task(shell, Link::Autopilot, autopilot.0, for_autopilot).expect(once));
+    links.spawn(receive_task(shell, Link::Swarm, swarm.0, false).expect(once));
+    links.spawn(transmit_task(shell, Link::Autopilot, autopilot.1).expect(once));
+    links.spawn(transmit_task(shell, Link::Swarm, swarm.1).expect(once));
+    links.spawn(timer_task(shell).expect(once));
 }
 
 #[task(pool_size = 2)]
-async fn receive(shell: &'static Shell, link: Link, uart: Receiver, for_autopilot: bool) {
+async fn receive_task(shell: &'static Shell, link: Link, uart: Receiver, for_autopilot: bool) {
     shell.receive(link, uart, for_autopilot).await
 }
 
 #[task(pool_size = 2)]
-async fn transmit(shell: &'static Shell, link: Link, uart: Transmitter) {
+async fn transmit_task(shell: &'static Shell, link: Link, uart: Transmitter) {
     shell.transmit(link, uart).await
 }
 
 #[task]
-async fn keep_time(shell: &'static Shell) {
-    shell.keep_time().await
+async fn timer_task(shell: &'static Shell) {
+    shell.run_timers().await
 }
 
 /// Feeds the watchdog while all is well, and restarts when that is asked for.
 #[task]
-async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
+async fn watchdog_task(shell: &'static Shell, mut watchdog: Watchdog) {
     loop {
         Timer::after(CHECK_IN_EVERY).await;
-        if shell.wants_restart() {
+        if shell.is_restart_due() {
             crash::restart();
         }
         if shell.is_alive() {

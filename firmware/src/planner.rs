@@ -3,21 +3,21 @@
 
 use companion::planner::coverage::Request;
 use companion::storage::mission_file::coverage::CoverageView;
-use companion::storage::mission_file::{Kind, MissionView};
-use companion::swarm::fleet::{Lots, MAX_DIVISIONS};
-use companion::{MAX_DONE_RANGES, PlanFailure, Wanted, planner};
+use companion::storage::mission_file::{MissionKind, MissionView};
+use companion::swarm::fleet::{DivisionInputs, MAX_DIVISIONS};
+use companion::{MAX_DONE_RANGES, PlanFailure, PlanKind, planner};
 use heapless::Vec;
-use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::detour::{self, DetourRequest, KeepOutZone};
 use planner_core::field::FieldView;
-use planner_core::flight::{Range, VehiclePlan};
+use planner_core::flight::{VehiclePlan, WaypointRange};
 use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 
 use crate::boards;
 use crate::capacity::BoardCompanion;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use crate::kept::Work;
-use crate::scratch::Scratch;
+use crate::kept::FileWork;
+use crate::scratch::WorkspaceOverlay;
 
 /// Most keep-out zones of a detour. A vehicle that fell silent may lie below a dozen places, any
 /// other makes one zone or two; with more zones than these there is no detour, not one past a zone
@@ -25,33 +25,33 @@ use crate::scratch::Scratch;
 const MAX_ZONES: usize = 4 * VEHICLES;
 
 /// Memory for planning beside roadmap and mission: pieces that lie in memories of their own.
-pub struct Memory<'a> {
+pub struct PlanningMemory<'a> {
     /// Workspace of the search.
-    pub scratch: &'a mut Scratch,
+    pub scratch: &'a mut WorkspaceOverlay,
     /// The swarm's plan.
     pub swarm: &'a mut SwarmPlan<VEHICLES, WAYPOINTS>,
     /// The vehicle's own.
-    pub own: &'a mut Own,
+    pub own: &'a mut OwnPlanMemory,
 }
 
 /// A vehicle's plan, and what it is made from beside the swarm's.
-pub struct Own {
+pub struct OwnPlanMemory {
     plan: VehiclePlan<WAYPOINTS, GATES>,
-    obstacles: Vec<KeepOff, MAX_ZONES>,
+    obstacles: Vec<KeepOutZone, MAX_ZONES>,
     /// Whether there were more.
-    crowded: bool,
-    done: Vec<Range, MAX_DONE_RANGES>,
-    losses: Vec<Lots<VEHICLES>, MAX_DIVISIONS>,
+    too_many_zones: bool,
+    done: Vec<WaypointRange, MAX_DONE_RANGES>,
+    losses: Vec<DivisionInputs<VEHICLES>, MAX_DIVISIONS>,
     nodes: Vec<u16, WAYPOINTS>,
 }
 
-impl Own {
+impl OwnPlanMemory {
     /// All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
         Self {
             plan: VehiclePlan::new(),
             obstacles: Vec::new(),
-            crowded: false,
+            too_many_zones: false,
             done: Vec::new(),
             losses: Vec::new(),
             nodes: Vec::new(),
@@ -59,7 +59,7 @@ impl Own {
     }
 }
 
-impl Default for Own {
+impl Default for OwnPlanMemory {
     fn default() -> Self {
         Self::new()
     }
@@ -78,47 +78,47 @@ pub struct Planner<'a> {
     /// A checksum of all.
     pub files: u32,
     /// Memory of the planner.
-    pub memory: Memory<'a>,
+    pub memory: PlanningMemory<'a>,
 }
 
 impl Planner<'_> {
     /// Inputs of the plan that the companion wants: lost vehicles, or keep-out zones of its detour.
-    pub fn note(&mut self, wanted: Wanted, companion: &BoardCompanion) -> Option<DetourRequest> {
-        let Own { obstacles, crowded, done, losses, .. } = &mut *self.memory.own;
+    pub fn read_inputs(&mut self, wanted: PlanKind, companion: &BoardCompanion) -> Option<DetourRequest> {
+        let OwnPlanMemory { obstacles, too_many_zones: crowded, done, losses, .. } = &mut *self.memory.own;
         obstacles.clear();
         done.clear();
         losses.clear();
         *crowded = false;
         // Cannot overflow: as many as the companion keeps.
-        let _ = done.extend_from_slice(companion.done());
-        if wanted == Wanted::Division {
+        let _ = done.extend_from_slice(companion.excluded_waypoints());
+        if wanted == PlanKind::Division {
             // Cannot overflow: as many as the companion keeps, and the one under way.
             companion.losses().for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
         }
-        if wanted != Wanted::Detour {
+        if wanted != PlanKind::Detour {
             return None;
         }
-        companion.detour(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
+        companion.detour_request(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
     }
 
     /// The plan asked for. Files of which it is known that they bring the board down are not
     /// planned on.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Reason why there is none.
     pub fn answer(
         &mut self,
-        wanted: Wanted,
+        wanted: PlanKind,
         detour: Option<&DetourRequest>,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-        if wanted == Wanted::Detour && detour.is_none() {
+        if wanted == PlanKind::Detour && detour.is_none() {
             return Err(PlanFailure::Unreachable);
         }
-        if !boards::begin(Work::Plan, self.files) {
+        if !boards::begin_work(FileWork::Plan, self.files) {
             return Err(PlanFailure::Invalid);
         }
         let outcome = self.plan(detour);
-        boards::finish();
+        boards::finish_work();
         outcome
     }
 
@@ -131,20 +131,20 @@ impl Planner<'_> {
         let Some(mission) = &self.mission else { return Err(PlanFailure::NoRoadmap) };
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         let schedule = &mission.header().schedule;
-        if let Kind::Coverage(area) = mission.kind() {
+        if let MissionKind::Coverage(area) = mission.kind() {
             return match detour {
-                Some(request) => plan_around(area, self.field, request, &mut self.memory),
+                Some(request) => plan_area_detour(area, self.field, request, &mut self.memory),
                 None => plan_area(mission, self.field, index, &mut self.memory),
             };
         }
         let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::NoRoadmap) };
-        let Memory { scratch, swarm, own } = &mut self.memory;
+        let PlanningMemory { scratch, swarm, own } = &mut self.memory;
         let ws = scratch.planner();
         if let Some(request) = detour {
-            if own.crowded {
+            if own.too_many_zones {
                 return Err(PlanFailure::Capacity);
             }
-            detour::plan_vehicle(
+            detour::plan_vehicle_detour(
                 roadmap,
                 request,
                 &mut own.obstacles,
@@ -155,7 +155,7 @@ impl Planner<'_> {
             .map_err(|_| PlanFailure::Unreachable)?;
             return Ok(&own.plan);
         }
-        planner::goals(mission, roadmap, GATES, ws, swarm, |_| {})?;
+        planner::plan_goals(mission, roadmap, GATES, ws, swarm, |_| {})?;
         plan::vehicle_plan(swarm, index, schedule, &mut ws.schedule, &mut own.plan)
             .map_err(|_| PlanFailure::Capacity)?;
         Ok(&own.plan)
@@ -164,18 +164,18 @@ impl Planner<'_> {
 
 /// The way home over the area, or aside. Apart as [`plan_area`].
 #[inline(never)]
-fn plan_around<'m>(
+fn plan_area_detour<'m>(
     area: &CoverageView<'_>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,
-    memory: &'m mut Memory<'_>,
+    memory: &'m mut PlanningMemory<'_>,
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-    let Memory { scratch, own, .. } = memory;
-    if own.crowded {
+    let PlanningMemory { scratch, own, .. } = memory;
+    if own.too_many_zones {
         return Err(PlanFailure::Capacity);
     }
     let ws = &mut scratch.area().area;
-    planner::coverage::around::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
+    planner::coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
         area,
         field,
         request,
@@ -192,13 +192,13 @@ fn plan_area<'m>(
     mission: &MissionView<'_>,
     field: Option<FieldView<'_>>,
     index: usize,
-    memory: &'m mut Memory<'_>,
+    memory: &'m mut PlanningMemory<'_>,
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-    let Kind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
-    let Memory { scratch, swarm, own } = memory;
+    let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
+    let PlanningMemory { scratch, swarm, own } = memory;
     let ws = scratch.area();
-    planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
-        &Request { mission, view, field, gates_most: GATES, done: &own.done },
+    planner::coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+        &Request { mission, view, field, max_gates: GATES, photographed: &own.done },
         own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,
         &mut ws.schedule,

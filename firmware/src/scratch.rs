@@ -25,34 +25,34 @@ use crate::capacity::{
 pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Scratch of planning a coverage mission.
-pub struct Area {
+pub struct AreaWorkspace {
     /// Lanes and routes.
     pub area: coverage::Workspace<AREA_VERTICES, LANES, VEHICLES>,
     /// Flights.
     pub schedule: ScheduleWorkspace,
 }
 
-impl Area {
-    /// Empty.
+impl AreaWorkspace {
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self { area: coverage::Workspace::new(), schedule: ScheduleWorkspace::new() }
     }
 }
 
-impl Default for Area {
+impl Default for AreaWorkspace {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// The memory; a board has one. The smaller uses lie in the memory of the largest.
-pub struct Scratch {
+pub struct WorkspaceOverlay {
     memory: Memory,
-    used: Use,
+    used: OverlayUse,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Use {
+enum OverlayUse {
     Plan,
     Build,
     Coverage,
@@ -61,14 +61,14 @@ enum Use {
 
 union Memory {
     plan: ManuallyDrop<Planner>,
-    build: ManuallyDrop<Builder>,
-    coverage: ManuallyDrop<Coverage>,
-    area: ManuallyDrop<Area>,
+    build: ManuallyDrop<RoadmapBuilder>,
+    coverage: ManuallyDrop<CoverageWorkspace>,
+    area: ManuallyDrop<AreaWorkspace>,
 }
 
 /// Zero values of each use: the compiler refuses a constant that is no value of its type.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ALL_ZEROS: (Planner, Builder, Coverage, Area) = {
+const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageWorkspace, AreaWorkspace) = {
     // SAFETY: the compiler checks it.
     unsafe {
         let zeroed =
@@ -77,42 +77,42 @@ const ALL_ZEROS: (Planner, Builder, Coverage, Area) = {
     }
 };
 
-impl Scratch {
+impl WorkspaceOverlay {
     /// All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
-        Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, used: Use::Plan }
+        Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, used: OverlayUse::Plan }
     }
 
     /// The memory for planning from here on.
     pub fn planner(&mut self) -> &mut Planner {
-        self.turn(Use::Plan);
+        self.switch_use(OverlayUse::Plan);
         // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner was written since.
         unsafe { &mut self.memory.plan }
     }
 
     /// The memory for building from here on; empty.
-    pub fn builder(&mut self) -> &mut Builder {
-        self.turn(Use::Build);
+    pub fn builder(&mut self) -> &mut RoadmapBuilder {
+        self.switch_use(OverlayUse::Build);
         // SAFETY: as above; all zeros is an empty builder.
         unsafe { &mut self.memory.build }
     }
 
     /// The memory for a coverage mission from here on; empty.
-    pub fn coverage(&mut self) -> &mut Coverage {
-        self.turn(Use::Coverage);
+    pub fn coverage(&mut self) -> &mut CoverageWorkspace {
+        self.switch_use(OverlayUse::Coverage);
         // SAFETY: as above; all zeros is nothing lent yet.
         unsafe { &mut self.memory.coverage }
     }
 
     /// The memory for planning a coverage mission from here on; empty.
-    pub fn area(&mut self) -> &mut Area {
-        self.turn(Use::Area);
+    pub fn area(&mut self) -> &mut AreaWorkspace {
+        self.switch_use(OverlayUse::Area);
         // SAFETY: as above; all zeros is an area without vertices.
         unsafe { &mut self.memory.area }
     }
 
     /// Zeros where the use changes.
-    fn turn(&mut self, used: Use) {
+    fn switch_use(&mut self, used: OverlayUse) {
         if self.used != used {
             // SAFETY: no use has anything to drop, and any bytes may be written over their memory.
             unsafe { (&raw mut self.memory).write_bytes(0, 1) };
@@ -121,14 +121,14 @@ impl Scratch {
     }
 }
 
-impl Default for Scratch {
+impl Default for WorkspaceOverlay {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// Workspaces of a coverage mission's plan.
-pub struct Coverage {
+pub struct CoverageWorkspace {
     /// The whole path.
     pub tracks: Tracks<LANES>,
     /// Lanes that are left after a loss.
@@ -145,8 +145,8 @@ pub struct Coverage {
     pub schedule: ScheduleWorkspace,
 }
 
-impl Coverage {
-    /// Empty.
+impl CoverageWorkspace {
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
@@ -160,14 +160,14 @@ impl Coverage {
     }
 }
 
-impl Default for Coverage {
+impl Default for CoverageWorkspace {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// Nodes and edges of a roadmap that is built on board.
-pub struct Builder {
+pub struct RoadmapBuilder {
     nodes: [Point; ROADMAP_NODES],
     node_count: usize,
     index: prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>,
@@ -175,7 +175,7 @@ pub struct Builder {
     edge_count: usize,
 }
 
-impl Builder {
+impl RoadmapBuilder {
     /// Samples nodes and joins them: Algorithm 1 of P3D. Every edge carries the clearance it was tested at.
     ///
     /// # Errors
@@ -186,16 +186,16 @@ impl Builder {
         terminals: &[Point],
         config: &Config,
     ) -> Result<(), PrmError> {
-        self.sample(grid, terminals, config)?;
-        self.index(config)?;
-        self.join(grid, config)
+        self.sample_nodes(grid, terminals, config)?;
+        self.build_index(config)?;
+        self.connect_nodes(grid, config)
     }
 
     /// First step: nodes.
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn sample(
+    pub fn sample_nodes(
         &mut self,
         grid: &VoxelGrid<'_>,
         terminals: &[Point],
@@ -210,15 +210,15 @@ impl Builder {
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn index(&mut self, config: &Config) -> Result<(), PrmError> {
-        self.index.index(&self.nodes[..self.node_count], config)
+    pub fn build_index(&mut self, config: &Config) -> Result<(), PrmError> {
+        self.index.build_index(&self.nodes[..self.node_count], config)
     }
 
     /// Third step: edges.
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn join(&mut self, grid: &VoxelGrid<'_>, config: &Config) -> Result<(), PrmError> {
+    pub fn connect_nodes(&mut self, grid: &VoxelGrid<'_>, config: &Config) -> Result<(), PrmError> {
         let Self { node_count, index, edges, edge_count, .. } = self;
         *edge_count = 0;
         prm::connect_range(grid, index, config, 0..*node_count, |edge| {

@@ -1,7 +1,7 @@
 //! The shell around the companion: what moves bytes, keeps time and plans.
 //!
-//! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`keep_time`](Shell::keep_time) are tasks of an interrupt's
-//! executor; [`work`](Shell::work) is a task of another one below it, so a long plan never holds a setpoint up. The companion is
+//! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`run_timers`](Shell::run_timers) are tasks of an interrupt's
+//! executor; [`run_planner_and_flash`](Shell::run_planner_and_flash) is a task of another one below it, so a long plan never holds a setpoint up. The companion is
 //! held only for the time of one of its calls, never across an `await`, and both executors wait for so long ([`HoldsExecutors`]).
 
 use core::cell::RefCell;
@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use companion::storage::store::{FlashRequest, MAX_READ};
-use companion::{Event, Link, PlanFailure, State, Wanted};
+use companion::{Event, Link, PlanFailure, PlanKind, State};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -39,28 +39,28 @@ const LINE_TEXTS: [&str; 2] =
 /// Time that queued messages have to go out before a restart, milliseconds.
 const FLUSH_BEFORE_RESTART_MS: u32 = 200;
 
-type Shared<T> = Signal<CriticalSectionRawMutex, T>;
+type TaskSignal<T> = Signal<CriticalSectionRawMutex, T>;
 
 /// State that the tasks share.
 pub struct Shell {
     companion: Mutex<HoldsExecutors, RefCell<Option<&'static mut BoardCompanion>>>,
     /// Signals that a link may have bytes to send.
-    sends: [Shared<()>; 2],
+    send_due: [TaskSignal<()>; 2],
     /// The companion's next step may be due earlier than thought.
-    steps: Shared<()>,
+    timer_changed: TaskSignal<()>,
     /// The companion asks for a plan.
-    wants_plan: Shared<Wanted>,
+    wants_plan: TaskSignal<PlanKind>,
     /// Signals that long work may be waiting.
-    works: Shared<()>,
+    work_due: TaskSignal<()>,
     /// When a restart was asked for, milliseconds; 0 if none was.
     restart_ms: AtomicU32,
     /// Whether the flash is at work.
-    writes: AtomicBool,
+    flash_busy: AtomicBool,
     /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
-    seen_ms: [AtomicU32; TASK_COUNT],
+    checked_in_ms: [AtomicU32; TASK_COUNT],
     /// Whether there is a companion.
     started: AtomicBool,
-    setpoints: Setpoints,
+    setpoints: SetpointGaps,
     /// Errors that the UARTs reported.
     pub line_errors: [AtomicU32; 2],
 }
@@ -74,21 +74,21 @@ enum Request {
 
 /// The system id of the autopilot: of those whose heartbeat comes within a while after the first one, that of which most is
 /// heard, since an autopilot may pass on those of others. `None` where none comes in time.
-pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
-    let mut ear = Ear::new();
+pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
+    let mut ear = AutopilotListener::new();
     let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
     let mut chunk = [0; UART_CHUNK];
     while let Ok(received) =
         with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
     {
-        let known = ear.loudest().is_some();
+        let known = ear.most_heard().is_some();
         // A line error loses bytes, no more.
-        ear.hear(&chunk[..received.unwrap_or_default()]);
-        if !known && ear.loudest().is_some() {
+        ear.handle_bytes(&chunk[..received.unwrap_or_default()]);
+        if !known && ear.most_heard().is_some() {
             until = Instant::now() + OTHER_AUTOPILOTS_WITHIN;
         }
     }
-    ear.loudest()
+    ear.most_heard()
 }
 
 /// System id of a board without an autopilot: files can be uploaded to it. When it hears an
@@ -102,18 +102,18 @@ const OTHER_AUTOPILOTS_WITHIN: Duration = Duration::from_millis(1100);
 const MAX_AUTOPILOTS: usize = 8;
 
 /// Listens for autopilots.
-struct Ear {
+struct AutopilotListener {
     framer: Framer,
     /// System id, frames, and whether a heartbeat was among them.
     heard: Vec<(u8, u32, bool), MAX_AUTOPILOTS>,
 }
 
-impl Ear {
+impl AutopilotListener {
     const fn new() -> Self {
         Self { framer: Framer::new(), heard: Vec::new() }
     }
 
-    fn hear(&mut self, mut input: &[u8]) {
+    fn handle_bytes(&mut self, mut input: &[u8]) {
         while let Some(frame) = self.framer.next(now(), &mut input) {
             if frame.component != companion::AUTOPILOT_COMPONENT || frame.system == 0 {
                 continue;
@@ -128,7 +128,7 @@ impl Ear {
     }
 
     /// The system id of the autopilot of which most is heard; the first of several.
-    fn loudest(&self) -> Option<u8> {
+    fn most_heard(&self) -> Option<u8> {
         let beating = self.heard.iter().filter(|(_, _, beats)| *beats);
         beating.rev().max_by_key(|(_, frames, _)| *frames).map(|(id, ..)| *id)
     }
@@ -156,71 +156,78 @@ impl Shell {
     pub const fn new() -> Self {
         Self {
             companion: Mutex::new(RefCell::new(None)),
-            sends: [Signal::new(), Signal::new()],
-            steps: Signal::new(),
+            send_due: [Signal::new(), Signal::new()],
+            timer_changed: Signal::new(),
             wants_plan: Signal::new(),
-            works: Signal::new(),
+            work_due: Signal::new(),
             restart_ms: AtomicU32::new(0),
-            writes: AtomicBool::new(false),
-            seen_ms: [const { AtomicU32::new(0) }; TASK_COUNT],
+            flash_busy: AtomicBool::new(false),
+            checked_in_ms: [const { AtomicU32::new(0) }; TASK_COUNT],
             started: AtomicBool::new(false),
-            setpoints: Setpoints::new(),
+            setpoints: SetpointGaps::new(),
             line_errors: [const { AtomicU32::new(0) }; 2],
         }
     }
 
-    /// Puts the companion in, before any task of links or time starts. Until then the board is
+    /// Stores the companion, before any task of links or time starts. Until then the board is
     /// alive for no longer than [`START_TIMEOUT_MS`].
     pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
-        (0..TASK_COUNT).for_each(|task| self.seen(task));
+        (0..TASK_COUNT).for_each(|task| self.check_in(task));
         self.started.store(true, Ordering::Relaxed);
     }
 
-    /// Holds the companion for the time of `work`.
-    fn hold<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
+    /// Holds the companion for the time of `run_planner_and_flash`.
+    fn lock_companion<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
         self.companion.lock(|held| {
             work(held.borrow_mut().as_deref_mut().expect("the companion is put in before any task starts"))
         })
     }
 
     /// Does something with the companion, at a time no earlier than that of the last, and hands on what came of it.
-    fn with<T>(&'static self, work: impl FnOnce(&mut BoardCompanion, companion::Instant) -> T) -> T {
-        let result = self.hold(|companion| {
+    fn with_companion<T>(
+        &'static self,
+        work: impl FnOnce(&mut BoardCompanion, companion::Instant) -> T,
+    ) -> T {
+        let result = self.lock_companion(|companion| {
             let result = work(companion, now());
             while let Some(event) = companion.poll_event() {
                 match event {
                     Event::PlanRequested(wanted) => self.wants_plan.signal(wanted),
-                    Event::RestartRequested => self.ask_restart(),
+                    Event::RestartRequested => self.request_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
-                        if let Some(reported) = self.setpoints.take(now_ms()) {
-                            companion.say_count(false, "Setpoints: #, at most # ms apart", reported);
+                        if let Some(reported) = self.setpoints.take_flight(now_ms()) {
+                            companion.send_text_with_numbers(
+                                false,
+                                "Setpoints: #, at most # ms apart",
+                                reported,
+                            );
                         }
                     }
                     // The event's text is reported already.
                     Event::StateChanged { .. } | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
                 }
             }
-            if companion.streams() {
-                self.setpoints.begin(now_ms());
+            if companion.streams_setpoints() {
+                self.setpoints.begin_stream(now_ms());
             } else {
-                self.setpoints.end(now_ms());
+                self.setpoints.end_stream(now_ms());
             }
             result
         });
-        self.sends.iter().for_each(|sends| sends.signal(()));
-        self.works.signal(());
-        self.steps.signal(());
+        self.send_due.iter().for_each(|sends| sends.signal(()));
+        self.work_due.signal(());
+        self.timer_changed.signal(());
         result
     }
 
-    /// Once asked for, it is not put off by being asked for again.
-    fn ask_restart(&self) {
+    /// Requests a restart. A repeated request does not delay it.
+    fn request_restart(&self) {
         let _ = self.restart_ms.compare_exchange(0, now_ms().max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
 
-    fn seen(&self, task: usize) {
-        self.seen_ms[task].store(now_ms(), Ordering::Relaxed);
+    fn check_in(&self, task: usize) {
+        self.checked_in_ms[task].store(now_ms(), Ordering::Relaxed);
     }
 
     /// Takes what a UART receives to the companion.
@@ -228,17 +235,17 @@ impl Shell {
     /// A board without an autopilot restarts when it hears one, if `for_autopilot`.
     pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
         let mut chunk = [0; UART_CHUNK];
-        let mut ear = for_autopilot.then(Ear::new);
+        let mut ear = for_autopilot.then(AutopilotListener::new);
         let errors = &self.line_errors[link as usize];
         let (mut reported, mut tells_at) = (0, Instant::MIN);
         loop {
             match with_timeout(CHECK_IN_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
-                    self.with(|companion, now| companion.handle_bytes(link, now, &chunk[..length]));
+                    self.with_companion(|companion, now| companion.handle_bytes(link, now, &chunk[..length]));
                     if let Some(ear) = &mut ear {
-                        ear.hear(&chunk[..length]);
-                        if ear.loudest().is_some() {
-                            self.ask_restart();
+                        ear.handle_bytes(&chunk[..length]);
+                        if ear.most_heard().is_some() {
+                            self.request_restart();
                         }
                     }
                 }
@@ -249,13 +256,13 @@ impl Shell {
             let count = errors.load(Ordering::Relaxed);
             if count != reported && Instant::now() >= tells_at {
                 (reported, tells_at) = (count, Instant::now() + LINE_REPORT_EVERY);
-                self.with(|companion, _| {
+                self.with_companion(|companion, _| {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
-                    companion.say_count(true, LINE_TEXTS[link as usize], [count, damaged]);
+                    companion.send_text_with_numbers(true, LINE_TEXTS[link as usize], [count, damaged]);
                 });
             }
-            self.seen(link as usize);
+            self.check_in(link as usize);
             Timer::after(UART_POLL_EVERY).await;
         }
     }
@@ -264,62 +271,66 @@ impl Shell {
     pub async fn transmit(&'static self, link: Link, mut uart: impl Write) -> ! {
         let mut frame = [0; MAX_FRAME_LEN];
         loop {
-            let length = self.hold(|companion| companion.poll_transmit(link, &mut frame));
+            let length = self.lock_companion(|companion| companion.poll_transmit(link, &mut frame));
             if length == 0 {
                 // Late or not, it comes by.
-                let _ = with_timeout(CHECK_IN_EVERY, self.sends[link as usize].wait()).await;
+                let _ = with_timeout(CHECK_IN_EVERY, self.send_due[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
-                    self.setpoints.note(now_ms());
+                    self.setpoints.note_setpoint(now_ms());
                 }
-                // Work that waited for room for its report may go on.
-                self.works.signal(());
+                // Work that waited for room for its report may continue.
+                self.work_due.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
                     self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
                 }
             }
-            self.seen(2 + link as usize);
+            self.check_in(2 + link as usize);
         }
     }
 
-    /// Lets the companion's time pass.
-    pub async fn keep_time(&'static self) -> ! {
+    /// Calls the companion whenever one of its timers is due.
+    pub async fn run_timers(&'static self) -> ! {
         loop {
             let now = now();
-            let due = self.hold(|companion| companion.poll_timeout());
+            let due = self.lock_companion(|companion| companion.poll_timeout());
             let due = due.unwrap_or(now + companion::Duration::from_micros(CHECK_IN_EVERY.as_micros()));
             if due <= now {
-                self.with(BoardCompanion::handle_timeout);
+                self.with_companion(BoardCompanion::handle_timeout);
             } else {
-                select(Timer::at(Instant::from_micros(due.micros())), self.steps.wait()).await;
+                select(Timer::at(Instant::from_micros(due.as_micros())), self.timer_changed.wait()).await;
             }
-            self.seen(TIME_TASK);
+            self.check_in(TIME_TASK);
         }
     }
 
     /// Answers the companion's requests for plans and for its flash, one after the other: the flash is never erased while
     /// a roadmap in it is planned on.
-    pub async fn work(&'static self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
+    pub async fn run_planner_and_flash(
+        &'static self,
+        planner: &mut Planner<'_>,
+        flash: &mut impl Flash,
+    ) -> ! {
         loop {
             if let Some(wanted) = self.wants_plan.try_take() {
-                let detour = self.hold(|companion| planner.note(wanted, companion));
+                let detour = self.lock_companion(|companion| planner.read_inputs(wanted, companion));
                 let answer: Result<_, PlanFailure> = planner.answer(wanted, detour.as_ref());
-                self.with(|companion, now| companion.handle_plan(now, wanted, answer));
+                self.with_companion(|companion, now| companion.handle_plan(now, wanted, answer));
             }
             if !self.serve_flash(flash).await {
-                self.works.wait().await;
+                self.work_due.wait().await;
             }
         }
     }
 
-    /// Does one thing that the companion asks of its flash; false if it asks for none, or is about to restart: that must
+    /// Executes one flash request of the companion; false if it asks for none, or is about to restart: that must
     /// not tear what is being written.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
         if self.restart_ms.load(Ordering::Relaxed) != 0 {
             return false;
         }
         let mut bytes = [0; MAX_READ];
-        let request = self.hold(|companion| {
+        let request = self.lock_companion(|companion| {
             Some(match companion.poll_flash()? {
                 FlashRequest::Erase { at } => Request::Erase(at),
                 FlashRequest::Read { at, len } => Request::Read(at, len),
@@ -331,27 +342,27 @@ impl Shell {
         });
         let Some(request) = request else {
             // The companion may have an answer to send.
-            self.sends.iter().for_each(|sends| sends.signal(()));
+            self.send_due.iter().for_each(|sends| sends.signal(()));
             return false;
         };
-        self.writes.store(true, Ordering::Relaxed);
+        self.flash_busy.store(true, Ordering::Relaxed);
         let outcome = match request {
             Request::Erase(at) => flash.erase(at).await.map(|()| 0),
             Request::Program(at, len) => flash.program(at, &bytes[..len]).await.map(|()| 0),
             Request::Read(at, len) => flash.read(at, &mut bytes[..len]).map(|()| len),
         };
-        self.writes.store(false, Ordering::Relaxed);
+        self.flash_busy.store(false, Ordering::Relaxed);
         let outcome = outcome.map(|len| &bytes[..len]);
-        self.with(|companion, now| companion.handle_flash(now, outcome));
+        self.with_companion(|companion, now| companion.handle_flash(now, outcome));
         true
     }
 
     /// Whether a restart was asked for, what was to be said before has had time to go out, and the flash is at rest.
-    pub fn wants_restart(&self) -> bool {
+    pub fn is_restart_due(&self) -> bool {
         let asked = self.restart_ms.load(Ordering::Relaxed);
         asked != 0
             && now_ms().wrapping_sub(asked) > FLUSH_BEFORE_RESTART_MS
-            && !self.writes.load(Ordering::Relaxed)
+            && !self.flash_busy.load(Ordering::Relaxed)
     }
 
     /// Whether every task of the links and of time came by lately, and so did the last setpoint where they are to flow: else the
@@ -365,8 +376,8 @@ impl Shell {
             return now_ms < START_TIMEOUT_MS;
         }
         let limit = 4 * CHECK_IN_EVERY.as_millis() as u32;
-        self.seen_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
-            && self.setpoints.since(now_ms).is_none_or(|passed| passed < limit)
+        self.checked_in_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
+            && self.setpoints.since_last_ms(now_ms).is_none_or(|passed| passed < limit)
     }
 }
 
@@ -379,7 +390,7 @@ impl Default for Shell {
 /// Number of setpoints in a flight and the gaps between them, by the board's own time. A stream
 /// lasts as long as the companion reports it, not until a pause: else the longest pauses would not
 /// be seen.
-struct Setpoints {
+struct SetpointGaps {
     count: AtomicU32,
     /// The longest time between two, or from the stream's begin to the first or from the last to its end, milliseconds.
     gap_ms: AtomicU32,
@@ -387,48 +398,48 @@ struct Setpoints {
     last_ms: AtomicU32,
 }
 
-impl Setpoints {
+impl SetpointGaps {
     const fn new() -> Self {
         Self { count: AtomicU32::new(0), gap_ms: AtomicU32::new(0), last_ms: AtomicU32::new(0) }
     }
 
     /// Notes a setpoint that goes out.
-    fn note(&self, now_ms: u32) {
+    fn note_setpoint(&self, now_ms: u32) {
         self.count.fetch_add(1, Ordering::Relaxed);
-        self.mark(now_ms, now_ms.max(1));
+        self.set_last(now_ms, now_ms.max(1));
     }
 
     /// The companion streams them, from now on if it did not before.
-    fn begin(&self, now_ms: u32) {
+    fn begin_stream(&self, now_ms: u32) {
         let _ = self.last_ms.compare_exchange(0, now_ms.max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
 
     /// Time since the last, if more are to come, milliseconds.
-    fn since(&self, now_ms: u32) -> Option<u32> {
-        passed_ms(self.last_ms.load(Ordering::Relaxed), now_ms)
+    fn since_last_ms(&self, now_ms: u32) -> Option<u32> {
+        elapsed_ms(self.last_ms.load(Ordering::Relaxed), now_ms)
     }
 
     /// The companion streams none, for now.
-    fn end(&self, now_ms: u32) {
-        self.mark(now_ms, 0);
+    fn end_stream(&self, now_ms: u32) {
+        self.set_last(now_ms, 0);
     }
 
-    fn mark(&self, now_ms: u32, next_ms: u32) {
-        if let Some(gap_ms) = passed_ms(self.last_ms.swap(next_ms, Ordering::Relaxed), now_ms) {
+    fn set_last(&self, now_ms: u32, next_ms: u32) {
+        if let Some(gap_ms) = elapsed_ms(self.last_ms.swap(next_ms, Ordering::Relaxed), now_ms) {
             self.gap_ms.fetch_max(gap_ms, Ordering::Relaxed);
         }
     }
 
     /// Number and longest gap of a flight that is over; none if it had none.
-    fn take(&self, now_ms: u32) -> Option<[u32; 2]> {
-        self.end(now_ms);
+    fn take_flight(&self, now_ms: u32) -> Option<[u32; 2]> {
+        self.end_stream(now_ms);
         let reported = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
         (reported[0] > 0).then_some(reported)
     }
 }
 
 /// Time since the last setpoint, if there was one.
-fn passed_ms(last_ms: u32, now_ms: u32) -> Option<u32> {
+fn elapsed_ms(last_ms: u32, now_ms: u32) -> Option<u32> {
     (last_ms != 0).then(|| now_ms.wrapping_sub(last_ms))
 }
 
@@ -443,17 +454,17 @@ mod tests {
 
     #[test]
     fn a_setpoint_is_missed_only_while_more_are_to_come() {
-        let setpoints = Setpoints::new();
-        assert_eq!(setpoints.since(1000), None);
-        setpoints.note(1000);
-        setpoints.note(1050);
-        assert_eq!((setpoints.since(1050), setpoints.since(1500)), (Some(0), Some(450)));
-        setpoints.end(1500);
-        assert_eq!(setpoints.since(9000), None);
-        setpoints.begin(9000);
-        setpoints.note(9000);
-        assert_eq!(setpoints.take(9000), Some([3, 450]));
-        assert_eq!(setpoints.take(9000), None);
+        let setpoints = SetpointGaps::new();
+        assert_eq!(setpoints.since_last_ms(1000), None);
+        setpoints.note_setpoint(1000);
+        setpoints.note_setpoint(1050);
+        assert_eq!((setpoints.since_last_ms(1050), setpoints.since_last_ms(1500)), (Some(0), Some(450)));
+        setpoints.end_stream(1500);
+        assert_eq!(setpoints.since_last_ms(9000), None);
+        setpoints.begin_stream(9000);
+        setpoints.note_setpoint(9000);
+        assert_eq!(setpoints.take_flight(9000), Some([3, 450]));
+        assert_eq!(setpoints.take_flight(9000), None);
     }
 
     #[test]
@@ -461,17 +472,17 @@ mod tests {
         let shell = Shell::new();
         assert!(shell.is_alive_at(19_999) && !shell.is_alive_at(20_000), "it starts");
         shell.started.store(true, Ordering::Relaxed);
-        let come_by = |ms| shell.seen_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
+        let come_by = |ms| shell.checked_in_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
         come_by(1000);
         assert!(shell.is_alive_at(1399) && !shell.is_alive_at(1400));
         come_by(5000);
-        shell.setpoints.begin(5000);
+        shell.setpoints.begin_stream(5000);
         assert!(shell.is_alive_at(5399));
         come_by(5300);
         assert!(!shell.is_alive_at(5400), "the first setpoint is late");
-        shell.setpoints.note(5400);
+        shell.setpoints.note_setpoint(5400);
         assert!(shell.is_alive_at(5400));
-        shell.seen_ms[TIME_TASK].store(4000, Ordering::Relaxed);
+        shell.checked_in_ms[TIME_TASK].store(4000, Ordering::Relaxed);
         assert!(!shell.is_alive_at(5400), "one task hangs");
     }
 }

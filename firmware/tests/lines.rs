@@ -93,7 +93,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), false));
     let mut transmits = pin!(shell.transmit(Link::Autopilot, End(&lines[0])));
     let mut tells = pin!(shell.transmit(Link::Swarm, End(&lines[1])));
-    let mut keeps_time = pin!(shell.keep_time());
+    let mut keeps_time = pin!(shell.run_timers());
     let mut run = |ms: u32| {
         let mut cx = Context::from_waker(Waker::noop());
         for _ in 0..ms {

@@ -1,7 +1,7 @@
 //! Capacities of the desk's swarm, and what each costs; what each board can hold.
 
 use companion::storage::mission_file::MissionView;
-use companion::storage::store::Layout;
+use companion::storage::store::FlashLayout;
 use companion::storage::store::area::DATA_OFFSET;
 use companion::{Companion, Config};
 use planner_core::roadmap::RoadmapView;
@@ -34,7 +34,7 @@ pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompani
 
 /// Capacities of a board's firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Board {
+pub struct BoardCapacity {
     /// Name of the board, as `cargo xtask build --board` takes it.
     pub name: &'static str,
     /// Nodes of a roadmap.
@@ -58,51 +58,51 @@ pub struct Board {
 /// Outward corners of an area's no-fly zones that a board holds.
 pub const BOARD_CORNERS: usize = 32;
 
-const fn roadmap_bytes(layout: &Layout) -> usize {
+const fn roadmap_bytes(layout: &FlashLayout) -> usize {
     (layout.slot_len - DATA_OFFSET) as usize
 }
 
 /// The default board.
-pub const NUCLEO_H743: Board = Board {
+pub const NUCLEO_H743: BoardCapacity = BoardCapacity {
     name: "nucleo-h743",
     nodes: 4096,
     half_edges: 65_536,
     vehicles: 32,
     gates: 128,
     pieces: 2048,
-    roadmap_bytes: roadmap_bytes(&Layout::H743),
+    roadmap_bytes: roadmap_bytes(&FlashLayout::H743),
     vertices: 256,
     lanes: 512,
 };
 
 /// The smaller board, with half the memory.
-pub const HALF: Board = Board {
+pub const HALF: BoardCapacity = BoardCapacity {
     name: "pico2",
     nodes: 2048,
     half_edges: 32_768,
     vehicles: 16,
     pieces: 1024,
-    roadmap_bytes: roadmap_bytes(&Layout::PICO2),
+    roadmap_bytes: roadmap_bytes(&FlashLayout::PICO2),
     lanes: 256,
     ..NUCLEO_H743
 };
 
 /// All boards; the first holds the most.
-pub const BOARDS: [Board; 3] = [NUCLEO_H743, Board { name: "qemu", ..NUCLEO_H743 }, HALF];
+pub const BOARDS: [BoardCapacity; 3] = [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, HALF];
 
-impl Board {
+impl BoardCapacity {
     /// The board of this name.
     ///
     /// # Errors
     /// There is none; the error names those there are.
-    pub fn named(name: &str) -> Result<&'static Self, String> {
+    pub fn by_name(name: &str) -> Result<&'static Self, String> {
         let names = || BOARDS.map(|board| board.name).join(", ");
         BOARDS.iter().find(|board| board.name == name).ok_or_else(|| format!("boards are {}", names()))
     }
 
     /// The first of the board's limits that a roadmap file exceeds.
     pub fn roadmap_excess(&self, roadmap: &RoadmapView<'_>) -> Option<String> {
-        self.excess(&[
+        self.first_excess(&[
             ("nodes", roadmap.node_count(), self.nodes),
             ("half-edges", roadmap.half_edge_count(), self.half_edges),
             ("bytes of roadmap", roadmap.byte_len(), self.roadmap_bytes),
@@ -111,12 +111,12 @@ impl Board {
 
     /// The first of the board's limits that an area exceeds.
     pub fn area_excess(&self, vertices: usize, lanes: usize) -> Option<String> {
-        self.excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
+        self.first_excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
     }
 
     /// The first of the board's limits that a mission file exceeds.
     pub fn mission_excess(&self, mission: &MissionView<'_>) -> Option<String> {
-        self.excess(&[
+        self.first_excess(&[
             ("vehicles", mission.vehicles().len(), self.vehicles),
             ("goals", mission.goals().len(), self.vehicles),
         ])
@@ -124,10 +124,10 @@ impl Board {
 
     /// Whether a vehicle's plan has more gates than it holds.
     pub fn gates_excess(&self, gates: usize) -> Option<String> {
-        self.excess(&[("gates of one vehicle", gates, self.gates)])
+        self.first_excess(&[("gates of one vehicle", gates, self.gates)])
     }
 
-    fn excess(&self, limits: &[(&str, usize, usize)]) -> Option<String> {
+    fn first_excess(&self, limits: &[(&str, usize, usize)]) -> Option<String> {
         let over = limits.iter().find(|(_, count, most)| count > most);
         over.map(|(what, count, most)| format!("{count} {what}, {} holds {most}", self.name))
     }

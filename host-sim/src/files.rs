@@ -23,7 +23,7 @@ pub const BINARY_BYTES: u64 = 1 << 26;
 /// It cannot be read, is not a regular file, or is longer.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     // Asked before it is opened: opening a FIFO waits for its other end.
-    let length = regular(path)?;
+    let length = regular_file_len(path)?;
     let too_long = || io::Error::other(format!("it is longer than {most} bytes"));
     if length > most {
         return Err(too_long());
@@ -46,21 +46,21 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// There is none, or it is something else.
-pub fn regular(path: &Path) -> io::Result<u64> {
+pub fn regular_file_len(path: &Path) -> io::Result<u64> {
     let metadata = fs::metadata(path)?;
     let kind = if metadata.is_dir() { "it is a directory" } else { "it is not a regular file" };
     if metadata.is_file() { Ok(metadata.len()) } else { Err(io::Error::other(kind)) }
 }
 
 /// Files that a command writes into one directory: all of them, or none.
-pub struct Results {
+pub struct ResultFiles {
     dir: PathBuf,
     /// Directories made for them, the innermost first.
     made: Vec<PathBuf>,
     files: Vec<(NamedTempFile, PathBuf)>,
 }
 
-impl Results {
+impl ResultFiles {
     /// Makes the directory and tries whether it takes files of these names. It is gone again if nothing is kept in it.
     ///
     /// # Errors
@@ -71,9 +71,9 @@ impl Results {
         let results = Self { dir: dir.into(), made: missing.map(PathBuf::from).collect(), files: Vec::new() };
         fs::create_dir_all(dir).with_context(|| format!("cannot make a directory: {}", quoted_path(dir)))?;
         for name in names {
-            results.target(name)?;
+            results.target_path(name)?;
         }
-        results.temporary()?;
+        results.temporary_file()?;
         Ok(results)
     }
 
@@ -81,7 +81,7 @@ impl Results {
     ///
     /// # Errors
     /// As [`Self::open`], or the path names no file.
-    pub fn file(path: &Path) -> anyhow::Result<Self> {
+    pub fn single_file(path: &Path) -> anyhow::Result<Self> {
         // `a/` means a directory, though its last part is `a`.
         let slash = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         let name = path.file_name().and_then(|name| name.to_str()).filter(|_| !slash);
@@ -90,12 +90,12 @@ impl Results {
     }
 
     /// Place of a file of this name: the target of a link.
-    fn target(&self, name: &str) -> anyhow::Result<PathBuf> {
+    fn target_path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
         let cannot = || format!("cannot write: {}", quoted_path(&path));
         match fs::canonicalize(&path) {
             Ok(real) => {
-                regular(&real).with_context(cannot)?;
+                regular_file_len(&real).with_context(cannot)?;
                 let writable = fs::OpenOptions::new().append(true).open(&real);
                 writable.map(|_| real).with_context(cannot)
             }
@@ -103,7 +103,7 @@ impl Results {
         }
     }
 
-    fn temporary(&self) -> anyhow::Result<NamedTempFile> {
+    fn temporary_file(&self) -> anyhow::Result<NamedTempFile> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".flockmate-");
         #[cfg(unix)]
@@ -121,8 +121,8 @@ impl Results {
     /// # Errors
     /// It cannot be written.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let target = self.target(name)?;
-        let mut file = self.temporary()?;
+        let target = self.target_path(name)?;
+        let mut file = self.temporary_file()?;
         let written = file.write_all(bytes).and_then(|()| file.flush());
         written.with_context(|| format!("cannot write: {}", quoted_path(&target)))?;
         self.files.push((file, target));
@@ -141,7 +141,7 @@ impl Results {
     ///
     /// # Errors
     /// One of them cannot be renamed.
-    pub fn keep(mut self) -> anyhow::Result<()> {
+    pub fn commit(mut self) -> anyhow::Result<()> {
         let files = std::mem::take(&mut self.files);
         let mut replaced = Vec::new();
         for (file, target) in files {
@@ -180,7 +180,7 @@ fn put_back(target: &Path, before: Option<TempPath>) {
     };
 }
 
-impl Drop for Results {
+impl Drop for ResultFiles {
     fn drop(&mut self) {
         self.files.clear();
         for dir in &self.made {
@@ -211,34 +211,34 @@ mod tests {
     fn results_are_written_all_or_none() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("a/b");
-        let mut results = Results::open(&out, &["one", "two"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "two"]).unwrap();
         results.add("one", b"1").unwrap();
         drop(results);
         assert!(!folder.path().join("a").exists(), "nothing is left of what was not kept");
 
-        let mut results = Results::open(&out, &["one", "two"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "two"]).unwrap();
         results.add("one", b"1").unwrap();
         assert!(!out.join("one").exists());
         results.add("two", b"2").unwrap();
-        results.keep().unwrap();
+        results.commit().unwrap();
         let names: Vec<_> = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!((names.len(), fs::read(out.join("two")).unwrap()), (2, b"2".to_vec()));
 
         // A file that cannot have its name, here since a folder has it by now, leaves all that was
         // there before.
-        let mut results = Results::open(&out, &["one", "three", "last"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "three", "last"]).unwrap();
         for name in ["one", "three", "last"] {
             results.add(name, b"new").unwrap();
         }
         fs::create_dir_all(out.join("last/full")).unwrap();
-        assert!(results.keep().is_err());
+        assert!(results.commit().is_err());
         assert_eq!(fs::read(out.join("one")).unwrap(), b"1");
         assert!(!out.join("three").exists() && out.join("last/full").is_dir());
         assert_eq!(fs::read_dir(&out).unwrap().count(), 3, "one, two, and the folder");
         fs::remove_dir_all(out.join("last")).unwrap();
 
         // Another run that fails leaves the results of the first.
-        let mut results = Results::open(&out, &["one", "two"]).unwrap();
+        let mut results = ResultFiles::open(&out, &["one", "two"]).unwrap();
         results.add("one", b"other").unwrap();
         drop(results);
         assert_eq!(fs::read(out.join("one")).unwrap(), b"1");
@@ -250,10 +250,10 @@ mod tests {
         fs::write(folder.path().join("file"), b"").unwrap();
         fs::create_dir_all(folder.path().join("out/result.json")).unwrap();
         for (dir, name) in [("file", "result.json"), ("file/x", "result.json"), ("out", "result.json")] {
-            assert!(Results::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
+            assert!(ResultFiles::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
         }
         for path in ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y", "/tmp/x/"] {
-            assert!(Results::file(Path::new(path)).is_err(), "{path}");
+            assert!(ResultFiles::single_file(Path::new(path)).is_err(), "{path}");
         }
         assert!(!folder.path().join("file/x").exists());
     }
@@ -265,9 +265,9 @@ mod tests {
         let (real, link) = (folder.path().join("real"), folder.path().join("link"));
         fs::write(&real, b"old").unwrap();
         std::os::unix::fs::symlink(&real, &link).unwrap();
-        let mut results = Results::file(&link).unwrap();
+        let mut results = ResultFiles::single_file(&link).unwrap();
         results.add_file(&link, b"new").unwrap();
-        results.keep().unwrap();
+        results.commit().unwrap();
         assert_eq!(fs::read(&real).unwrap(), b"new");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
     }

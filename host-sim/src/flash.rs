@@ -5,13 +5,13 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use companion::storage::store::{Fault, FlashRequest, Layout, MAX_READ, ReadFlash};
+use companion::storage::store::{FlashFault, FlashLayout, FlashRequest, MAX_READ, ReadFlash};
 
 use crate::files;
 use crate::quote::quoted_path;
 
 /// Flash layout of a companion on the desk: the default board's bank.
-pub const LAYOUT: Layout = Layout::H743;
+pub const LAYOUT: FlashLayout = FlashLayout::H743;
 
 /// The bank.
 pub struct DeskFlash {
@@ -29,7 +29,7 @@ impl DeskFlash {
         let Some(path) = path else { return Ok(Self { bytes, file: None }) };
         let failed = || format!("cannot keep a flash: {}", quoted_path(path));
         if path.exists() {
-            files::regular(path).with_context(failed)?;
+            files::regular_file_len(path).with_context(failed)?;
         }
         let opened = File::options().read(true).write(true).create(true).truncate(false).open(path);
         let mut file = opened.with_context(failed)?;
@@ -46,21 +46,21 @@ impl DeskFlash {
     }
 
     /// Does what a companion asks; the bytes read, none for an erasure or a program.
-    pub fn obey<'a>(
+    pub fn execute_request<'a>(
         &mut self,
         request: FlashRequest<'_>,
         read: &'a mut [u8; MAX_READ],
-    ) -> Result<&'a [u8], Fault> {
+    ) -> Result<&'a [u8], FlashFault> {
         match request {
             FlashRequest::Read { at, len } => {
-                let out = read.get_mut(..len).ok_or(Fault)?;
+                let out = read.get_mut(..len).ok_or(FlashFault)?;
                 self.read(at, out)?;
                 return Ok(out);
             }
             FlashRequest::Erase { at } => {
-                self.change(at, LAYOUT.sector_len as usize, |part| part.fill(0xFF))?;
+                self.modify_range(at, LAYOUT.sector_len as usize, |part| part.fill(0xFF))?;
             }
-            FlashRequest::Program { at, bytes } => self.change(at, bytes.len(), |part| {
+            FlashRequest::Program { at, bytes } => self.modify_range(at, bytes.len(), |part| {
                 // Programmed as flash does it: bits only fall.
                 part.iter_mut().zip(bytes).for_each(|(held, byte)| *held &= byte);
             })?,
@@ -73,22 +73,27 @@ impl DeskFlash {
         self.bytes
     }
 
-    fn change(&mut self, at: u32, len: usize, change: impl FnOnce(&mut [u8])) -> Result<(), Fault> {
+    fn modify_range(
+        &mut self,
+        at: u32,
+        len: usize,
+        change: impl FnOnce(&mut [u8]),
+    ) -> Result<(), FlashFault> {
         let start = at as usize;
-        let part = self.bytes.get_mut(start..start + len).ok_or(Fault)?;
+        let part = self.bytes.get_mut(start..start + len).ok_or(FlashFault)?;
         change(part);
         if let Some(file) = &mut self.file {
             let written = file.seek(SeekFrom::Start(u64::from(at))).and_then(|_| file.write_all(part));
-            written.map_err(|_| Fault)?;
+            written.map_err(|_| FlashFault)?;
         }
         Ok(())
     }
 }
 
 impl ReadFlash for DeskFlash {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
         let start = at as usize;
-        out.copy_from_slice(self.bytes.get(start..start + out.len()).ok_or(Fault)?);
+        out.copy_from_slice(self.bytes.get(start..start + out.len()).ok_or(FlashFault)?);
         Ok(())
     }
 }

@@ -48,13 +48,13 @@ const BAD_INPUT: u8 = 2;
 fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(cli) => run(cli.command),
-        Err(error) => refused(&error),
+        Err(error) => print_argument_error(&error),
     };
     // Results that nobody could read are none.
-    let done = done.and_then(|code| progress::printed().map(|()| code));
+    let done = done.and_then(|code| progress::check_printed().map(|()| code));
     done.unwrap_or_else(|error| {
         // Where the error cannot be printed either, the exit code reports it.
-        let _ = writeln!(std::io::stderr(), "error: {}", quote::message(&format!("{error:#}")));
+        let _ = writeln!(std::io::stderr(), "error: {}", quote::quote_message(&format!("{error:#}")));
         ExitCode::from(BAD_INPUT)
     })
 }
@@ -76,7 +76,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
 }
 
 /// A command line that is no command: help that was asked for, or one line that says what is wrong, and a hint.
-fn refused(error: &clap::Error) -> anyhow::Result<ExitCode> {
+fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
     if asked {
         let text = error.render();

@@ -9,11 +9,11 @@ pub mod stretches;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
-use companion::planner::{self, Step};
-use companion::storage::mission_file::{Block, MissionGoal};
-use companion::{PlanFailure, Wanted};
+use companion::planner::{self, PlanStep};
+use companion::storage::mission_file::{MissionBlock, MissionGoal};
+use companion::{PlanFailure, PlanKind};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
+use planner_core::detour::{self, DetourError, DetourRequest, KeepOutZone};
 use planner_core::flight::{PathError, Task};
 use planner_core::plan::{self, PlanError};
 use planner_core::schedule::ScheduleError;
@@ -22,7 +22,7 @@ use planner_core::search::SearchWorkspace;
 use self::ready::schedule_config;
 pub use self::ready::{Mission, OwnPlan, PLANNED_ACCEL_MPS2, SwarmPlan, VERTICAL_MPS};
 use crate::capacity::{
-    Board, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap,
+    BoardCapacity, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap,
 };
 use crate::coverage::check_ground;
 use crate::map::{self, VoxelMap};
@@ -63,7 +63,7 @@ impl Mission {
     /// The same, and more vehicles, goals or nodes than the board holds.
     pub fn prepare_for(
         scenario: Scenario,
-        board: Option<&'static Board>,
+        board: Option<&'static BoardCapacity>,
         progress: &Progress,
     ) -> anyhow::Result<Self> {
         if scenario.area.is_some() {
@@ -72,18 +72,18 @@ impl Mission {
         }
         let mut timing = Timing::default();
         let begun = Instant::now();
-        let stage = progress.stage("map");
+        let stage = progress.begin_stage("map");
         let map = map::load(&scenario.map.file, scenario.map.resolution_m)?.voxel_map(scenario.map.unknown);
         timing.map_s = begun.elapsed().as_secs_f64();
         drop(stage);
 
         let begun = Instant::now();
-        let stage = progress.stage("roadmap");
+        let stage = progress.begin_stage("roadmap");
         let schedule = schedule_config(&scenario);
-        let goals = places::goals(&scenario, &map, &schedule)?;
-        let tasks = places::tasks(&scenario, &map)?;
+        let goals = places::goal_points(&scenario, &map, &schedule)?;
+        let tasks = places::vehicle_tasks(&scenario, &map)?;
         let descents_m = descents_m(&scenario, &map, &goals)?;
-        if let Some(Board { name, vehicles, .. }) =
+        if let Some(BoardCapacity { name, vehicles, .. }) =
             board.filter(|b| b.vehicles < tasks.len().max(goals.len()))
         {
             bail!(
@@ -91,11 +91,11 @@ impl Mission {
                 scenario.path
             );
         }
-        let (mut roadmap, header, parts) = places::build(&scenario, &map, &goals)?;
+        let (mut roadmap, header, parts) = places::build_roadmap(&scenario, &map, &goals)?;
         timing.roadmap_parts = parts;
         let capping = Instant::now();
         if let Some(board) = board {
-            roadmap = roadmap.fit(board)?;
+            roadmap = roadmap.fit_to_board(board)?;
             timing.roadmap_parts.cap_s = capping.elapsed().as_secs_f64();
         }
         let encoding = Instant::now();
@@ -123,7 +123,7 @@ impl Mission {
             .zip(&self.descents_m)
             .map(|(&position, &descent_m)| MissionGoal { position, descent_m })
             .collect();
-        self.encode(&Block::Goals(&goals))
+        self.encode(&MissionBlock::Goals(&goals))
     }
 
     /// Another separation than the scenario's, in the air and from vehicles that stand, metres. Plans follow from the mission
@@ -131,7 +131,7 @@ impl Mission {
     ///
     /// # Errors
     /// What a mission file does not hold.
-    pub fn separate(&mut self, separation_m: f32, parked_separation_m: f32) -> anyhow::Result<()> {
+    pub fn set_separation(&mut self, separation_m: f32, parked_separation_m: f32) -> anyhow::Result<()> {
         (self.schedule.separation_m, self.schedule.parked_separation_m) = (separation_m, parked_separation_m);
         self.mission_file = self.goals_file()?;
         Ok(())
@@ -150,36 +150,38 @@ impl Mission {
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
         let (mut step_begun, mut search_s, mut assignment_s) = (Instant::now(), 0.0, 0.0);
-        planner::goals(&mission, &view, self.gates_most(), &mut workspace, &mut plan, |step| {
+        planner::plan_goals(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
             let took_s = core::mem::replace(&mut step_begun, Instant::now()).elapsed().as_secs_f64();
             match step {
-                Step::Search => search_s = took_s,
-                Step::Assignment => assignment_s = took_s,
-                Step::Schedule => {}
+                PlanStep::Search => search_s = took_s,
+                PlanStep::Assignment => assignment_s = took_s,
+                PlanStep::Schedule => {}
             }
         })
-        .map_err(|e| self.describe(&e))?;
+        .map_err(|e| self.describe_plan_error(&e))?;
         (self.timing.search_s, self.timing.assignment_s) = (search_s, assignment_s);
         self.timing.plan_s = begun.elapsed().as_secs_f64();
         Ok(plan)
     }
 
     /// Gates that one vehicle may have.
-    fn gates_most(&self) -> usize {
+    fn max_gates(&self) -> usize {
         self.board.map_or(GATES, |board| board.gates)
     }
 
-    fn describe(&self, error: &PlanError) -> anyhow::Error {
+    fn describe_plan_error(&self, error: &PlanError) -> anyhow::Error {
         let path = &self.scenario.path;
         match error {
             PlanError::Schedule(id, ScheduleError::Blocked) => anyhow!(
                 "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\nhint: {}",
-                self.too_near().unwrap_or_else(|| "move its start or goal out of their way, or give the \
+                self.describe_near_goals().unwrap_or_else(|| {
+                    "move its start or goal out of their way, or give the \
                                                    roadmap more nodes"
-                    .into())
+                        .into()
+                })
             ),
             PlanError::Schedule(id, ScheduleError::GatesFull) => {
-                let most = self.gates_most();
+                let most = self.max_gates();
                 anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {most} gates")
             }
             PlanError::Schedule(id, ScheduleError::PiecesFull) => {
@@ -200,7 +202,7 @@ impl Mission {
     }
 
     /// Two goals that are too near to each other for two vehicles to land there, and the distance needed.
-    fn too_near(&self) -> Option<String> {
+    fn describe_near_goals(&self) -> Option<String> {
         let scenario = &self.scenario;
         let needed_m = self.schedule.parked_separation_m;
         let landed = |i: usize| self.goals[i] - Point::new(0.0, 0.0, self.descents_m[i]);
@@ -216,7 +218,7 @@ impl Mission {
     }
 
     /// Goals that no vehicle flies to, and vehicles that no goal is left for.
-    pub fn left(&self, plan: &SwarmPlan) -> Left {
+    pub fn unserved(&self, plan: &SwarmPlan) -> Left {
         if self.scenario.area.is_some() {
             // Whoever stays on the ground would finish no sooner.
             return Left::default();
@@ -224,49 +226,50 @@ impl Mission {
         let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));
         Left {
             goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
-            vehicles: plan.flights.iter().filter(|f| !f.task.flies()).map(|f| f.id).collect(),
+            vehicles: plan.flights.iter().filter(|f| !f.task.leaves_pad()).map(|f| f.id).collect(),
             reasons: Vec::new(),
         }
     }
 
-    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or a way around.
-    pub fn answer(
+    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or a detour.
+    pub fn answer_plan_request(
         &self,
         plan: &SwarmPlan,
         index: usize,
-        wanted: Wanted,
+        wanted: PlanKind,
         companion: &DeskCompanion,
     ) -> Result<Box<OwnPlan>, PlanFailure> {
         let own = |plan: &SwarmPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
         match wanted {
-            Wanted::Mission if companion.done().is_empty() => own(plan),
-            Wanted::Mission | Wanted::Division => {
-                let losses = companion.losses().take(if wanted == Wanted::Division { usize::MAX } else { 0 });
-                let rest = self.plan_rest(companion.done(), losses);
+            PlanKind::Mission if companion.excluded_waypoints().is_empty() => own(plan),
+            PlanKind::Mission | PlanKind::Division => {
+                let losses =
+                    companion.losses().take(if wanted == PlanKind::Division { usize::MAX } else { 0 });
+                let rest = self.plan_rest(companion.excluded_waypoints(), losses);
                 own(&*rest.map_err(|_| PlanFailure::Unreachable)?)
             }
-            Wanted::Detour => {
+            PlanKind::Detour => {
                 let mut obstacles = Vec::new();
-                let request = companion.detour(|obstacle| obstacles.push(obstacle));
+                let request = companion.detour_request(|obstacle| obstacles.push(obstacle));
                 let request = request.ok_or(PlanFailure::Unreachable)?;
                 match self.scenario.area.is_some() {
-                    true => self.around(&request, &mut obstacles),
-                    false => self.detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable),
+                    true => self.plan_area_detour(&request, &mut obstacles),
+                    false => self.plan_detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable),
                 }
             }
         }
     }
 
     /// A way around `obstacles`.
-    fn detour(
+    fn plan_detour(
         &self,
         request: &DetourRequest,
-        obstacles: &mut [KeepOff],
+        obstacles: &mut [KeepOutZone],
     ) -> Result<Box<OwnPlan>, DetourError> {
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();
-        detour::plan_vehicle(&self.view(), request, obstacles, &mut search, &mut nodes, &mut own)?;
+        detour::plan_vehicle_detour(&self.view(), request, obstacles, &mut search, &mut nodes, &mut own)?;
         Ok(own)
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use planner_core::Point;
 
-use crate::files::Results;
+use crate::files::ResultFiles;
 use crate::mission::{Mission, SwarmPlan};
 use crate::report::{
     self, Curve, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
@@ -94,7 +94,7 @@ pub const RESULT_FILES: [&str; 3] = ["result.json", "timing.json", "report.html"
 /// # Errors
 /// One cannot be written.
 pub fn add(
-    results: &mut Results,
+    results: &mut ResultFiles,
     result: &MissionResult,
     timing: &Timing,
     mut page: ReportData,
@@ -106,7 +106,7 @@ pub fn add(
 }
 
 /// One `x y z` a line, metres, for other programs to be given the same work.
-pub fn points(points: impl Iterator<Item = Point>) -> String {
+pub fn points_to_text(points: impl Iterator<Item = Point>) -> String {
     points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect()
 }
 

@@ -25,7 +25,7 @@ impl Progress {
     }
 
     /// A stage of unknown length; gone when dropped.
-    pub fn stage(self, name: &'static str) -> Stage {
+    pub fn begin_stage(self, name: &'static str) -> Stage {
         let bar = self.shown.then(|| {
             let bar = ProgressBar::new_spinner().with_message(name);
             bar.enable_steady_tick(Duration::from_millis(100));
@@ -35,7 +35,7 @@ impl Progress {
     }
 
     /// A stage of `length` steps; gone when dropped.
-    pub fn steps(self, name: &'static str, length: u64) -> Stage {
+    pub fn begin_counted_stage(self, name: &'static str, length: u64) -> Stage {
         let style = ProgressStyle::with_template("{msg:12} {bar:40} {pos}/{len} {elapsed}");
         let bar = self.shown.then(|| {
             let bar = ProgressBar::new(length).with_message(name);
@@ -53,7 +53,7 @@ pub struct Stage {
 
 impl Stage {
     /// Shows the progress of the stage.
-    pub fn at(&self, position: u64) {
+    pub fn set_position(&self, position: u64) {
         if let Some(bar) = &self.bar {
             bar.set_position(position);
         }
@@ -83,14 +83,14 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
 ///
 /// # Errors
 /// Standard output did not take a line: its reader has gone away, or a disk is full.
-pub fn printed() -> anyhow::Result<()> {
+pub fn check_printed() -> anyhow::Result<()> {
     match STDOUT_ERROR.lock().expect("nobody panics with it").take() {
         Some(error) => Err(error).context("cannot print: standard output"),
         None => Ok(()),
     }
 }
 
-/// Prints a line. Where that fails the work goes on, since it may fly something; [`printed`](crate::progress::printed)
+/// Prints a line. Where that fails the work continues, since it may fly something; [`check_printed`](crate::progress::check_printed)
 /// reports at its end.
 #[macro_export]
 macro_rules! say {

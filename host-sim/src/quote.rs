@@ -7,15 +7,15 @@ pub const MAX_QUOTE_CHARS: usize = 200;
 /// Longest line of an error, characters: the words around two quotations.
 const MAX_ERROR_CHARS: usize = 600;
 
-/// A character that changes how a terminal shows what stands around it.
-fn is_code(c: char) -> bool {
+/// Whether a character changes how a terminal shows the text around it.
+fn is_control_code(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
 }
 
 /// The text with its codes escaped; where it is longer than [`MAX_QUOTE_CHARS`] characters, its beginning and its end.
 pub fn quoted(text: &str) -> String {
-    // No more than could be shown is looked at, from either end.
+    // No more than could be shown is checked, from either end.
     shortened(&escaped(&shortened(text, 2 * MAX_QUOTE_CHARS)), MAX_QUOTE_CHARS)
 }
 
@@ -27,7 +27,7 @@ pub fn quoted_path(path: &Path) -> String {
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        if is_code(c) {
+        if is_control_code(c) {
             out.extend(c.escape_default());
         } else {
             out.push(c);
@@ -47,7 +47,7 @@ fn shortened(text: &str, most: usize) -> String {
 }
 
 /// A whole message as it is printed: nothing in it is a code but its ends of line, and no line is endless.
-pub fn message(text: &str) -> String {
+pub fn quote_message(text: &str) -> String {
     let lines: Vec<String> = text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
     lines.join("\n")
 }
@@ -63,7 +63,7 @@ pub fn about_arguments(text: &str, arguments: impl Iterator<Item = String>) -> S
             }
         }
     }
-    message(&text)
+    quote_message(&text)
 }
 
 #[cfg(test)]
@@ -95,8 +95,8 @@ mod tests {
         #[test]
         fn whatever_is_quoted_is_short_and_without_codes(text in "(?s).{0,700}") {
             let short = quoted(&text);
-            prop_assert!(short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_code), "{short:?}");
-            prop_assert!(message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_code)));
+            prop_assert!(short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_control_code), "{short:?}");
+            prop_assert!(quote_message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_control_code)));
         }
     }
 }

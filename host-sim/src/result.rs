@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use crate::roadmap::Parts;
+use crate::roadmap::BuildTimes;
 
 /// `result.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -208,7 +208,7 @@ pub struct Timing {
     /// Starts and goals checked; the roadmap: nodes, edges and their clearances, file.
     pub roadmap_s: f64,
     /// Time of each part of the roadmap's construction.
-    pub roadmap_parts: Parts,
+    pub roadmap_parts: BuildTimes,
     /// The shortest paths that give what each goal would cost each vehicle.
     pub search_s: f64,
     /// Which vehicle flies to which goal.

@@ -21,7 +21,7 @@ use planner_core::search::SearchWorkspace;
 use planner_core::voxel::{GridShape, VoxelGrid};
 use rayon::prelude::*;
 
-use crate::capacity::{Board, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
+use crate::capacity::{BoardCapacity, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
 use crate::map::{BoxTree, VoxelMap};
 
 /// Greatest clearance stored with an edge, metres: no vehicle of ours is any wider.
@@ -47,7 +47,7 @@ pub struct Roadmap {
 
 /// How long each part took, seconds. Boxes and nodes are made at the same time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Parts {
+pub struct BuildTimes {
     /// The tree of boxes over the map, from which distances are read.
     pub boxes_s: f64,
     /// Random free nodes, and their heights over the ground.
@@ -64,7 +64,7 @@ pub struct Parts {
 
 /// Samples and joins: Algorithm 1 of P3D, with the clearance of every edge. The result does not depend on the number of
 /// threads.
-pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<(Roadmap, Parts)> {
+pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<(Roadmap, BuildTimes)> {
     let grid = map.grid();
     let sampled = || {
         let nodes = sample(map, terminals, config)?;
@@ -77,7 +77,8 @@ pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Re
     let joining = Instant::now();
     let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     let edges = join(&grid, &tree, &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
-    let parts = Parts { boxes_s, nodes_s, edges_s: joining.elapsed().as_secs_f64(), ..Parts::default() };
+    let parts =
+        BuildTimes { boxes_s, nodes_s, edges_s: joining.elapsed().as_secs_f64(), ..BuildTimes::default() };
     Ok((Roadmap { nodes, edges, heights_m }, parts))
 }
 
@@ -87,10 +88,10 @@ pub fn add_passages(
     map: &VoxelMap,
     roadmap: &mut Roadmap,
     config: &Config,
-    wanted: &[passages::Wanted],
+    wanted: &[passages::WantedConnection],
 ) -> anyhow::Result<usize> {
     let (grid, tree) = (map.grid(), BoxTree::new(&map.grid()));
-    let added = passages::missing(map, &tree, &roadmap.nodes, &roadmap.edges, config, wanted);
+    let added = passages::missing_passage_nodes(map, &tree, &roadmap.nodes, &roadmap.edges, config, wanted);
     if added.is_empty() {
         return Ok(0);
     }
@@ -137,8 +138,8 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     config: &Config,
     workspace: &mut Workspace<NODES, CUBES>,
 ) -> Result<Vec<prm::Edge>, PrmError> {
-    workspace.index(nodes, config)?;
-    in_pieces(nodes.len(), |range, edges| {
+    workspace.build_index(nodes, config)?;
+    map_nodes_in_parallel(nodes.len(), |range, edges| {
         prm::connect_range(grid, workspace, config, range, |edge| {
             edges.push(edge);
             Ok(())
@@ -156,7 +157,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
     config: &Config,
     workspace: &mut Workspace<NODES, CUBES>,
 ) -> Result<Vec<Edge>, PrmError> {
-    workspace.index(nodes, config)?;
+    workspace.build_index(nodes, config)?;
     // No edge is farther from obstacles than its ends; most are just as far as the nearer of them.
     let around: Vec<f32> =
         nodes.par_iter().map(|node| tree.clearance_m(node, node, MAX_STORED_CLEARANCE_M, 0.0)).collect();
@@ -170,7 +171,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
         tree.clearance_m(&nodes[a], &nodes[b], most_m(edge), enough_m)
     };
     let unsure_m = rounding_m(grid.shape()) + 1e-5 * config.clearance_m;
-    in_pieces(nodes.len(), |range, edges| {
+    map_nodes_in_parallel(nodes.len(), |range, edges| {
         let known = Cell::new(None);
         let hint = |edge| {
             let nearest_m = clearance_m(edge, config.clearance_m - unsure_m);
@@ -191,7 +192,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
 }
 
 /// Results of `work` for all nodes, piece by piece on all threads, in the order of the pieces.
-fn in_pieces<T: Copy + Send>(
+fn map_nodes_in_parallel<T: Copy + Send>(
     nodes: usize,
     work: impl Fn(Range<usize>, &mut Vec<T>) -> Result<(), PrmError> + Sync,
 ) -> Result<Vec<T>, PrmError> {
@@ -214,11 +215,11 @@ fn rounding_m(shape: &GridShape) -> f32 {
 }
 
 impl Roadmap {
-    /// The nodes with as many of the edges as a board holds: [`cap::cap`] chooses them.
+    /// The nodes with as many of the edges as a board holds: [`cap::limit_edges`] chooses them.
     ///
     /// # Errors
     /// It has more nodes than the board holds, or needs more edges to stay connected.
-    pub fn fit(self, board: &Board) -> anyhow::Result<Self> {
+    pub fn fit_to_board(self, board: &BoardCapacity) -> anyhow::Result<Self> {
         let (name, nodes) = (board.name, self.nodes.len());
         if nodes > board.nodes {
             bail!(
@@ -230,7 +231,7 @@ impl Roadmap {
         let bare = roadmap::encoded_len(nodes, 0, NODE_COLUMNS).unwrap_or(usize::MAX);
         let an_edge = 2 * size_of::<u32>();
         let most = (board.half_edges / 2).min(board.roadmap_bytes.saturating_sub(bare) / an_edge);
-        let edges = cap::cap(&self.nodes, &self.edges, most)
+        let edges = cap::limit_edges(&self.nodes, &self.edges, most)
             .ok_or_else(|| anyhow!("the roadmap does not fit {name}: {most} edges do not connect it"))?;
         Ok(Self { edges, ..self })
     }
@@ -276,12 +277,12 @@ fn describe(error: &PrmError) -> anyhow::Error {
 mod tests {
     use super::*;
     use crate::map::Unknown;
-    use crate::map::building::building;
+    use crate::map::building::building_map;
     use planner_core::prm::Sampling;
 
     #[test]
     fn any_number_of_threads_gives_the_same_edges() {
-        let map = building(1, 0.5).unwrap().voxel_map(Unknown::Blocked);
+        let map = building_map(1, 0.5).unwrap().voxel_map(Unknown::Blocked);
         let config = Config {
             nodes: 500,
             edge_min_m: 0.5,

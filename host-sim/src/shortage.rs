@@ -1,7 +1,7 @@
 //! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what would help.
 //!
 //! Whether a way is missing in the roadmap or in the building is read from the map itself: the widest way from a goal to a
-//! start, over the centres of its cells, by a flood that always goes on from the widest cell it has reached. Its width is
+//! start, over the centres of its cells, by a flood that always continues from the widest cell it has reached. Its width is
 //! the distance to the nearest obstacle at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood
 //! of each near a wall; only missions that fall short pay it.
 
@@ -22,13 +22,13 @@ const MAX_FLOODED_CELLS: usize = 1 << 25;
 const MAX_GOAL_LINES: usize = 8;
 
 /// One line for each goal that is left and each vehicle without one, with its place and what would help.
-pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
-    let left = mission.left(plan);
+pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
+    let left = mission.unserved(plan);
     let all = left.goals.len() + left.vehicles.len();
     if all == 0 {
         return Vec::new();
     }
-    let mut asked = Asked { mission, reach: Reach::new(mission), widths: BTreeMap::new() };
+    let mut asked = ShortageFindings { mission, reach: Reachability::new(mission), widths: BTreeMap::new() };
     let mut lines = Vec::new();
     for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
@@ -45,14 +45,14 @@ pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
 }
 
 /// Findings so far.
-struct Asked<'a> {
+struct ShortageFindings<'a> {
     mission: &'a Mission,
-    reach: Reach,
-    /// For each vehicle asked about, [`widths_m`] to all goals.
+    reach: Reachability,
+    /// For each vehicle asked about, [`widest_path_clearances_m`] to all goals.
     widths: BTreeMap<usize, Option<Vec<f32>>>,
 }
 
-fn goal_line(asked: &mut Asked<'_>, goal: usize) -> String {
+fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     let (mission, reach) = (asked.mission, &asked.reach);
     let (at, vehicles) = (&mission.goals[goal], mission.tasks.len());
     let what = format!("goal {goal} at [{}, {}, {}]", at.x, at.y, at.z);
@@ -60,13 +60,13 @@ fn goal_line(asked: &mut Asked<'_>, goal: usize) -> String {
     let bound =
         mission.tasks.iter().enumerate().find(|(_, task)| task.goal.is_some_and(|g| usize::from(g) == goal));
     let reachable = match bound {
-        Some((vehicle, _)) => reach.joined(vehicle, goal),
-        None => (0..vehicles).any(|vehicle| reach.joined(vehicle, goal)),
+        Some((vehicle, _)) => reach.are_connected(vehicle, goal),
+        None => (0..vehicles).any(|vehicle| reach.are_connected(vehicle, goal)),
     };
     let labelled = mission.tasks.iter().any(|task| task.goal.is_some());
     let why = match (reachable, bound, labelled) {
         (false, bound, _) => {
-            let vehicle = bound.map_or_else(|| smallest(mission), |(vehicle, _)| vehicle);
+            let vehicle = bound.map_or_else(|| smallest_vehicle(mission), |(vehicle, _)| vehicle);
             format!("no way in the roadmap leads there; {}", what_helps(asked, vehicle, goal))
         }
         (true, _, true) => "no vehicle names it as its goal".to_owned(),
@@ -81,13 +81,13 @@ fn goal_line(asked: &mut Asked<'_>, goal: usize) -> String {
     format!("{what}{place}: {why}")
 }
 
-fn vehicle_line(asked: &mut Asked<'_>, id: u8, asks: bool) -> String {
+fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String {
     let (mission, reach) = (asked.mission, &asked.reach);
     let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();
     let at = &mission.scenario.vehicles[vehicle].start;
     let place = mission.scenario.vehicle_places.get(vehicle).map_or(String::new(), |p| format!(" ({p})"));
     let goals = mission.goals.len();
-    let why = if !(0..goals).any(|goal| reach.joined(vehicle, goal)) {
+    let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
         let helps = if asks { format!("; {}", what_helps(asked, vehicle, goal)) } else { String::new() };
         format!("no way in the roadmap leads from it to a goal{helps}")
@@ -100,19 +100,25 @@ fn vehicle_line(asked: &mut Asked<'_>, id: u8, asks: bool) -> String {
 }
 
 /// The vehicle that fits through most.
-fn smallest(mission: &Mission) -> usize {
+fn smallest_vehicle(mission: &Mission) -> usize {
     let radius = |i: &usize| mission.scenario.vehicles[*i].radius_m;
     (0..mission.tasks.len()).min_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default()
 }
 
 /// Remedy that would bring this vehicle to this goal.
-fn what_helps(asked: &mut Asked<'_>, vehicle: usize, goal: usize) -> String {
+fn what_helps(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
     let (radius_m, required_m) = (settings.radius_m, mission.tasks[vehicle].required_clearance_m);
     let widths = asked.widths.entry(vehicle).or_insert_with(|| {
         let field = mission.clearance_field();
-        widths_m(&mission.map, |p| field.lower_bound_m(p), &settings.start, &mission.goals, required_m)
+        widest_path_clearances_m(
+            &mission.map,
+            |p| field.lower_bound_m(p),
+            &settings.start,
+            &mission.goals,
+            required_m,
+        )
     });
     let Some(widest_m) = widths.as_ref().map(|widths| widths[goal]) else {
         return "more roadmap.nodes or a smaller roadmap.safety_margin_m may help".to_owned();
@@ -142,34 +148,34 @@ fn what_helps(asked: &mut Asked<'_>, vehicle: usize, goal: usize) -> String {
 }
 
 /// Which goals each vehicle's start is joined to by edges that are wide enough for it.
-struct Reach {
+struct Reachability {
     /// Whether each vehicle is joined to each goal.
     joined: Vec<Vec<bool>>,
 }
 
-impl Reach {
+impl Reachability {
     fn new(mission: &Mission) -> Self {
         let view = mission.view();
         let vehicles = mission.tasks.len();
         let row = |vehicle: usize| {
-            let seen = component(&view, vehicle, mission.tasks[vehicle].required_clearance_m);
+            let seen = connected_component(&view, vehicle, mission.tasks[vehicle].required_clearance_m);
             (0..mission.goals.len()).map(|goal| seen[vehicles + goal]).collect()
         };
         Self { joined: (0..vehicles).map(row).collect() }
     }
 
-    fn joined(&self, vehicle: usize, goal: usize) -> bool {
+    fn are_connected(&self, vehicle: usize, goal: usize) -> bool {
         self.joined[vehicle][goal]
     }
 }
 
 /// The nodes that edges of this clearance join to a node.
-fn component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> Vec<bool> {
+fn connected_component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> Vec<bool> {
     let mut seen = vec![false; view.node_count()];
     let mut open = vec![from as u16];
     seen[from] = true;
     while let Some(node) = open.pop() {
-        for edge in view.half_edges(node).filter(|edge| view.clears(edge, required_m)) {
+        for edge in view.half_edges(node).filter(|edge| view.has_clearance(edge, required_m)) {
             if !std::mem::replace(&mut seen[usize::from(edge.target)], true) {
                 open.push(edge.target);
             }
@@ -180,7 +186,7 @@ fn component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> Vec<bool> 
 
 /// Distance to the nearest obstacle at the narrowest cell of the widest way to each goal, metres, at most `most_m` rounded
 /// up to a step; 0 where there is no way. `None` where the map is too large to be asked. `at_least_m` is a cheap bound.
-fn widths_m(
+fn widest_path_clearances_m(
     map: &VoxelMap,
     at_least_m: impl Fn(&Point) -> f32,
     from: &Point,
@@ -256,7 +262,7 @@ mod tests {
     /// Two rooms behind a wall with a door of `door` cells of 0.1 m.
     fn rooms(door: u32) -> VoxelMap {
         let shape = GridShape { dims: [60, 40, 20], min: Point::zeros(), resolution_m: 0.1 };
-        let mut map = OccupancyMap::unknown(shape, "rooms").unwrap();
+        let mut map = OccupancyMap::all_unknown(shape, "rooms").unwrap();
         for (i, j, k) in (0..60).flat_map(|i| (0..40).flat_map(move |j| (0..20).map(move |k| (i, j, k)))) {
             let in_door = (20 - door / 2..20 + door.div_ceil(2)).contains(&j);
             let wall = (i == 30 && !in_door) || k == 0;
@@ -270,7 +276,9 @@ mod tests {
     fn a_way_is_no_wider_than_its_ends() {
         let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));
         let low = |p: &Point| Point::new(p.x, p.y, 0.2);
-        let widths = |from: &Point, to: &Point| widths_m(&rooms(8), |_| 0.0, from, &[*to], 0.15).unwrap()[0];
+        let widths = |from: &Point, to: &Point| {
+            widest_path_clearances_m(&rooms(8), |_| 0.0, from, &[*to], 0.15).unwrap()[0]
+        };
         assert!(widths(&from, &to) > 0.14);
         assert!(widths(&low(&from), &to) <= 0.101 && widths(&from, &low(&to)) <= 0.101);
     }
@@ -279,10 +287,10 @@ mod tests {
     fn the_widest_way_is_as_wide_as_the_door() {
         let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));
         for door in [2, 5, 8, 12] {
-            let width_m = widths_m(&rooms(door), |_| 0.0, &from, &[to], 2.0).unwrap()[0];
+            let width_m = widest_path_clearances_m(&rooms(door), |_| 0.0, &from, &[to], 2.0).unwrap()[0];
             let half_m = door as f32 * 0.05;
             assert!((width_m - half_m).abs() <= 0.1, "{door}: {width_m} for {half_m}");
         }
-        assert_eq!(widths_m(&rooms(0), |_| 0.0, &from, &[from, to], 2.0).unwrap()[1], 0.0);
+        assert_eq!(widest_path_clearances_m(&rooms(0), |_| 0.0, &from, &[from, to], 2.0).unwrap()[1], 0.0);
     }
 }

@@ -35,7 +35,7 @@ const CRC32: u8 = 14;
 const ACK: u8 = 128;
 
 /// A client on a link.
-pub struct Client {
+pub struct FtpClient {
     link: Box<dyn Link>,
     framer: Framer,
     began: Clock,
@@ -49,7 +49,7 @@ pub struct Client {
 }
 
 /// A piece that is not answered yet.
-struct Piece {
+struct PendingPiece {
     request: [u8; PAYLOAD_LEN],
     length: usize,
     sent_at: Clock,
@@ -64,7 +64,7 @@ struct Answer {
     data: Vec<u8>,
 }
 
-impl Client {
+impl FtpClient {
     /// A client that talks to the companion of one vehicle, or of the first it hears.
     pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
         let now = link.now();
@@ -103,7 +103,7 @@ impl Client {
     }
 
     /// The next frame from a companion, if there is one; beats once a second, so that autopilots pass things on to us.
-    fn hear(&mut self) -> anyhow::Result<Vec<Frame>> {
+    fn receive_frames(&mut self) -> anyhow::Result<Vec<Frame>> {
         if self.link.now() >= self.beat_at {
             self.beat_at += HEARTBEAT_EVERY;
             let beat = HEARTBEAT_DATA {
@@ -135,10 +135,10 @@ impl Client {
     ///
     /// # Errors
     /// None is heard.
-    pub fn find(&mut self) -> anyhow::Result<u8> {
+    pub fn wait_for_companion(&mut self) -> anyhow::Result<u8> {
         let began = self.link.now();
         while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
-            if let Some(frame) = self.hear()?.first() {
+            if let Some(frame) = self.receive_frames()?.first() {
                 self.system = Some(frame.system);
                 return Ok(frame.system);
             }
@@ -151,7 +151,7 @@ impl Client {
         )
     }
 
-    fn request(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
+    fn request_payload(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
         let mut payload = [0; PAYLOAD_LEN];
         (payload[1], payload[2]) = (self.system.unwrap_or(0), COMPANION_COMPONENT);
         payload[3..5].copy_from_slice(&self.sequence.to_le_bytes());
@@ -162,15 +162,15 @@ impl Client {
         payload
     }
 
-    fn ask(&mut self, payload: &[u8; PAYLOAD_LEN]) -> anyhow::Result<()> {
+    fn send_request(&mut self, payload: &[u8; PAYLOAD_LEN]) -> anyhow::Result<()> {
         let mut out = [0; frame::MAX_FRAME_LEN];
         let extra = frame::extra_crc(MESSAGE).context("the dialect has FTP")?;
         let length = frame::encode_raw(self.header(), MESSAGE, extra, payload, &mut out);
         self.send(&out[..length])
     }
 
-    fn answers(&mut self) -> anyhow::Result<Vec<Answer>> {
-        let (us, frames) = ((self.own_system, COMPONENT_ID), self.hear()?);
+    fn receive_answers(&mut self) -> anyhow::Result<Vec<Answer>> {
+        let (us, frames) = ((self.own_system, COMPONENT_ID), self.receive_frames()?);
         let for_us = frames
             .iter()
             .map(Frame::padded)
@@ -186,22 +186,22 @@ impl Client {
         Ok(for_us.map(|(p, _)| read(p)).collect())
     }
 
-    /// Asks until it is answered.
-    fn done(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
-        let request = self.request(opcode, 0, data);
+    /// Repeats a request until it is answered.
+    fn request_until_answered(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
+        let request = self.request_payload(opcode, 0, data);
         let began = self.link.now();
         let mut asked_at = began;
-        self.ask(&request)?;
+        self.send_request(&request)?;
         while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
             if self.retransmission.is_over(asked_at, self.link.now()) {
-                self.ask(&request)?;
+                self.send_request(&request)?;
                 asked_at = self.link.now();
             }
             let sequence = self.sequence;
             let mine = |a: &Answer| a.sequence == sequence && a.answers == opcode;
-            if let Some(answer) = self.answers()?.into_iter().find(mine) {
+            if let Some(answer) = self.receive_answers()?.into_iter().find(mine) {
                 if !answer.yes {
-                    bail!("{}", why(&answer.data));
+                    bail!("{}", nak_reason(&answer.data));
                 }
                 return Ok(answer);
             }
@@ -214,31 +214,33 @@ impl Client {
     /// # Errors
     /// The companion refuses it, does not answer, or got something else.
     pub fn upload(&mut self, file: File, bytes: &[u8], progress: impl Fn(u64)) -> anyhow::Result<()> {
-        self.done(RESET, &[])?;
-        self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
+        self.request_until_answered(RESET, &[])?;
+        self.session =
+            self.request_until_answered(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
         // The time for erasing its flash says nothing about the link.
         self.retransmission = Retransmission::new(self.link.now());
         let mut pieces = bytes.chunks(MAX_DATA).enumerate();
-        let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();
+        let mut under_way: BTreeMap<u16, PendingPiece> = BTreeMap::new();
         let (mut arrived, mut heard_at) = (0, self.link.now());
         loop {
             while under_way.len() < self.retransmission.window()
                 && let Some((i, piece)) = pieces.next()
             {
-                let request = self.request(WRITE, (i * MAX_DATA) as u32, piece);
-                self.ask(&request)?;
-                let piece = Piece { request, length: piece.len(), sent_at: self.link.now(), repeated: false };
+                let request = self.request_payload(WRITE, (i * MAX_DATA) as u32, piece);
+                self.send_request(&request)?;
+                let piece =
+                    PendingPiece { request, length: piece.len(), sent_at: self.link.now(), repeated: false };
                 under_way.insert(self.sequence, piece);
             }
             if under_way.is_empty() {
                 break;
             }
-            for answer in self.answers()? {
+            for answer in self.receive_answers()? {
                 if answer.answers != WRITE {
                     continue;
                 }
                 if !answer.yes {
-                    bail!("{}", why(&answer.data));
+                    bail!("{}", nak_reason(&answer.data));
                 }
                 if let Some(piece) = under_way.remove(&answer.sequence) {
                     arrived += piece.length;
@@ -256,13 +258,13 @@ impl Client {
             }
             for piece in under_way.values_mut() {
                 if self.retransmission.is_over(piece.sent_at, self.link.now()) {
-                    self.ask(&piece.request)?;
+                    self.send_request(&piece.request)?;
                     (piece.sent_at, piece.repeated) = (self.link.now(), true);
                 }
             }
         }
-        self.done(TERMINATE, &[]).context("not stored")?;
-        if self.sum(file).context("cannot compare")? != crc32(bytes) {
+        self.request_until_answered(TERMINATE, &[]).context("not stored")?;
+        if self.remote_crc(file).context("cannot compare")? != crc32(bytes) {
             bail!("what arrived has another CRC-32");
         }
         Ok(())
@@ -272,8 +274,8 @@ impl Client {
     ///
     /// # Errors
     /// There is no such file, or no answer.
-    pub fn sum(&mut self, file: File) -> anyhow::Result<u32> {
-        let answer = self.done(CRC32, file.name().as_bytes())?;
+    pub fn remote_crc(&mut self, file: File) -> anyhow::Result<u32> {
+        let answer = self.request_until_answered(CRC32, file.name().as_bytes())?;
         let sum = answer.data.first_chunk().context("no sum in the answer")?;
         Ok(u32::from_le_bytes(*sum))
     }
@@ -286,7 +288,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     crc::Crc::<u32>::new(&FTP).checksum(bytes)
 }
 
-fn why(data: &[u8]) -> String {
+fn nak_reason(data: &[u8]) -> String {
     let known = match data {
         [2, 5, ..] => "the file is no such file, damaged, or the flash failed; the old one was kept",
         [2, 27, ..] => "the file is too large",

@@ -16,7 +16,7 @@ fn prepared(more: &str) -> Mission {
 fn reasons(more: &str) -> Vec<String> {
     let mut mission = prepared(more);
     let plan = mission.plan().unwrap();
-    shortage::lines(&mission, &plan)
+    shortage::shortage_lines(&mission, &plan)
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn too_few_nodes_and_too_wide_a_margin_are_told_apart() {
     let mut mission =
         Mission::prepare(scenario::parse(&margin, "demo.toml").unwrap(), &Progress::hidden()).unwrap();
     let plan = mission.plan().unwrap();
-    let wide = shortage::lines(&mission, &plan);
+    let wide = shortage::shortage_lines(&mission, &plan);
     assert!(wide.len() == 9 && wide[8] == "and 12 more", "{wide:?}");
     let (_, margin) = wide[0].split_once("a roadmap.safety_margin_m of at most ").expect(&wide[0]);
     let margin_m: f32 = margin.split(' ').next().unwrap().parse().unwrap();

@@ -93,9 +93,9 @@ pub enum FromBoard {
 }
 
 /// Kind, port, length, address, time.
-type Fields = (u8, u8, u16, u32, u64);
+type HeaderFields = (u8, u8, u16, u32, u64);
 
-fn to_bytes((kind, port, len, address, time): Fields) -> [u8; HEAD] {
+fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEAD] {
     let mut head = [0; HEAD];
     (head[0], head[1]) = (kind, port);
     head[2..4].copy_from_slice(&len.to_le_bytes());
@@ -104,13 +104,13 @@ fn to_bytes((kind, port, len, address, time): Fields) -> [u8; HEAD] {
     head
 }
 
-fn from_bytes(head: &[u8; HEAD]) -> Fields {
+fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
     let [kind, port, l0, l1, a0, a1, a2, a3, time @ ..] = *head;
     (kind, port, u16::from_le_bytes([l0, l1]), u32::from_le_bytes([a0, a1, a2, a3]), u64::from_le_bytes(time))
 }
 
 impl ToBoard {
-    /// As it travels.
+    /// The bytes of the record header.
     pub fn to_bytes(self) -> [u8; HEAD] {
         to_bytes(match self {
             Self::Bytes { port, len, due_us } => (0, port, len, 0, due_us),
@@ -121,7 +121,7 @@ impl ToBoard {
         })
     }
 
-    /// As it was meant; `None` for bytes of no record.
+    /// The record that these bytes encode; `None` for bytes of no record.
     pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
         let (kind, port, len, address, time) = from_bytes(head);
         Some(match kind {
@@ -134,8 +134,8 @@ impl ToBoard {
         })
     }
 
-    /// Bytes that follow.
-    pub fn follows(self) -> usize {
+    /// Number of payload bytes that follow the header.
+    pub fn payload_len(self) -> usize {
         match self {
             Self::Bytes { len, .. } | Self::Poke { len, .. } => len.into(),
             Self::Run { .. } | Self::Peek { .. } | Self::Call { .. } => 0,
@@ -144,7 +144,7 @@ impl ToBoard {
 }
 
 impl FromBoard {
-    /// As it travels.
+    /// The bytes of the record header.
     pub fn to_bytes(self) -> [u8; HEAD] {
         to_bytes(match self {
             Self::Started => (0, 0, 0, 0, 0),
@@ -154,7 +154,7 @@ impl FromBoard {
         })
     }
 
-    /// As it was meant; `None` for bytes of no record.
+    /// The record that these bytes encode; `None` for bytes of no record.
     pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
         let (kind, port, len, _, time) = from_bytes(head);
         Some(match kind {
@@ -166,8 +166,8 @@ impl FromBoard {
         })
     }
 
-    /// Bytes that follow.
-    pub fn follows(self) -> usize {
+    /// Number of payload bytes that follow the header.
+    pub fn payload_len(self) -> usize {
         match self {
             Self::Sent { len, .. } | Self::Memory { len } => len.into(),
             Self::Started | Self::Waits { .. } => 0,

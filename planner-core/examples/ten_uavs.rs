@@ -48,7 +48,7 @@ fn main() {
     let (descents_m, mode, gates_most) = (&[2.0; 10], Mode::Unlabelled(Objective::TotalDistance), 64);
     let (separation_m, parked_separation_m, cruise_mps, vertical_mps) = (2.0, 1.6, 2.0, 1.0);
     let schedule = ScheduleConfig { separation_m, parked_separation_m, cruise_mps, vertical_mps };
-    let request = PlanRequest { vehicles: &vehicles, descents_m, mode, schedule, gates_most };
+    let request = PlanRequest { vehicles: &vehicles, descents_m, mode, schedule, max_gates: gates_most };
     let mut workspace = Box::new(PlanWorkspace::<512, 10, 2048>::new());
     let (mut swarm, mut own) = (SwarmPlan::<10, 64>::new(), VehiclePlan::<64, 64>::new());
     plan::plan_swarm(&view, &request, &mut workspace, &mut swarm).expect("every goal can be reached");

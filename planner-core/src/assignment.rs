@@ -20,8 +20,8 @@ mod state;
 use libm::fmaxf;
 
 pub use self::costs::AssignmentError;
-use self::costs::Costs;
-use self::state::{Paths, State, UNASSIGNED};
+use self::costs::CostMatrix;
+use self::state::{AugmentingPaths, MatchingState, UNASSIGNED};
 
 /// Result of an assignment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,7 +50,7 @@ pub struct AssignmentWorkspace<const N: usize> {
 }
 
 impl<const N: usize> AssignmentWorkspace<N> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         assert!(N < UNASSIGNED as usize, "indices are 16 bits");
         Self {
@@ -67,15 +67,15 @@ impl<const N: usize> AssignmentWorkspace<N> {
         }
     }
 
-    fn borrow(&mut self, rows: usize, cols: usize) -> (State<'_>, Paths<'_>) {
-        let state = State {
+    fn split_borrows(&mut self, rows: usize, cols: usize) -> (MatchingState<'_>, AugmentingPaths<'_>) {
+        let state = MatchingState {
             price: &mut self.price[..cols],
             row_of: &mut self.row_of[..cols],
             col_of: &mut self.col_of[..rows],
             row: &mut self.row[..cols],
             free: &mut self.free[..rows],
         };
-        let paths = Paths {
+        let paths = AugmentingPaths {
             distance: &mut self.distance[..cols],
             previous: &mut self.previous[..cols],
             settled: &mut self.settled[..cols],
@@ -102,9 +102,9 @@ pub fn assign<const N: usize>(
     ws: &mut AssignmentWorkspace<N>,
     out: &mut [Option<u16>],
 ) -> Result<Assignment, AssignmentError> {
-    let costs = check(costs, rows, cols, N, out)?;
+    let costs = check_inputs(costs, rows, cols, N, out)?;
     solve(&costs, ws);
-    Ok(report(&costs, &ws.col_of, out))
+    Ok(write_assignment(&costs, &ws.col_of, out))
 }
 
 /// The assignment with the most pairs, among those the least largest cost, and among those the least total (mission
@@ -113,57 +113,57 @@ pub fn assign<const N: usize>(
 /// The least largest cost comes from augmenting paths that minimise their largest edge, from all free rows at once: a
 /// larger matching needs an edge out of what is reached below the present bound, so the bound is raised no further than
 /// it must be (O. Gross, "The bottleneck assignment problem", 1959).
-pub fn bottleneck<const N: usize>(
+pub fn assign_bottleneck<const N: usize>(
     costs: &[f32],
     rows: usize,
     cols: usize,
     ws: &mut AssignmentWorkspace<N>,
     out: &mut [Option<u16>],
 ) -> Result<Assignment, AssignmentError> {
-    let mut costs = check(costs, rows, cols, N, out)?;
-    let (mut state, mut paths) = ws.borrow(costs.rows, costs.cols);
+    let mut costs = check_inputs(costs, rows, cols, N, out)?;
+    let (mut state, mut paths) = ws.split_borrows(costs.rows, costs.cols);
     state.reset();
     let mut limit = f32::NEG_INFINITY;
-    while let Some(largest) = augment::from_all_bottleneck(&costs, &mut state, &mut paths) {
+    while let Some(largest) = augment::augment_bottleneck(&costs, &mut state, &mut paths) {
         limit = fmaxf(limit, largest);
     }
     costs.limit = limit;
     solve(&costs, ws);
-    Ok(report(&costs, &ws.col_of, out))
+    Ok(write_assignment(&costs, &ws.col_of, out))
 }
 
-fn check<'a>(
+fn check_inputs<'a>(
     costs: &'a [f32],
     rows: usize,
     cols: usize,
     capacity: usize,
     out: &[Option<u16>],
-) -> Result<Costs<'a>, AssignmentError> {
+) -> Result<CostMatrix<'a>, AssignmentError> {
     if rows.max(cols) > capacity {
         return Err(AssignmentError::WorkspaceTooSmall);
     }
     if out.len() != rows {
         return Err(AssignmentError::OutputLength);
     }
-    Costs::new(costs, rows, cols)
+    CostMatrix::new(costs, rows, cols)
 }
 
-fn solve<const N: usize>(costs: &Costs<'_>, ws: &mut AssignmentWorkspace<N>) {
-    let (mut state, mut paths) = ws.borrow(costs.rows, costs.cols);
+fn solve<const N: usize>(costs: &CostMatrix<'_>, ws: &mut AssignmentWorkspace<N>) {
+    let (mut state, mut paths) = ws.split_borrows(costs.rows, costs.cols);
     state.reset();
-    let complete = reduce::free_rows(costs, &mut state, &mut paths)
-        .is_some_and(|left| (0..left).all(|k| augment::from_one(costs, &mut state, &mut paths, k)));
+    let complete = reduce::reduce_to_free_rows(costs, &mut state, &mut paths)
+        .is_some_and(|left| (0..left).all(|k| augment::augment_from_row(costs, &mut state, &mut paths, k)));
     if !complete {
         state.reset();
-        while augment::from_all(costs, &mut state, &mut paths) {}
+        while augment::augment_from_free_rows(costs, &mut state, &mut paths) {}
     }
 }
 
-fn report(costs: &Costs<'_>, col_of: &[u16], out: &mut [Option<u16>]) -> Assignment {
+fn write_assignment(costs: &CostMatrix<'_>, col_of: &[u16], out: &mut [Option<u16>]) -> Assignment {
     out.fill(None);
     let mut result = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
     for (row, &col) in col_of[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED) {
-        let cost = costs.at(row as u16, col);
+        let cost = costs.cost_at(row as u16, col);
         let (from, to) = if costs.transposed { (usize::from(col), row as u16) } else { (row, col) };
         out[from] = Some(to);
         result.pairs += 1;

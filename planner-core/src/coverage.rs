@@ -11,7 +11,7 @@
 //! | `patches.rs` | more lanes where a no-fly zone covers a lane and not what it should photograph |
 //! | `order.rs` | the order and the directions in which lanes are flown |
 //! | `transit.rs` | shortest ways around no-fly zones |
-//! | `around.rs` | the way home, or aside, of a vehicle that leaves its route |
+//! | `around.rs` | the path home, or aside, of a vehicle that leaves its route |
 //! | `pack.rs` | CBinPack, SIMPLE-BINPAT and BINPAT: routes, vehicles, layers, costs |
 //! | `powell.rs` | POWELL-BINPAT: the shares that make the largest cost least |
 //! | `exact.rs` | the least largest cost of all contiguous divisions |
@@ -45,7 +45,7 @@ pub mod transit;
 
 pub use self::flat::Flat;
 
-/// Why there is no coverage plan.
+/// Reason why there is no coverage plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CoverageError {
     /// The area is not one: see [`area::AreaError`].

@@ -10,7 +10,7 @@ use libm::{fmaxf, fminf, sqrtf};
 use crate::flight::{Gate, Path};
 use crate::{ConfigError, Point, all_positive};
 
-/// Which rule keeps vehicles apart.
+/// Rule by which vehicles keep apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// None.
@@ -60,17 +60,17 @@ pub struct Neighbour {
     pub age_s: f32,
     /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it flies another plan.
     pub progress_m: Option<f32>,
-    /// Whether it stands on the ground, or lies there for all one knows.
+    /// Whether it is on the ground, or has to be assumed there.
     pub grounded: bool,
     /// Whether it has left the plan for good: its gates are open, and it is an obstacle.
-    pub out: bool,
+    pub out_of_plan: bool,
     /// Whether it flies around something on a path of its own.
     pub detours: bool,
 }
 
 /// The vehicle that asks.
 #[derive(Clone, Copy, Debug)]
-pub struct Own<'a, const W: usize> {
+pub struct OwnVehicle<'a, const W: usize> {
     /// Place in the roster sorted by id, from 0.
     pub rank: u16,
     /// ENU metres.
@@ -121,20 +121,25 @@ const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 /// (`MAX_PATH_SAMPLES`) of the own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
-    own: &Own<'_, W>,
+    own: &OwnVehicle<'_, W>,
     gates: &[Gate],
     neighbours: &[Neighbour],
 ) -> Advice {
     match cfg.method {
         Method::Off => Advice::FREE,
-        Method::Algorithm2 => algorithm2(cfg, own.rank, &own.position, neighbours),
-        Method::Priority => priority(cfg, own, gates, neighbours),
+        Method::Algorithm2 => advise_by_algorithm2(cfg, own.rank, &own.position, neighbours),
+        Method::Priority => advise_by_priority(cfg, own, gates, neighbours),
     }
 }
 
 /// P3D Algorithm 2, lines 12–17: within the safety distance of a higher-ranked vehicle `h` the nominal speed is divided
 /// by `(h + 1) · 1.5`; of several the last (highest) counts, as the loop overwrites. Restored when the neighbour leaves.
-fn algorithm2(cfg: &DeconflictConfig, rank: u16, position: &Point, neighbours: &[Neighbour]) -> Advice {
+fn advise_by_algorithm2(
+    cfg: &DeconflictConfig,
+    rank: u16,
+    position: &Point,
+    neighbours: &[Neighbour],
+) -> Advice {
     let near = |n: &&Neighbour| n.rank > rank && (n.position - position).norm() < cfg.safety_distance_m;
     match neighbours.iter().filter(near).max_by_key(|n| n.rank) {
         Some(n) => Advice {
@@ -146,9 +151,9 @@ fn algorithm2(cfg: &DeconflictConfig, rank: u16, position: &Point, neighbours: &
     }
 }
 
-fn priority<const W: usize>(
+fn advise_by_priority<const W: usize>(
     cfg: &DeconflictConfig,
-    own: &Own<'_, W>,
+    own: &OwnVehicle<'_, W>,
     gates: &[Gate],
     neighbours: &[Neighbour],
 ) -> Advice {
@@ -164,17 +169,18 @@ fn priority<const W: usize>(
         own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + cfg.cruise_mps * PATH_SAMPLE_S;
     let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - GATE_OVERSHOOT_M)..];
     for gate in ahead.iter().take_while(|gate| gate.at_m <= horizon_m) {
-        let passed = by_id(neighbours, gate.id)
-            .is_some_and(|n| n.out || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m));
+        let passed = find_neighbour(neighbours, gate.id).is_some_and(|n| {
+            n.out_of_plan || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m)
+        });
         if !passed {
             stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.id);
             break;
         }
     }
     let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
-    let ahead = Ahead::new(cfg, own);
+    let ahead = PathAhead::new(cfg, own);
     for n in neighbours.iter().filter(|n| !n.grounded).filter(unplanned) {
-        if let Some(distance) = ahead.first_contact(cfg, own, n) {
+        if let Some(distance) = ahead.distance_to_conflict_m(cfg, own, n) {
             stop(distance, n.id);
         }
     }
@@ -183,20 +189,20 @@ fn priority<const W: usize>(
     advice
 }
 
-/// The neighbour of an id: most come sorted by it.
-fn by_id(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
+/// The neighbour with this id. Neighbours are usually sorted by id.
+fn find_neighbour(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
     let sorted = neighbours.binary_search_by_key(&id, |n| n.id).ok();
     sorted.map(|at| &neighbours[at]).or_else(|| neighbours.iter().find(|n| n.id == id))
 }
 
-/// The own path ahead, as far as it is looked at: the points where this vehicle will be, one after each look.
-struct Ahead {
+/// Samples of the own path ahead: the points where this vehicle will be, at equal distances.
+struct PathAhead {
     points: Vec<Point, MAX_PATH_SAMPLES>,
     step_m: f32,
 }
 
-impl Ahead {
-    fn new<const W: usize>(cfg: &DeconflictConfig, own: &Own<'_, W>) -> Self {
+impl PathAhead {
+    fn new<const W: usize>(cfg: &DeconflictConfig, own: &OwnVehicle<'_, W>) -> Self {
         let step_m = cfg.cruise_mps * PATH_SAMPLE_S;
         let points = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(MAX_PATH_SAMPLES);
         Self { points: points.collect(), step_m }
@@ -205,10 +211,10 @@ impl Ahead {
     /// Distance along the own path to where it first comes within the safety distance of a neighbour that flies on as last
     /// heard; `None` if not within the look-ahead, or if flying on only takes us further apart. Squares are compared: a board
     /// takes its square roots by software. From far apart the next looks are left out that are too early for both to meet.
-    fn first_contact<const W: usize>(
+    fn distance_to_conflict_m<const W: usize>(
         &self,
         cfg: &DeconflictConfig,
-        own: &Own<'_, W>,
+        own: &OwnVehicle<'_, W>,
         n: &Neighbour,
     ) -> Option<f32> {
         let away = |looks: usize, own: &Point| {
@@ -229,7 +235,7 @@ impl Ahead {
             let room_m = least_m - apart_m - DISTANCE_ROUNDING_M;
             let comes_near = || {
                 let from = if last.0 == i { last.1 } else { away(i, &self.points[i - 1]) };
-                least_square_between(&from, &to).is_some_and(|square| square < near)
+                min_squared_distance(&from, &to).is_some_and(|square| square < near)
             };
             if to.norm_squared() < near || room_m < look_m && comes_near() {
                 return Some(i as f32 * self.step_m);
@@ -243,7 +249,7 @@ impl Ahead {
 }
 
 /// Square of the least distance from the origin on the way from one place to another, if it is at neither of them.
-fn least_square_between(from: &Point, to: &Point) -> Option<f32> {
+fn min_squared_distance(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
     let ahead = to.dot(&step);
     if ahead <= 0.0 {
@@ -283,7 +289,7 @@ mod tests {
             };
             prop_assume!(distance(0) > cfg.safety_distance_m);
             let contact = (0..4000).find(|&ms| distance(ms) < cfg.safety_distance_m - 0.01);
-            let found = Ahead::new(&cfg, &own).first_contact(&cfg, &own, &n);
+            let found = PathAhead::new(&cfg, &own).distance_to_conflict_m(&cfg, &own, &n);
             if let Some(ms) = contact {
                 let within_m = found.expect("a contact is found");
                 prop_assert!(within_m <= cruise_mps * ms as f32 * 1e-3 + 1e-3);
@@ -304,7 +310,7 @@ mod tests {
             age_s: 0.0,
             progress_m: None,
             grounded: false,
-            out: false,
+            out_of_plan: false,
             detours: false,
         }
     }
@@ -316,8 +322,8 @@ mod tests {
         path
     }
 
-    fn own(path: &Path<4>) -> Own<'_, 4> {
-        Own { rank: 1, position: Point::zeros(), along_m: 0.0, path, detours: false }
+    fn own(path: &Path<4>) -> OwnVehicle<'_, 4> {
+        OwnVehicle { rank: 1, position: Point::zeros(), along_m: 0.0, path, detours: false }
     }
 
     #[test]
@@ -351,7 +357,8 @@ mod tests {
         heard[0].progress_m = Some(9.0);
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
         assert_eq!((advice.stop_within_m, advice.waiting_for), (2.5, 7), "an unheard vehicle has not passed");
-        heard[0] = Neighbour { out: true, grounded: true, ..neighbour(7, 1, Point::new(9.0, 9.0, 0.0)) };
+        heard[0] =
+            Neighbour { out_of_plan: true, grounded: true, ..neighbour(7, 1, Point::new(9.0, 9.0, 0.0)) };
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates[2..], &heard);
         assert_eq!(advice, Advice::FREE, "a vehicle out of the plan will never pass");
     }

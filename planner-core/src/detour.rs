@@ -1,13 +1,13 @@
-//! One vehicle's way around what left the plan: a vehicle that lies, stands or hovers where the schedule did not put it. Over a
+//! One vehicle's detour around a vehicle that left the plan and lies, stands or hovers off its schedule. Over a
 //! field, where there is no roadmap, [`crate::coverage::around`] plans it.
 //!
 //! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so there is no time in it: the
-//! shortest path on the roadmap from where the vehicle hovers to its goal that keeps off every [`KeepOff`]. It begins with
-//! the rest of the leg at hand, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
+//! shortest path on the roadmap from where the vehicle hovers to its goal that keeps clear of every [`KeepOutZone`]. It begins with
+//! the rest of the current leg, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
 //! something already than it should be, it only comes no nearer. A column ends at the ground, as far as the roadmap says where
 //! that is.
 //!
-//! ENU metres. Cost: two A*, each edge looked at against every [`KeepOff`]; each of these against every node.
+//! ENU metres. Cost: two A*, each edge checked against every [`KeepOutZone`]; each of these against every node.
 
 use core::ops::Range;
 
@@ -26,9 +26,9 @@ const HOVER_SWAY_M: f32 = 0.05;
 /// safety filter allows no more.
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
-/// A stretch to stay away from.
+/// A capsule or column that a detour keeps clear of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeepOff {
+pub struct KeepOutZone {
     /// One end of the zone's axis.
     pub from: Point,
     /// The other end.
@@ -36,31 +36,31 @@ pub struct KeepOff {
     /// Distance to keep, metres.
     pub radius_m: f32,
     /// Kind of the zone.
-    pub nature: Nature,
+    pub kind: ZoneKind,
 }
 
 /// Kind of a keep-out zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Nature {
+pub enum ZoneKind {
     /// A zone that may be occupied all along its axis.
-    Solid,
+    Static,
     /// A vehicle at `from` that descends to `to`: not to be rested below, nor flown up to.
-    Landing,
-    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is kept off.
-    Lying,
+    Descending,
+    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is kept clear.
+    Grounded,
 }
 
-impl KeepOff {
+impl KeepOutZone {
     /// Whether its ends are finite and its radius is finite and not negative; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
-        finite("from", &self.from)?;
-        finite("to", &self.to)?;
-        not_negative("radius_m", self.radius_m)
+        check_finite("from", &self.from)?;
+        check_finite("to", &self.to)?;
+        check_not_negative("radius_m", self.radius_m)
     }
 
-    /// The zone with no more distance than `here` has: a vehicle that is too near already may fly
+    /// The zone, shrunk so that `here` is not inside it: a vehicle that is too near already may fly
     /// off.
-    fn seen_from(&self, here: &Point, nearer_m: f32) -> Self {
+    fn shrunk_to(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
         let far_m = self.radius_m + nearer_m;
         if now_sq >= far_m * far_m {
@@ -72,12 +72,14 @@ impl KeepOff {
 
     /// The zone no deeper than the ground below it: a vehicle does not fall through a floor. A
     /// vehicle that lies is on the ground.
-    fn settled(&self, view: &RoadmapView<'_>) -> Self {
+    fn clipped_to_ground(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
-        let Some((low_m, high_m)) = view.ground_around(&self.from).filter(|_| falls) else { return *self };
+        let Some((low_m, high_m)) = view.ground_range_near(&self.from).filter(|_| falls) else {
+            return *self;
+        };
         let (mut from, mut to) = (self.from, self.to);
         to.z = fmaxf(to.z, low_m);
-        if self.nature == Nature::Lying {
+        if self.kind == ZoneKind::Grounded {
             from.z = fmaxf(high_m, to.z);
         }
         Self { from, to, ..*self }
@@ -85,8 +87,8 @@ impl KeepOff {
 
     /// The part of the zone that may not be flown through. A vehicle that descends may be met half
     /// way by one that climbs as fast: of its column the lower third above `here` is left to cross.
-    pub(crate) fn solid(&self, here: &Point) -> Self {
-        if self.nature != Nature::Landing {
+    pub(crate) fn impassable_part(&self, here: &Point) -> Self {
+        if self.kind != ZoneKind::Descending {
             return *self;
         }
         let room_m = self.from.z - here.z - self.radius_m;
@@ -98,12 +100,12 @@ impl KeepOff {
         }
     }
 
-    /// Whether a place is too near.
-    pub fn holds(&self, place: &Point) -> bool {
-        self.touches(place, place)
+    /// Whether a place is inside the zone.
+    pub fn contains(&self, place: &Point) -> bool {
+        self.intersects(place, place)
     }
 
-    pub(crate) fn touches(&self, a: &Point, b: &Point) -> bool {
+    pub(crate) fn intersects(&self, a: &Point, b: &Point) -> bool {
         // Most are apart along one axis alone, which is cheaper to see than a distance.
         let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
         let beside = |axis: usize| {
@@ -119,21 +121,21 @@ impl KeepOff {
     }
 }
 
-/// The box around what is too near, for many legs in a row: most are beside it.
-struct Box {
+/// Bounding box of a zone, for a quick check of many legs: most legs are outside it.
+struct BoundingBox {
     low: Point,
     high: Point,
 }
 
-impl Box {
-    fn around(of: &KeepOff) -> Self {
+impl BoundingBox {
+    fn of_zone(of: &KeepOutZone) -> Self {
         let (from, to) = (&of.from, &of.to);
         let radius = Point::repeat(of.radius_m);
         Self { low: from.inf(to) - radius, high: from.sup(to) + radius }
     }
 
     /// Beyond which of its six sides a place is, a bit for each: what is between two places beyond the same side is too.
-    fn sides(&self, p: &Point) -> u8 {
+    fn outer_faces(&self, p: &Point) -> u8 {
         let (low, high) = (&self.low, &self.high);
         u8::from(p.x < low.x)
             | u8::from(p.x > high.x) << 1
@@ -146,22 +148,22 @@ impl Box {
 
 /// Whether a path between two arc lengths, `ahead`, comes too near: with the climb if that begins before 0, and with the descent if
 /// it ends beyond the path. Nearer than `here`, where the vehicle is, has to be: what it leaves is not in its way.
-pub fn is_blocked<const W: usize>(
+pub fn is_path_blocked<const W: usize>(
     path: &Path<W>,
     ahead: Range<f32>,
     climb_m: f32,
     descent_m: f32,
     here: &Point,
-    obstacle: &KeepOff,
+    obstacle: &KeepOutZone,
 ) -> bool {
     let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else { return false };
-    let obstacle = obstacle.seen_from(here, HOVER_SWAY_M);
+    let obstacle = obstacle.shrunk_to(here, HOVER_SWAY_M);
     let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
     let (along_m, until_m) = (ahead.start, ahead.end);
-    let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
+    let climbs = along_m < 0.0 && obstacle.intersects(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
-    let next = legs_begun(path, along_m);
-    let descends = until_m > path.length_m() && obstacle.touches(&last.position, &ground);
+    let next = count_legs_begun(path, along_m);
+    let descends = until_m > path.length_m() && obstacle.intersects(&last.position, &ground);
     if climbs || descends {
         return true;
     }
@@ -169,11 +171,11 @@ pub fn is_blocked<const W: usize>(
     let Some((begun, waypoints)) = waypoints.split_first() else { return false };
     let place = if along_m > begun.along_m { path.point_at(along_m) } else { Some(begun.position) };
     let mut from = place.unwrap_or(first.position);
-    let room = Box::around(&obstacle);
-    let mut beside = room.sides(&from);
+    let room = BoundingBox::of_zone(&obstacle);
+    let mut beside = room.outer_faces(&from);
     let mut from_m = fmaxf(along_m, begun.along_m);
     let mut touches = |to: Point| {
-        let was_beside = core::mem::replace(&mut beside, room.sides(&to));
+        let was_beside = core::mem::replace(&mut beside, room.outer_faces(&to));
         let leg = (core::mem::replace(&mut from, to), to);
         was_beside & beside == 0 && obstacle.comes_near(&leg.0, &leg.1)
     };
@@ -190,13 +192,13 @@ pub fn is_blocked<const W: usize>(
     false
 }
 
-/// Number of stretches that [`is_blocked`] checks: the legs ahead, the climb, the descent.
-pub fn stretches_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
-    path.waypoints().len() - legs_begun(path, along_m) + 2
+/// Number of stretches that [`is_path_blocked`] checks: the legs ahead, the climb, the descent.
+pub fn count_segments_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
+    path.waypoints().len() - count_legs_begun(path, along_m) + 2
 }
 
-/// The waypoints that are not ahead of an arc length.
-fn legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
+/// Number of waypoints up to an arc length.
+fn count_legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
 
@@ -239,32 +241,32 @@ impl DetourRequest {
     /// Whether its places are finite, and its height and clearances are finite and not negative; the error names the
     /// first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
-        finite("here", &self.here)?;
-        finite("leg", &self.leg[0])?;
-        finite("leg", &self.leg[1])?;
+        check_finite("here", &self.here)?;
+        check_finite("leg", &self.leg[0])?;
+        check_finite("leg", &self.leg[1])?;
         if let Goal::Home { over, layer_m } = &self.goal {
-            finite("over", over)?;
-            finite("layer_m", &Point::repeat(*layer_m))?;
+            check_finite("over", over)?;
+            check_finite("layer_m", &Point::repeat(*layer_m))?;
         }
         if let Some((low, high)) = &self.fence {
-            finite("fence", low)?;
-            finite("fence", high)?;
+            check_finite("fence", low)?;
+            check_finite("fence", high)?;
         }
-        not_negative("leg_clearance_m", self.leg_clearance_m)?;
-        not_negative("descent_m", self.descent_m)?;
-        not_negative("required_clearance_m", self.required_clearance_m)
+        check_not_negative("leg_clearance_m", self.leg_clearance_m)?;
+        check_not_negative("descent_m", self.descent_m)?;
+        check_not_negative("required_clearance_m", self.required_clearance_m)
     }
 }
 
-fn finite(name: &'static str, place: &Point) -> Result<(), ConfigError> {
+fn check_finite(name: &'static str, place: &Point) -> Result<(), ConfigError> {
     if place.iter().all(|c| c.is_finite()) { Ok(()) } else { Err(ConfigError(name)) }
 }
 
-fn not_negative(name: &'static str, number: f32) -> Result<(), ConfigError> {
+fn check_not_negative(name: &'static str, number: f32) -> Result<(), ConfigError> {
     if number >= 0.0 && number.is_finite() { Ok(()) } else { Err(ConfigError(name)) }
 }
 
-/// Why there is no way around.
+/// Reason why no detour was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DetourError {
     /// The request, or something to keep off, holds a number that it may not.
@@ -280,24 +282,26 @@ pub enum DetourError {
 /// Greatest length of a path to a landing place aside, and greatest distance of that place, metres.
 const MAX_SIDESTEP_M: f32 = 20.0;
 
-/// The shortest path to the goal, or aside, that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer
-/// already the distance is shortened; `nodes` is scratch.
-pub fn plan<const N: usize, const W: usize>(
+/// The shortest path to the goal, or aside, that keeps clear of all `obstacles`, written to `out`. Of an obstacle that
+/// is nearer already the distance is shortened; `nodes` is scratch.
+pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
-    obstacles: &mut [KeepOff],
+    obstacles: &mut [KeepOutZone],
     ws: &mut SearchWorkspace<N>,
     nodes: &mut Vec<u16, W>,
     out: &mut Path<W>,
 ) -> Result<(), DetourError> {
     request.check().map_err(DetourError::Config)?;
-    obstacles.iter().try_for_each(KeepOff::check).map_err(DetourError::Config)?;
+    obstacles.iter().try_for_each(KeepOutZone::check).map_err(DetourError::Config)?;
     let here = request.here;
     for obstacle in obstacles.iter_mut() {
-        *obstacle = obstacle.settled(view);
+        *obstacle = obstacle.clipped_to_ground(view);
     }
-    shorten(obstacles, &here);
-    let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.solid(&here).touches(a, b));
+    shrink_zones(obstacles, &here);
+    let clear = |a: &Point, b: &Point| {
+        !obstacles.iter().any(|obstacle| obstacle.impassable_part(&here).intersects(a, b))
+    };
     let Goal::Node(number) = request.goal else { return Err(DetourError::Search(SearchError::NoPath)) };
     let goal = view.header().starts.saturating_add(number);
     if number >= view.header().goals {
@@ -310,14 +314,14 @@ pub fn plan<const N: usize, const W: usize>(
     let passable = |from: u16, edge: &HalfEdge| {
         let to = view.node(edge.target);
         let near = !request.aside || (to - here).norm() < MAX_SIDESTEP_M;
-        near && view.clears(edge, request.required_clearance_m) && clear(&view.node(from), &to)
+        near && view.has_clearance(edge, request.required_clearance_m) && clear(&view.node(from), &to)
     };
     let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
         if !request.aside {
             return search::astar(view, entry, goal, passable, ws, nodes);
         }
         search::dijkstra_all(view, entry, passable, ws)?;
-        let rest = |node: &u16| !obstacles.iter().any(|obstacle| obstacle.holds(&view.node(*node)));
+        let rest = |node: &u16| !obstacles.iter().any(|obstacle| obstacle.contains(&view.node(*node)));
         let reached = (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < MAX_SIDESTEP_M);
         let nearest = reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)));
         let nearest = nearest.ok_or(SearchError::NoPath)?;
@@ -340,29 +344,29 @@ pub fn plan<const N: usize, const W: usize>(
         };
         if length_m < best {
             best = length_m;
-            failed = write(view, request, nodes, out).map_err(DetourError::Path);
+            failed = write_path(view, request, nodes, out).map_err(DetourError::Path);
         }
     }
     failed
 }
 
-/// A zone that is nearer already than it should be keeps no more distance than there is.
-pub(crate) fn shorten(obstacles: &mut [KeepOff], here: &Point) {
-    for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
-        *obstacle = obstacle.seen_from(here, PATH_APPROACH_ROUNDING_M);
+/// Shrinks each zone that already contains the vehicle, so that the vehicle is on its border.
+pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
+    for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
+        *obstacle = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
     }
 }
 
-/// As [`plan`], as the plan of one vehicle: without gates, since all others stand while it is flown.
-pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
+/// As [`plan_detour`], as the plan of one vehicle: without gates, since all others stand while it is flown.
+pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
-    obstacles: &mut [KeepOff],
+    obstacles: &mut [KeepOutZone],
     ws: &mut SearchWorkspace<N>,
     nodes: &mut Vec<u16, W>,
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), DetourError> {
-    plan(view, request, obstacles, ws, nodes, &mut out.path)?;
+    plan_detour(view, request, obstacles, ws, nodes, &mut out.path)?;
     out.task = match request.goal {
         Goal::Node(goal) => Task::Goto(goal),
         Goal::Home { .. } => Task::Stay,
@@ -373,7 +377,7 @@ pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
-fn write<const W: usize>(
+fn write_path<const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
     nodes: &[u16],

@@ -79,7 +79,7 @@ impl<'a> FieldView<'a> {
         let Some((header, rest)) = bytes.split_first_chunk::<HEADER_LEN>() else {
             return Err(FileError::Truncated);
         };
-        let shape = shape_of(header)?;
+        let shape = parse_shape(header)?;
         if bytes.len() != shape.encoded_len() {
             return Err(if bytes.len() < shape.encoded_len() {
                 FileError::Truncated
@@ -131,15 +131,15 @@ impl<'a> FieldView<'a> {
     }
 }
 
-/// The length that a file's header tells, of a file that this version can read.
+/// The file length that a header states. The file's version has to be one that this code reads.
 ///
 /// # Errors
 /// It is no field, of another version, or has nodes where none may be.
 pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, FileError> {
-    Ok(shape_of(head)?.encoded_len())
+    Ok(parse_shape(head)?.encoded_len())
 }
 
-fn shape_of(header: &[u8; HEADER_LEN]) -> Result<FieldShape, FileError> {
+fn parse_shape(header: &[u8; HEADER_LEN]) -> Result<FieldShape, FileError> {
     if header[..8] != MAGIC {
         return Err(FileError::Magic);
     }

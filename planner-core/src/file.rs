@@ -14,7 +14,7 @@ type Tables = crc::Table<1>;
 #[cfg(not(target_os = "none"))]
 type Tables = crc::Table<16>;
 
-/// Why bytes are not a whole file, whatever the file holds. Printed, it says so in at most 41 characters.
+/// Reason why bytes are not a whole file of any kind. Its text has at most 41 characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileError {
     /// The bytes end before the header, or before the length the header gives.

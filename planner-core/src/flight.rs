@@ -8,8 +8,8 @@ mod photographs;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
-pub use self::done::{Done, Range};
-pub use self::photographs::{Look, Photographs, Shots, Trigger};
+pub use self::done::{WaypointRange, WaypointSet};
+pub use self::photographs::{HeadingMode, PicturePlan, PictureStretch, Trigger};
 use crate::Point;
 
 /// A corner of a path.
@@ -22,13 +22,13 @@ pub struct Waypoint {
     /// Arc length from the first waypoint, metres.
     pub along_m: f32,
     /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its order matters in flight.
-    pub at_s: f32,
-    /// Time of the departure, seconds: later than `at_s` where the schedule lets another vehicle
+    pub arrive_s: f32,
+    /// Time of the departure, seconds: later than `arrive_s` where the schedule lets another vehicle
     /// pass.
     pub leave_s: f32,
 }
 
-/// Why a path was refused.
+/// Reason why a path was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathError {
     /// The path has more than `W` waypoints.
@@ -53,18 +53,19 @@ impl<const W: usize> Path<W> {
         Self { waypoints: Vec::new() }
     }
 
-    /// Index of its last waypoint; none of an empty path.
+    /// Index of the path's last waypoint; `None` if the path is empty.
     pub fn last(&self) -> Option<usize> {
         self.waypoints.len().checked_sub(1)
     }
 
     /// Labels every waypoint without a stop: the first at `first_s`, each other one `seconds` of its leg later.
-    pub fn label_by(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
+    pub fn label_times_by(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
         let mut before: Option<(Point, f32)> = None;
         for waypoint in &mut self.waypoints {
-            waypoint.at_s = before.map_or(first_s, |(from, at_s)| at_s + seconds(&from, &waypoint.position));
-            waypoint.leave_s = waypoint.at_s;
-            before = Some((waypoint.position, waypoint.at_s));
+            waypoint.arrive_s =
+                before.map_or(first_s, |(from, at_s)| at_s + seconds(&from, &waypoint.position));
+            waypoint.leave_s = waypoint.arrive_s;
+            before = Some((waypoint.position, waypoint.arrive_s));
         }
     }
 
@@ -87,22 +88,22 @@ impl<const W: usize> Path<W> {
             }
             None => 0.0,
         };
-        let waypoint = Waypoint { position, clearance_m, along_m, at_s: 0.0, leave_s: 0.0 };
+        let waypoint = Waypoint { position, clearance_m, along_m, arrive_s: 0.0, leave_s: 0.0 };
         self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
     }
 
     /// Labels every waypoint without a stop: the first at `first_s`, the others after their arc length at `speed_mps`.
-    pub fn label(&mut self, first_s: f32, speed_mps: f32) {
+    pub fn label_times(&mut self, first_s: f32, speed_mps: f32) {
         for waypoint in &mut self.waypoints {
-            waypoint.at_s = first_s + waypoint.along_m / speed_mps;
-            waypoint.leave_s = waypoint.at_s;
+            waypoint.arrive_s = first_s + waypoint.along_m / speed_mps;
+            waypoint.leave_s = waypoint.arrive_s;
         }
     }
 
     /// Labels the last waypoint.
-    pub fn label_last(&mut self, at_s: f32, leave_s: f32) {
+    pub fn set_last_times(&mut self, at_s: f32, leave_s: f32) {
         if let Some(last) = self.waypoints.last_mut() {
-            (last.at_s, last.leave_s) = (at_s, leave_s);
+            (last.arrive_s, last.leave_s) = (at_s, leave_s);
         }
     }
 
@@ -194,12 +195,12 @@ pub enum Task {
     /// The vehicle flies to the goal with this index and lands below it.
     Goto(u16),
     /// The vehicle photographs along lanes and lands at the end of its path.
-    Photograph(Photographs),
+    Photograph(PicturePlan),
 }
 
 impl Task {
-    /// Whether it leaves its pad.
-    pub fn flies(&self) -> bool {
+    /// Whether the vehicle leaves its pad.
+    pub fn leaves_pad(&self) -> bool {
         *self != Self::Stay
     }
 
@@ -235,7 +236,7 @@ pub struct Flight<const W: usize> {
     /// Scheduled take-off, seconds after the start at nominal speeds.
     pub depart_s: f32,
     /// Longest timed segment of this flight, metres: [`crate::schedule::MAX_TIMED_SEGMENT_M`], or more on a flight that is long.
-    pub piece_m: f32,
+    pub segment_m: f32,
 }
 
 /// "Before my arc length `at_m`, vehicle `id` must have come past `until_m` of its own path."
@@ -246,7 +247,7 @@ pub struct Flight<const W: usize> {
 /// - It reports no more than the reference that it follows has come to, and at most [`PROGRESS_ERROR_M`] less once it stands.
 /// - It reports more than the path's length and the descent only when it stands on the ground, disarmed.
 ///
-/// A vehicle that waits where it is sent reports enough to open every gate that waits for what lies behind it.
+/// A vehicle that waits at its assigned place reports enough progress to open every gate for the part behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
     /// Place of the gate, metres along the own path; −climb is the pad.

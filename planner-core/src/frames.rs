@@ -3,7 +3,7 @@
 //! The mission frame is ENU metres on the plane tangent to the WGS84 ellipsoid at the mission origin. An autopilot's
 //! local frame is NED metres about its own EKF origin, but *not* a tangent plane: PX4 projects azimuthally on a sphere,
 //! ArduPilot scales degrees. Two kilometres from the origin they differ from WGS84 by metres, so every conversion goes
-//! through latitude and longitude with the projection of the autopilot at hand. f64 throughout: degrees at 1e-9.
+//! through latitude and longitude with the projection of the current autopilot. f64 throughout: degrees at 1e-9.
 
 use libm::{asin, atan2, cos, fabs, sin, sqrt};
 use nalgebra::Vector3;
@@ -36,24 +36,24 @@ impl Geodetic {
     }
 
     fn ecef(&self) -> Vector3<f64> {
-        self.turn().ecef(self.alt_m)
+        self.sin_cos().ecef(self.alt_m)
     }
 
-    fn turn(&self) -> Turn {
+    fn sin_cos(&self) -> LatLonSinCos {
         let (lat, lon) = (self.lat_deg.to_radians(), self.lon_deg.to_radians());
-        Turn { sin_lat: sin(lat), cos_lat: cos(lat), sin_lon: sin(lon), cos_lon: cos(lon) }
+        LatLonSinCos { sin_lat: sin(lat), cos_lat: cos(lat), sin_lon: sin(lon), cos_lon: cos(lon) }
     }
 }
 
 /// Sines and cosines of a latitude and a longitude, taken once: they cost more than all else here.
-struct Turn {
+struct LatLonSinCos {
     sin_lat: f64,
     cos_lat: f64,
     sin_lon: f64,
     cos_lon: f64,
 }
 
-impl Turn {
+impl LatLonSinCos {
     fn ecef(&self, alt_m: f64) -> Vector3<f64> {
         let n = WGS84_A / sqrt(1.0 - WGS84_E2 * self.sin_lat * self.sin_lat);
         Vector3::new(
@@ -66,9 +66,9 @@ impl Turn {
 
 /// ENU metres of `position` on the plane tangent at `origin`.
 pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
-    let turn = origin.turn();
+    let turn = origin.sin_cos();
     let d = position.ecef() - turn.ecef(origin.alt_m);
-    let Turn { sin_lat, cos_lat, sin_lon, cos_lon } = turn;
+    let LatLonSinCos { sin_lat, cos_lat, sin_lon, cos_lon } = turn;
     let east = -sin_lon * d.x + cos_lon * d.y;
     let north = -sin_lat * cos_lon * d.x - sin_lat * sin_lon * d.y + cos_lat * d.z;
     let up = cos_lat * cos_lon * d.x + cos_lat * sin_lon * d.y + sin_lat * d.z;
@@ -79,9 +79,9 @@ pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
 /// millimetre within 8 km, 4 mm at 100 km.
 pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     let (e, n, u) = (f64::from(enu.x), f64::from(enu.y), f64::from(enu.z));
-    let turn = origin.turn();
+    let turn = origin.sin_cos();
     let o = turn.ecef(origin.alt_m);
-    let Turn { sin_lat, cos_lat, sin_lon, cos_lon } = turn;
+    let LatLonSinCos { sin_lat, cos_lat, sin_lon, cos_lon } = turn;
     let x = o.x - sin_lon * e - sin_lat * cos_lon * n + cos_lat * cos_lon * u;
     let y = o.y + cos_lon * e - sin_lat * sin_lon * n + cos_lat * sin_lon * u;
     let z = o.z + cos_lat * n + sin_lat * u;

@@ -2,9 +2,9 @@
 
 use crate::Point;
 
-/// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a board carries the code
+/// The value clamped to the bounds. `f32::clamp` panics where the bounds are none, and a board carries the code
 /// that would print them: 25 kB.
-pub(crate) fn within(value: f32, low: f32, high: f32) -> f32 {
+pub(crate) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }
 }

@@ -24,7 +24,7 @@
 //! # Ok::<(), planner_core::voxel::GridError>(())
 //! ```
 //!
-//! `examples/ten_uavs.rs` goes on from there: roadmap, assignment, paths, schedule and gates of ten UAVs.
+//! `examples/ten_uavs.rs` continues from there: roadmap, assignment, paths, schedule and gates of ten UAVs.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -25,7 +25,7 @@ use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::search;
 
-/// Plans the whole swarm: [`costs`], then [`assign`], then [`schedule()`]. Vehicles and goals that cannot be served are
+/// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`]. Vehicles and goals that cannot be served are
 /// left out, the rest is served as well as can be.
 pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
@@ -34,9 +34,9 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let mut goals = Goals::new();
-    costs(view, request, ws)?;
-    assign(request, ws, &mut goals)?;
-    schedule(view, request, &goals, ws, out)
+    compute_costs(view, request, ws)?;
+    assign_goals(request, ws, &mut goals)?;
+    schedule_flights(view, request, &goals, ws, out)
 }
 
 /// The goal of each vehicle of a request, `None` for one that stays on its pad.
@@ -44,7 +44,7 @@ pub type Goals<const V: usize> = Vec<Option<u16>, V>;
 
 /// First step: the length of the shortest path from every start to every goal, into the workspace; labelled, only to
 /// the vehicle's own goal. One search a vehicle, or one cost matrix where all are of one size.
-pub fn costs<const N: usize, const V: usize, const P: usize>(
+pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
@@ -65,7 +65,7 @@ pub fn costs<const N: usize, const V: usize, const P: usize>(
     let Some(first) = request.vehicles.first() else { return Ok(()) };
     let labelled = request.mode == Mode::Labelled;
     if !labelled && request.vehicles.iter().all(|v| v.required_clearance_m == first.required_clearance_m) {
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, first.required_clearance_m);
+        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, first.required_clearance_m);
         return search::cost_matrix(view, &nodes, &targets, passable, &mut ws.search, costs)
             .map_err(|e| PlanError::Search(first.id, e));
     }
@@ -78,15 +78,15 @@ pub fn costs<const N: usize, const V: usize, const P: usize>(
             (true, None) => continue,
         };
         let (targets, row) = (&targets[wanted.clone()], &mut row[wanted]);
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
+        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, vehicle.required_clearance_m);
         search::dijkstra_row(view, i as u16, targets, passable, &mut ws.search, row)
             .map_err(|e| PlanError::Search(vehicle.id, e))?;
     }
     Ok(())
 }
 
-/// Second step: which vehicle flies to which goal, from the costs left in the workspace by [`costs`].
-pub fn assign<const N: usize, const V: usize, const P: usize>(
+/// Second step: which vehicle flies to which goal, from the costs left in the workspace by [`compute_costs`].
+pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
     assigned: &mut Goals<V>,
@@ -100,7 +100,7 @@ pub fn assign<const N: usize, const V: usize, const P: usize>(
     let _ = assigned.resize(starts, None);
     let solve = match request.mode {
         Mode::Unlabelled(Objective::TotalDistance) => assignment::assign,
-        Mode::Unlabelled(Objective::Makespan) => assignment::bottleneck,
+        Mode::Unlabelled(Objective::Makespan) => assignment::assign_bottleneck,
         Mode::Labelled => {
             for (i, vehicle) in request.vehicles.iter().enumerate() {
                 let Some(goal) = vehicle.goal else { continue };
@@ -116,7 +116,7 @@ pub fn assign<const N: usize, const V: usize, const P: usize>(
 }
 
 /// Third step: the paths to the `assigned` goals and their order at shared stretches.
-pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
+pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     assigned: &Goals<V>,
@@ -145,19 +145,19 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
             climb_m,
             descent_m,
             depart_s: 0.0,
-            piece_m: MAX_TIMED_SEGMENT_M,
+            segment_m: MAX_TIMED_SEGMENT_M,
         };
         // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     let handover_s = if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
-    let mut planned = in_order(view, request, handover_s, ws, out);
+    let mut planned = schedule_in_order(view, request, handover_s, ws, out);
     if handover_s > 0.0 && planned.is_err() {
         // Better late than not at all.
-        planned = in_order(view, request, 0.0, ws, out);
+        planned = schedule_in_order(view, request, 0.0, ws, out);
     }
     planned?;
-    out.seal(&request.schedule);
+    out.set_crc(&request.schedule);
     Ok(())
 }
 
@@ -172,7 +172,7 @@ const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 
 /// The paths, their order, and whether each vehicle has room for its gates. A place is free `handover_s` after its vehicle has left it.
 #[inline(never)]
-fn in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn schedule_in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     handover_s: f32,
@@ -180,10 +180,16 @@ fn in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     order::schedule_all(view, request, handover_s, ws, out)?;
-    departures::improve(request, handover_s, ws, out)?;
+    departures::improve_departure_order(request, handover_s, ws, out)?;
     for (index, flight) in out.flights.iter().enumerate() {
-        schedule::merged_m(&request.schedule, &out.flights, index, request.gates_most, &mut ws.schedule)
-            .map_err(|e| PlanError::Schedule(flight.id, e))?;
+        schedule::gate_merge_distance_m(
+            &request.schedule,
+            &out.flights,
+            index,
+            request.max_gates,
+            &mut ws.schedule,
+        )
+        .map_err(|e| PlanError::Schedule(flight.id, e))?;
     }
     Ok(())
 }
@@ -208,7 +214,7 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
 
 impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     /// Notes the CRC of what it holds.
-    pub(crate) fn seal(&mut self, cfg: &ScheduleConfig) {
+    pub(crate) fn set_crc(&mut self, cfg: &ScheduleConfig) {
         self.crc = crc(cfg, self);
     }
 }
@@ -219,9 +225,9 @@ fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V,
     let mut numbers = |numbers: &[f32]| numbers.iter().for_each(|c| digest.update(&c.to_le_bytes()));
     numbers(&[cfg.separation_m, cfg.parked_separation_m, cfg.cruise_mps, cfg.vertical_mps]);
     for flight in &plan.flights {
-        numbers(&[flight.climb_m, flight.descent_m, flight.depart_s, flight.piece_m]);
+        numbers(&[flight.climb_m, flight.descent_m, flight.depart_s, flight.segment_m]);
         for w in flight.path.waypoints() {
-            numbers(&[w.position.x, w.position.y, w.position.z, w.at_s, w.leave_s]);
+            numbers(&[w.position.x, w.position.y, w.position.z, w.arrive_s, w.leave_s]);
         }
     }
     for flight in &plan.flights {

@@ -26,7 +26,7 @@ use rand_pcg::Pcg32;
 
 use self::config::LengthRange;
 pub use self::config::{Config, Edge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length};
-use self::free_box::Sight;
+use self::free_box::NodeVisibility;
 pub use self::neighbours::Workspace;
 use crate::Point;
 use crate::segment::{point_clearance, segment_clearance, segment_is_clear};
@@ -55,7 +55,7 @@ pub fn sample_nodes(
         }
         nodes[i] = *terminal;
     }
-    let mut draws = Draws::new(config);
+    let mut draws = SampleSequence::new(config);
     let (min, size) = (grid.shape().min, grid.shape().max() - grid.shape().min);
     let is_free = |p: &Point| {
         grid.shape().cell_of(p).is_some_and(|cell| !grid.is_occupied(cell))
@@ -63,10 +63,11 @@ pub fn sample_nodes(
             && (config.clearance_m == 0.0 || segment_is_clear(grid, p, p, config.clearance_m))
     };
     for (found, node) in nodes[terminals.len()..total].iter_mut().enumerate() {
-        let draw = |draws: &mut Draws| Some(min + draws.next().component_mul(&size)).filter(&is_free);
+        let draw =
+            |draws: &mut SampleSequence| Some(min + draws.next().component_mul(&size)).filter(&is_free);
         let tries = if config.sampling == Sampling::Bridge && found % 2 == 1 { TRIES_PER_BRIDGE } else { 0 };
-        let bridge =
-            (0..tries).find_map(|_| draw(&mut draws).filter(|p| bridges(grid, config, p, draws.next())));
+        let bridge = (0..tries)
+            .find_map(|_| draw(&mut draws).filter(|p| passes_bridge_test(grid, config, p, draws.next())));
         let free = bridge.or_else(|| (0..TRIES_PER_NODE).find_map(|_| draw(&mut draws)));
         *node = free.ok_or(PrmError::NoFreeSpace(found))?;
     }
@@ -84,7 +85,7 @@ fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
 /// The bridge test: whether the points on either side of a clear one, at the same random offset, are both not clear.
 /// `draw` is of the unit cube. The offset is at most twice the clearance on each axis: a passage that is as wide
 /// leaves half of its width to fly in; where no clearance is asked for, an eighth of the longest edge.
-fn bridges(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> bool {
+fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> bool {
     let reach_m = (2.0 * config.clearance_m).max(config.edge_max_m / 8.0);
     let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
     [p + offset, p - offset]
@@ -92,15 +93,15 @@ fn bridges(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> boo
         .all(|end| grid.shape().cell_of(end).is_some() && !keeps_clear(grid, config, end))
 }
 
-/// Points of the unit cube, [0, 1) on each axis.
-struct Draws {
+/// Sequence of random points of the unit cube, [0, 1) on each axis.
+struct SampleSequence {
     rng: Pcg32,
     sampling: Sampling,
     index: u32,
     shift: Point,
 }
 
-impl Draws {
+impl SampleSequence {
     fn new(config: &Config) -> Self {
         let mut rng = Pcg32::seed_from_u64(config.seed);
         let shift = uniform(&mut rng);
@@ -150,7 +151,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     workspace: &mut Workspace<NODES, CUBES>,
     edges: &mut [Edge],
 ) -> Result<usize, PrmError> {
-    workspace.index(nodes, config)?;
+    workspace.build_index(nodes, config)?;
     let mut count = 0;
     connect_range(grid, workspace, config, 0..nodes.len(), |edge| {
         *edges.get_mut(count).ok_or(PrmError::RoadmapFull)? = edge;
@@ -185,16 +186,16 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     mut found: impl FnMut(Edge, f32) -> Result<(), PrmError>,
 ) -> Result<(), PrmError> {
     config.check()?;
-    let mut sight = Sight::new(grid, config);
+    let mut sight = NodeVisibility::new(grid, config);
     for place in range.start..range.end.min(workspace.len()) {
         sight.move_to(workspace.point(place));
         let edge = |other: usize| {
             let (a, b) = (workspace.node(place), workspace.node(other));
             Edge { a: a.min(b), b: a.max(b) }
         };
-        workspace.each_near(place, config, |places| {
+        workspace.for_each_in_range(place, config, |places| {
             let hint = |other| hint(edge(other));
-            sight.each_clear(workspace, places, hint, |other, room_m| found(edge(other), room_m))
+            sight.for_each_visible(workspace, places, hint, |other, room_m| found(edge(other), room_m))
         })?;
     }
     Ok(())
@@ -214,7 +215,7 @@ pub fn connect_all_pairs(
     let lengths = LengthRange::new(config);
     for (k, a) in nodes.iter().enumerate() {
         for (l, b) in nodes.iter().enumerate().skip(k + 1) {
-            if lengths.holds(squared_length((*a).into(), (*b).into()))
+            if lengths.contains(squared_length((*a).into(), (*b).into()))
                 && segment_is_clear(grid, a, b, config.clearance_m)
             {
                 found(Edge { a: k as u16, b: l as u16 });

@@ -11,7 +11,7 @@
 //! does (ALT: Goldberg and Harrelson 2005, "Computing the Shortest Path: A* Search Meets Graph Theory").
 //!
 //! It may carry each node's height over the ground too, four bytes a node, so that a board without a map knows where something
-//! that falls comes to rest ([`RoadmapView::ground_around`]).
+//! that falls comes to rest ([`RoadmapView::ground_range_near`]).
 //!
 //! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards no accessor can meet
 //! an offset or a target out of range, and A* finds shortest ways, whatever the bytes were. Whether an edge is as clear as
@@ -40,7 +40,7 @@ pub const HEADER_LEN: usize = 72;
 pub const MAX_NODES: usize = u16::MAX as usize;
 /// Largest coordinate magnitude, metres: up to there f32 distinguishes places a millimetre apart.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
-/// Longest edge a roadmap may have, metres. The schedule looks at each metre of an edge, so this bounds its work.
+/// Longest edge a roadmap may have, metres. The schedule checks each metre of an edge, so this bounds its work.
 pub const MAX_EDGE_M: f32 = 100.0;
 /// Longest path from a node to a landmark, metres: up to this length a sum of edges is right to 4
 /// mm an edge.
@@ -56,7 +56,7 @@ const LANDMARKS_LEN: usize = 4 * LANDMARKS;
 const HEIGHT_LEN: usize = 4;
 const WORD_LEN: usize = 4;
 
-/// Why a roadmap was refused, on reading or writing.
+/// Reason why a roadmap was refused, on reading or writing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RoadmapError {
     /// The bytes are no whole file.
@@ -149,8 +149,8 @@ impl RoadmapHeader {
         Ok(())
     }
 
-    /// Whether an edge may be as long as from `a` to `b`; the builder's own rule, to the bit.
-    fn holds_length(&self, a: &Point, b: &Point) -> bool {
+    /// Whether an edge from `a` to `b` has a valid length, by exactly the rule of the builder.
+    fn is_edge_length_valid(&self, a: &Point, b: &Point) -> bool {
         let square = squared_length((*a).into(), (*b).into());
         square >= self.edge_min_m * self.edge_min_m && square <= self.edge_max_m * self.edge_max_m
     }
@@ -245,7 +245,7 @@ impl<'a> RoadmapView<'a> {
             goals: u16_at(head, 58),
         };
         header.check(counts[0])?;
-        let view = Self::over(header, crc, &covered[HEADER_LEN..], counts);
+        let view = Self::from_body(header, crc, &covered[HEADER_LEN..], counts);
         view.check_graph()?;
         view.check_landmarks()?;
         view.check_heights()?;
@@ -254,7 +254,7 @@ impl<'a> RoadmapView<'a> {
 
     /// The parts of a body that is as long as its counts say, of nodes, half-edges and landmarks; what is left is heights.
     /// Nothing is checked.
-    fn over(header: RoadmapHeader, crc: u32, body: &'a [u8], counts: [usize; 3]) -> Self {
+    fn from_body(header: RoadmapHeader, crc: u32, body: &'a [u8], counts: [usize; 3]) -> Self {
         let [node_count, half_edge_count, landmarks] = counts;
         let (nodes, rest) = body.split_at(node_count * NODE_LEN);
         let (offsets, rest) = rest.split_at((node_count + 1) * WORD_LEN);
@@ -295,7 +295,7 @@ impl<'a> RoadmapView<'a> {
     /// Lengths in metres of the shortest ways from a node to the landmarks, over all edges; 0 where there is none. All 0
     /// if the roadmap has no landmarks.
     #[inline]
-    pub(crate) fn ways_to_landmarks_m(&self, node: u16) -> [f32; LANDMARKS] {
+    pub(crate) fn landmark_distances_m(&self, node: u16) -> [f32; LANDMARKS] {
         match self.landmarks.get(usize::from(node)) {
             Some(b) => {
                 [f32::from_le_bytes([b[0], b[1], b[2], b[3]]), f32::from_le_bytes([b[4], b[5], b[6], b[7]])]
@@ -328,7 +328,7 @@ impl<'a> RoadmapView<'a> {
     /// The edges out of a node, targets ascending; none for a node that does not exist.
     #[inline]
     pub fn half_edges(&self, node: u16) -> impl ExactSizeIterator<Item = HalfEdge> + use<'a> {
-        self.row(node).1.iter().map(HalfEdge::from_bytes)
+        self.half_edges_of(node).1.iter().map(HalfEdge::from_bytes)
     }
 
     /// A half-edge by its index.
@@ -339,7 +339,7 @@ impl<'a> RoadmapView<'a> {
 
     /// The edge from `a` to `b`, if there is one. O(log degree).
     pub fn edge_between(&self, a: u16, b: u16) -> Option<HalfEdge> {
-        let (_, row) = self.row(a);
+        let (_, row) = self.half_edges_of(a);
         row.binary_search_by_key(&b, target_of).ok().map(|i| HalfEdge::from_bytes(&row[i]))
     }
 
@@ -352,13 +352,13 @@ impl<'a> RoadmapView<'a> {
     /// Whether a vehicle that needs `required_m` (radius + margin) may fly `edge`. An edge with exactly the required
     /// clearance is blocked, as touching is; up to the tested clearance every edge of the roadmap is clear.
     #[inline]
-    pub fn clears(&self, edge: &HalfEdge, required_m: f32) -> bool {
+    pub fn has_clearance(&self, edge: &HalfEdge, required_m: f32) -> bool {
         edge.clearance_m > required_m || required_m <= self.header.tested_clearance_m
     }
 
     /// Index of a node's first half-edge, and its half-edges.
     #[inline]
-    pub(crate) fn row(&self, node: u16) -> (usize, &'a [[u8; WORD_LEN]]) {
+    pub(crate) fn half_edges_of(&self, node: u16) -> (usize, &'a [[u8; WORD_LEN]]) {
         let at = usize::from(node);
         match self.offsets.get(at..at + 2) {
             Some([from, to]) => {
@@ -370,7 +370,7 @@ impl<'a> RoadmapView<'a> {
     }
 }
 
-/// The length that a file's header tells, of a file that this version can read.
+/// The file length that a header states. The file's version has to be one that this code reads.
 ///
 /// # Errors
 /// It is no roadmap, of another version, or its counts are not those of such a length.

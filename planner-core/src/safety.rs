@@ -1,7 +1,7 @@
 //! The safety filter's geometry: where can a vehicle be until it has stopped, and do two such sets meet?
 //!
-//! The set of this vehicle ([`Set::along`], [`Set::vertical`]) is what it can no longer take back: [`REACTION_S`] at
-//! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`Heard::set`]) follows
+//! The set of this vehicle ([`ReachableSet::along`], [`ReachableSet::vertical`]) is what it can no longer take back: [`REACTION_S`] at
+//! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`NeighbourMotion::reachable_set`]) follows
 //! from what was last heard and from nothing else: no gate, no progress, no advice.
 //!
 //! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A motion that does not reduce a
@@ -9,7 +9,7 @@
 //! set of the step before, which did not: that is the safety argument (`docs/safety.md`).
 //!
 //! ENU metres. Sets are not compared by time, so an order in which two vehicles pass is no reason to come near. Cost:
-//! the segments of one set times those of the other; [`Heard::reach_m`] is a cheap bound for the many that are far. The
+//! the segments of one set times those of the other; [`NeighbourMotion::reach_m`] is a cheap bound for the many that are far. The
 //! own set is prepared once ([`OwnSet`]), so that most segments of the others are seen to be apart without a distance.
 
 mod own;
@@ -28,7 +28,7 @@ pub const MAX_LAG_S: f32 = 0.25;
 /// A neighbour heard within this time counts as heard, seconds.
 pub const FRESH_S: f32 = 1.0;
 /// A vehicle further than this from the path points that it reports does not fly along them,
-/// metres: real vehicles lag by up to 0.5 m and stray by 0.4 m.
+/// metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
 pub const OFF_REPORTED_PATH_M: f32 = 0.9;
 /// Most points of the set that a vehicle may occupy: its place and the eight path points that it
 /// reports.
@@ -55,25 +55,25 @@ impl Braking {
 /// Places where a vehicle can be: a polyline, perhaps a vertical column below its first point, and
 /// how much wider than a line both are.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Set {
+pub struct ReachableSet {
     points: Vec<Point, MAX_SET_POINTS>,
     /// Lower end of the column.
     foot: Option<Point>,
     /// Distance beside the line up to which the vehicle can be, metres.
-    pub grow_m: f32,
+    pub widened_by_m: f32,
 }
 
-impl Set {
+impl ReachableSet {
     /// A set of one place.
     #[inline]
     pub fn at(place: Point) -> Self {
         let mut points = Vec::new();
         // The first of nine.
         let _ = points.push(place);
-        Self { points, foot: None, grow_m: 0.0 }
+        Self { points, foot: None, widened_by_m: 0.0 }
     }
 
-    /// Goes on straight to a point; whether there is room for it.
+    /// Appends a straight leg to a point. Returns false if the set is full.
     fn push(&mut self, to: Point) -> bool {
         self.points.push(to).is_ok()
     }
@@ -82,11 +82,11 @@ impl Set {
     /// set ends where the points end.
     pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
         let mut set = Self::at(place);
-        set.follow(ahead, length_m);
+        set.extend_along(ahead, length_m);
         set
     }
 
-    fn follow(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
+    fn extend_along(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
         let (mut left_m, mut last) = (length_m, None);
         for point in ahead {
             let Some(from) = last.replace(point) else {
@@ -97,8 +97,8 @@ impl Set {
             let leg_m = sqrtf(leg.norm_squared());
             let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
             if !self.push(end) {
-                // More corners than there is room for: anywhere within what is left.
-                self.grow_m = left_m.max(0.0);
+                // The set has no memory for more corners: assume any place within the remaining length.
+                self.widened_by_m = left_m.max(0.0);
                 return;
             }
             left_m -= leg_m;
@@ -119,7 +119,7 @@ impl Set {
     pub fn reach_m(&self) -> f32 {
         let here = self.points[0];
         let most_sq = self.points.iter().fold(0.0_f32, |most, p| most.max((p - here).norm_squared()));
-        sqrtf(most_sq) + self.grow_m
+        sqrtf(most_sq) + self.widened_by_m
     }
 
     /// Adds the column below the first point, down to a height.
@@ -142,7 +142,7 @@ impl Set {
 
 /// Inputs of a neighbour's set.
 #[derive(Clone, Copy, Debug)]
-pub struct Heard<'a> {
+pub struct NeighbourMotion<'a> {
     /// Place, ENU metres.
     pub position: Point,
     /// ENU m/s.
@@ -153,10 +153,10 @@ pub struct Heard<'a> {
     pub age_s: f32,
     /// How late messages are when they are heard, seconds.
     pub delay_s: f32,
-    /// Points that it flies along next; empty if somebody else flies it.
+    /// Points that it flies along next; empty while a pilot or a failsafe flies it.
     pub points: &'a [Point],
     /// Place of the neighbour on its points.
-    pub joint: Joint,
+    pub place_on_points: PlaceOnPoints,
     /// Greatest distance to which the points lead from the first of them, metres.
     pub extent_m: f32,
     /// Distance along its points up to which the neighbour may have stopped since, unheard for
@@ -170,7 +170,7 @@ pub struct Heard<'a> {
 
 /// Place of a vehicle on the points that it reports: the same as long as neither is heard again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Joint {
+pub enum PlaceOnPoints {
     /// The place was not sought yet.
     #[default]
     Unknown,
@@ -189,7 +189,7 @@ pub enum Joint {
 /// A path that comes nearer again by less than this does not come back, metres.
 const RETURN_TOLERANCE_M: f32 = 0.05;
 
-impl Joint {
+impl PlaceOnPoints {
     /// Looks for the places on the points at which it may be: the first one, and how far from there the last one is.
     #[inline(never)]
     pub fn find(position: &Point, points: &[Point]) -> Self {
@@ -229,7 +229,7 @@ impl Joint {
 
     /// Distance along the points from that place that the vehicle may have flown already, metres.
     #[inline]
-    pub fn more_m(&self) -> f32 {
+    pub fn flown_beyond_m(&self) -> f32 {
         if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
     }
 }
@@ -245,16 +245,16 @@ fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
 
 /// Bounds of a neighbour's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
+pub struct MotionBounds {
     /// How it stops.
     pub braking: Braking,
     /// Fastest flight, m/s.
     pub speed_max_mps: f32,
-    /// A vehicle that nobody hears has stopped by then, seconds.
+    /// Time after which a vehicle that no other vehicle hears has stopped, seconds.
     pub silent_s: f32,
 }
 
-impl Bounds {
+impl MotionBounds {
     /// Whether all are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         all_positive(&[
@@ -266,73 +266,77 @@ impl Bounds {
     }
 }
 
-impl Heard<'_> {
+impl NeighbourMotion<'_> {
     /// Distance from its place that the neighbour can reach in any direction, `ahead_s` of flight
     /// included, metres.
     #[inline]
-    pub fn reach_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
+    pub fn reach_m(&self, bounds: &MotionBounds, ahead_s: f32) -> f32 {
         if self.grounded {
             return 0.0;
         }
         if self.age_s > FRESH_S {
-            return self.ball_m(bounds);
+            return self.reach_any_direction_m(bounds);
         }
-        let along_m = self.along_m(bounds, ahead_s);
-        let Some(first) = self.points.first() else { return along_m + self.wider_m(bounds) };
+        let along_m = self.distance_until_stop_m(bounds, ahead_s);
+        let Some(first) = self.points.first() else { return along_m + self.lateral_reach_m(bounds) };
         let away = (first - self.position).abs();
         // No less than the distance, and no square root.
         let first_m = away.x + away.y + away.z;
         // Where the place on the points was not sought yet only their extent is known.
-        let more_m = if self.joint == Joint::Unknown { 2.0 * self.extent_m } else { self.joint.more_m() };
+        let more_m = if self.place_on_points == PlaceOnPoints::Unknown {
+            2.0 * self.extent_m
+        } else {
+            self.place_on_points.flown_beyond_m()
+        };
         if first_m < OFF_REPORTED_PATH_M {
             // On its points, and no further than those lead.
             return (along_m + more_m + OFF_REPORTED_PATH_M).min(first_m + self.extent_m);
         }
-        along_m + more_m + self.wider_m(bounds) + OFF_REPORTED_PATH_M
+        along_m + more_m + self.lateral_reach_m(bounds) + OFF_REPORTED_PATH_M
     }
 
-    /// How old what it says is, seconds.
+    /// Age of the neighbour's last report, seconds.
     #[inline]
-    fn old_s(&self) -> f32 {
+    fn data_age_s(&self) -> f32 {
         self.age_s + self.delay_s
     }
 
     #[inline]
-    fn ball_m(&self, bounds: &Bounds) -> f32 {
+    fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
         // The neighbour learns that no vehicle hears it by messages that are as late as its own.
-        bounds.speed_max_mps * self.old_s().min(bounds.silent_s + 2.0 * self.delay_s)
+        bounds.speed_max_mps * self.data_age_s().min(bounds.silent_s + 2.0 * self.delay_s)
     }
 
     /// Distance that the neighbour flies until it has stopped.
     #[inline]
-    fn along_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
+    fn distance_until_stop_m(&self, bounds: &MotionBounds, ahead_s: f32) -> f32 {
         if self.rests_within_m > 0.0 {
             return self.rests_within_m;
         }
         // The neighbour may have begun to speed up since it was heard.
-        let gained_mps = bounds.braking.accel_mps2 * (self.old_s() + REACTION_S);
+        let gained_mps = bounds.braking.accel_mps2 * (self.data_age_s() + REACTION_S);
         let most_mps = self.speed_mps.max(bounds.speed_max_mps);
         let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
-        speed_mps * (self.old_s() + REACTION_S + MAX_LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
+        speed_mps * (self.data_age_s() + REACTION_S + MAX_LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
     }
 
     #[inline]
-    fn wider_m(&self, bounds: &Bounds) -> f32 {
-        0.5 * bounds.braking.accel_mps2 * self.old_s() * self.old_s()
+    fn lateral_reach_m(&self, bounds: &MotionBounds) -> f32 {
+        0.5 * bounds.braking.accel_mps2 * self.data_age_s() * self.data_age_s()
     }
 
     /// Set of places where the neighbour can be; with `ahead_s` also where its points lead it in so
     /// much time.
-    pub fn set(&self, bounds: &Bounds, ahead_s: f32) -> Set {
-        let mut set = Set::at(self.position);
+    pub fn reachable_set(&self, bounds: &MotionBounds, ahead_s: f32) -> ReachableSet {
+        let mut set = ReachableSet::at(self.position);
         if self.grounded {
-            // How high it lies may be unknown.
+            // Its height on the ground may be unknown.
             set.add_column(self.column_to_m);
             return set;
         }
         if self.age_s > FRESH_S {
-            set.grow_m = self.ball_m(bounds);
+            set.widened_by_m = self.reach_any_direction_m(bounds);
         } else {
             self.add_motion(&mut set, bounds, ahead_s);
         }
@@ -340,21 +344,29 @@ impl Heard<'_> {
         set
     }
 
-    fn add_motion(&self, set: &mut Set, bounds: &Bounds, ahead_s: f32) {
-        let joint = self.joint();
+    fn add_motion(&self, set: &mut ReachableSet, bounds: &MotionBounds, ahead_s: f32) {
+        let joint = self.place_on_points();
         if let Some((nearest, ahead)) = joint.ahead(&self.position, self.points) {
             let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
-            set.follow(ahead, joint.more_m() + self.along_m(bounds, ahead_s));
+            set.extend_along(ahead, joint.flown_beyond_m() + self.distance_until_stop_m(bounds, ahead_s));
         } else {
-            let share = if self.speed_mps > 0.0 { self.along_m(bounds, 0.0) / self.speed_mps } else { 0.0 };
+            let share = if self.speed_mps > 0.0 {
+                self.distance_until_stop_m(bounds, 0.0) / self.speed_mps
+            } else {
+                0.0
+            };
             set.push(self.position + self.velocity * share);
-            set.grow_m = self.wider_m(bounds);
+            set.widened_by_m = self.lateral_reach_m(bounds);
         }
     }
 
     #[inline]
-    fn joint(&self) -> Joint {
-        if self.joint == Joint::Unknown { Joint::find(&self.position, self.points) } else { self.joint }
+    fn place_on_points(&self) -> PlaceOnPoints {
+        if self.place_on_points == PlaceOnPoints::Unknown {
+            PlaceOnPoints::find(&self.position, self.points)
+        } else {
+            self.place_on_points
+        }
     }
 }
 

@@ -25,10 +25,10 @@ pub(crate) mod tests;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
-use self::blocks::{Bits, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, ones, pieces_of};
+use self::blocks::{Bits, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices};
 pub use self::config::{ScheduleConfig, ScheduleError};
 pub use self::pieces::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
-use self::pieces::{Piece, conflict, cut};
+use self::pieces::{TimedSegment, cut_into_segments, is_conflict};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use crate::sort;
 
@@ -41,15 +41,15 @@ const OFF_PAD_M: f32 = 0.02;
 /// Scratch of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
 pub struct ScheduleWorkspace {
-    own: Vec<Piece, MAX_TIMED_SEGMENTS>,
-    other: Vec<Piece, MAX_TIMED_SEGMENTS>,
+    own: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
+    other: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     /// Blocks of `own`.
     blocks: Blocks,
     forbidden: Forbidden,
 }
 
 impl ScheduleWorkspace {
-    /// Empty.
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self { own: Vec::new(), other: Vec::new(), blocks: Blocks::new(), forbidden: Vec::new() }
     }
@@ -58,7 +58,7 @@ impl ScheduleWorkspace {
 /// Intervals of time that do not overlap.
 type Forbidden = Vec<(f32, f32), MAX_INTERVALS>;
 
-fn forbid(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
+fn add_forbidden_interval(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
     // Swallow what overlaps; when full, swallow the nearest as well.
     while let Some(i) = forbidden.iter().position(|&(l, h)| l <= high && low <= h) {
         let (l, h) = forbidden.swap_remove(i);
@@ -69,7 +69,7 @@ fn forbid(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
         let nearest = (0..forbidden.len()).min_by(|&a, &b| gap(&forbidden[a]).total_cmp(&gap(&forbidden[b])));
         if let Some(i) = nearest {
             let (l, h) = forbidden.swap_remove(i);
-            forbid(forbidden, fminf(low, l), fmaxf(high, h));
+            add_forbidden_interval(forbidden, fminf(low, l), fmaxf(high, h));
         }
     }
 }
@@ -94,23 +94,23 @@ pub(crate) fn departure_with_handover<'a, const W: usize>(
     scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
-    cut(cfg, flight, &mut ws.own)?;
-    ws.blocks.of(&ws.own);
+    cut_into_segments(cfg, flight, &mut ws.own)?;
+    ws.blocks.rebuild(&ws.own);
     ws.forbidden.clear();
     for other in scheduled {
         if ws.blocks.are_far_from(cfg, other) {
             continue;
         }
-        cut(cfg, other, &mut ws.other)?;
+        cut_into_segments(cfg, other, &mut ws.other)?;
         for block in ws.other.chunks(SEGMENTS_PER_BLOCK) {
-            let near = ws.blocks.near(cfg, block);
+            let near = ws.blocks.blocks_near(cfg, block);
             if near == 0 {
                 continue;
             }
             for q in block {
-                for p in pieces_of(near, &ws.own).filter(|p| conflict(cfg, p, q)) {
+                for p in segments_in_blocks(near, &ws.own).filter(|p| is_conflict(cfg, p, q)) {
                     // Held together iff p.from + d < q.to and q.from < p.to + d.
-                    forbid(
+                    add_forbidden_interval(
                         &mut ws.forbidden,
                         other.depart_s + q.from_s - handover_s - p.to_s,
                         other.depart_s + q.to_s + handover_s - p.from_s,
@@ -131,14 +131,14 @@ pub(crate) fn forbidden_differences<const W: usize>(
     handover_s: f32,
     ws: &mut ScheduleWorkspace,
 ) -> Result<(f32, f32), ScheduleError> {
-    cut(cfg, a, &mut ws.own)?;
-    cut(cfg, b, &mut ws.other)?;
+    cut_into_segments(cfg, a, &mut ws.own)?;
+    cut_into_segments(cfg, b, &mut ws.other)?;
     let (mut from_s, mut to_s) = (f32::INFINITY, f32::NEG_INFINITY);
     for q in &ws.other {
         for p in &ws.own {
             // A segment that widens no interval need not be compared.
             let (low, high) = (q.from_s - handover_s - p.to_s, q.to_s + handover_s - p.from_s);
-            if (low < from_s || high > to_s) && conflict(cfg, p, q) {
+            if (low < from_s || high > to_s) && is_conflict(cfg, p, q) {
                 (from_s, to_s) = (fminf(from_s, low), fmaxf(to_s, high));
             }
         }
@@ -177,7 +177,7 @@ fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
 /// It may have to wait where the segment ends, for a vehicle that it would block if that still counted as inside. The next
 /// segment begins there and is either in conflict too, and then counts by itself, or clear, and then so is the place between
 /// them. A vehicle has left its pad when it is off it, however low its climb ends, and its descent when it stands on the ground.
-fn left_at_m<const W: usize>(q: &Piece, flight: &Flight<W>) -> f32 {
+fn cleared_at_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     if q.to_m < flight.path.length_m() + flight.descent_m {
         fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_M - flight.climb_m)
     } else {
@@ -197,27 +197,27 @@ pub fn gates<const W: usize, const G: usize>(
     ws: &mut ScheduleWorkspace,
     out: &mut Vec<Gate, G>,
 ) -> Result<(), ScheduleError> {
-    let merged_m = merged_m(cfg, flights, index, G, ws)?;
+    let merged_m = gate_merge_distance_m(cfg, flights, index, G, ws)?;
     out.clear();
     let mut full = false;
-    each_gate(cfg, flights, index, merged_m, ws, |gate| full |= out.push(gate).is_err())?;
-    sort::by(out, |a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
+    for_each_gate(cfg, flights, index, merged_m, ws, |gate| full |= out.push(gate).is_err())?;
+    sort::sort_by(out, |a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
-/// Distance within which gates of flight `index` have to be merged for no more than `most`, metres.
-pub(crate) fn merged_m<const W: usize>(
+/// Distance within which gates of flight `index` have to be merged so that at most `most` remain, metres.
+pub(crate) fn gate_merge_distance_m<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
     index: usize,
     most: usize,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
-    cut(cfg, flights.get(index).ok_or(ScheduleError::BadIndex)?, &mut ws.own)?;
-    ws.blocks.of(&ws.own);
+    cut_into_segments(cfg, flights.get(index).ok_or(ScheduleError::BadIndex)?, &mut ws.own)?;
+    ws.blocks.rebuild(&ws.own);
     for merged_m in GATE_MERGE_M {
         let mut count = 0;
-        each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;
+        for_each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;
         if count <= most {
             return Ok(merged_m);
         }
@@ -232,11 +232,11 @@ const GATE_MERGE_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
 /// For each block of `ws.own` the blocks of `ws.other` that may come too near; `None` where none
 /// does.
 #[inline(never)]
-fn near_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
+fn conflicting_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
     let mut near = [0; MAX_BLOCKS];
     let mut some = false;
     for (bit, block) in ws.other.chunks(SEGMENTS_PER_BLOCK).enumerate() {
-        for own in ones(ws.blocks.near(cfg, block)) {
+        for own in set_bit_indices(ws.blocks.blocks_near(cfg, block)) {
             near[own] |= 1 << bit;
             some = true;
         }
@@ -245,7 +245,7 @@ fn near_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; MA
 }
 
 /// The gates of the flight in `ws.own`, one other vehicle after the other.
-fn each_gate<const W: usize>(
+fn for_each_gate<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
     index: usize,
@@ -254,25 +254,26 @@ fn each_gate<const W: usize>(
     mut found: impl FnMut(Gate),
 ) -> Result<(), ScheduleError> {
     // The vehicle hovers where the segment before ends and the one after begins, so those conflict wherever a hover does.
-    let moves = |piece: &&Piece| piece.parked || piece.to_m > piece.from_m;
+    let moves = |piece: &&TimedSegment| piece.parked || piece.to_m > piece.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
         if ws.blocks.are_far_from(cfg, other) {
             continue;
         }
-        cut(cfg, other, &mut ws.other)?;
-        let Some(near) = near_blocks(cfg, ws) else { continue };
+        cut_into_segments(cfg, other, &mut ws.other)?;
+        let Some(near) = conflicting_blocks(cfg, ws) else { continue };
         // The gate found last, and when it is passed.
         let mut last: Option<(Gate, f32)> = None;
         let mut highest = f32::NEG_INFINITY;
         let own = ws.own.iter().enumerate().map(|(i, p)| (near[i / SEGMENTS_PER_BLOCK], p));
         for (near, p) in own.filter(|(near, p)| *near != 0 && moves(p)) {
             let start_s = flight.depart_s + p.from_s;
-            let earlier =
-                |q: &&Piece| other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && conflict(cfg, p, q);
+            let earlier = |q: &&TimedSegment| {
+                other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && is_conflict(cfg, p, q)
+            };
             let (mut until_m, mut open_s) = (highest, f32::NEG_INFINITY);
-            for q in pieces_of(near, &ws.other).filter(moves).filter(earlier) {
-                let left_m = left_at_m(q, other);
+            for q in segments_in_blocks(near, &ws.other).filter(moves).filter(earlier) {
+                let left_m = cleared_at_m(q, other);
                 if left_m > until_m {
                     (until_m, open_s) = (left_m, other.depart_s + q.to_s);
                 }

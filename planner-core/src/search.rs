@@ -7,7 +7,7 @@
 //!
 //! Edge lengths are not stored but follow from the nodes. Most half-edges never need theirs: the target is settled or
 //! already reached too cheaply for any edge of that squared length, so a square root is taken only when it may change a
-//! distance. A host that searches often keeps the lengths at hand ([`WithLengths`]). Ties go to the lower node index, so the same roadmap gives the same path everywhere.
+//! distance. A host that searches often keeps the lengths at hand ([`RoadmapWithLengths`]). Ties go to the lower node index, so the same roadmap gives the same path everywhere.
 
 use heapless::Vec;
 
@@ -17,15 +17,15 @@ use crate::roadmap::{HalfEdge, RoadmapView, target_of};
 pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
-/// Half-edges compared together; a node seldom has more.
+/// Half-edges compared together; a node rarely has more.
 const HALF_EDGE_CHUNK: usize = 64;
 /// Places in a chunk; as long as a `u8` can count, so that no index needs a check.
-type Gains = [u8; 256];
+type Improvements = [u8; 256];
 
 /// Most targets for which the search is guided (A*) to each target in turn: a board's 32 vehicles.
 const MAX_GUIDED_TARGETS: usize = 32;
 
-/// Why a search gave no answer.
+/// Reason why a search has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchError {
     /// No passable way joins the two nodes.
@@ -48,7 +48,7 @@ pub struct SearchWorkspace<const N: usize> {
 }
 
 impl<const N: usize> SearchWorkspace<N> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         assert!(N <= u16::MAX as usize, "node indices are 16 bits");
         Self { distance: [0.0; N], parent: [0; N], heap: Heap::new() }
@@ -57,7 +57,7 @@ impl<const N: usize> SearchWorkspace<N> {
     /// Length in metres of the shortest way from the last search's source to `node`; infinite if it was not settled.
     pub fn distance_m(&self, node: u16) -> f32 {
         match self.distance.get(usize::from(node)) {
-            Some(&distance) if self.heap.place(node) == SETTLED => distance,
+            Some(&distance) if self.heap.entry_index(node) == SETTLED => distance,
             _ => f32::INFINITY,
         }
     }
@@ -66,7 +66,7 @@ impl<const N: usize> SearchWorkspace<N> {
     /// may be taken out for every target of a [`dijkstra_row`].
     pub fn path_to<const P: usize>(&self, node: u16, out: &mut Vec<u16, P>) -> Result<(), SearchError> {
         out.clear();
-        if usize::from(node) >= N || self.heap.place(node) != SETTLED {
+        if usize::from(node) >= N || self.heap.entry_index(node) != SETTLED {
             return Err(SearchError::NoPath);
         }
         let mut at = node;
@@ -89,7 +89,7 @@ impl<const N: usize> Default for SearchWorkspace<N> {
     }
 }
 
-/// A roadmap to search: as it lies in flash ([`RoadmapView`]), or with its edge lengths at hand ([`WithLengths`]). Both
+/// A roadmap to search: as it lies in flash ([`RoadmapView`]), or with its edge lengths at hand ([`RoadmapWithLengths`]). Both
 /// give the same paths and lengths, bit for bit.
 pub trait Graph {
     /// The roadmap.
@@ -103,14 +103,14 @@ pub trait Graph {
     ///
     /// Most do not: the target is settled, or reached more cheaply. They are distinguished by selects, since which they are
     /// cannot be predicted.
-    fn gains<const N: usize>(
+    fn find_improvements<const N: usize>(
         &self,
         first: usize,
         half_edges: &[[u8; 4]],
         here: &Point,
         reached: f32,
         distance: &[f32; N],
-        out: &mut Gains,
+        out: &mut Improvements,
     ) -> usize;
 }
 
@@ -125,14 +125,14 @@ impl Graph for RoadmapView<'_> {
     }
 
     #[inline]
-    fn gains<const N: usize>(
+    fn find_improvements<const N: usize>(
         &self,
         _first: usize,
         half_edges: &[[u8; 4]],
         here: &Point,
         reached: f32,
         distance: &[f32; N],
-        out: &mut Gains,
+        out: &mut Improvements,
     ) -> usize {
         // A little more room than there is, so that rounding never hides a gain: the exact comparison comes later. 1e-6
         // is eight times the rounding of the three products.
@@ -151,17 +151,17 @@ impl Graph for RoadmapView<'_> {
 
 /// A roadmap with the lengths of its half-edges in memory, 4 bytes each: for hosts, where many searches follow.
 #[derive(Clone, Copy, Debug)]
-pub struct WithLengths<'a> {
+pub struct RoadmapWithLengths<'a> {
     view: RoadmapView<'a>,
     lengths: &'a [f32],
 }
 
-impl<'a> WithLengths<'a> {
+impl<'a> RoadmapWithLengths<'a> {
     /// Fills `lengths`, which holds one number for each half-edge or more.
     pub fn new(view: RoadmapView<'a>, lengths: &'a mut [f32]) -> Result<Self, SearchError> {
         let lengths = lengths.get_mut(..view.half_edge_count()).ok_or(SearchError::WorkspaceTooSmall)?;
         for node in 0..view.node_count() as u16 {
-            let (first, row) = view.row(node);
+            let (first, row) = view.half_edges_of(node);
             for (length, half_edge) in lengths[first..].iter_mut().zip(row) {
                 *length = view.distance_m(node, target_of(half_edge));
             }
@@ -170,7 +170,7 @@ impl<'a> WithLengths<'a> {
     }
 }
 
-impl Graph for WithLengths<'_> {
+impl Graph for RoadmapWithLengths<'_> {
     fn view(&self) -> &RoadmapView<'_> {
         &self.view
     }
@@ -181,14 +181,14 @@ impl Graph for WithLengths<'_> {
     }
 
     #[inline]
-    fn gains<const N: usize>(
+    fn find_improvements<const N: usize>(
         &self,
         first: usize,
         half_edges: &[[u8; 4]],
         _here: &Point,
         reached: f32,
         distance: &[f32; N],
-        out: &mut Gains,
+        out: &mut Improvements,
     ) -> usize {
         let mut count = 0_u8;
         let lengths = &self.lengths[first..first + half_edges.len()];
@@ -227,10 +227,10 @@ pub fn dijkstra_all<const N: usize>(
     passable: impl Fn(u16, &HalfEdge) -> bool,
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
-    begin(graph.view(), from, ws)?;
+    start_search(graph.view(), from, ws)?;
     let mut gains = [0; 256];
     while let Some(node) = ws.heap.pop() {
-        relax(graph, node, &passable, |_| 0.0, ws, &mut gains);
+        relax_edges(graph, node, &passable, |_| 0.0, ws, &mut gains);
     }
     Ok(())
 }
@@ -264,10 +264,10 @@ pub(crate) fn shortest_path_tree<const N: usize>(
     from: u16,
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
-    begin(view, from, ws)?;
+    start_search(view, from, ws)?;
     let mut gains = [0; 256];
     while let Some(node) = ws.heap.pop() {
-        relax(view, node, &|_, _| true, |_| 0.0, ws, &mut gains);
+        relax_edges(view, node, &|_, _| true, |_| 0.0, ws, &mut gains);
     }
     Ok(())
 }
@@ -296,7 +296,8 @@ pub fn cost_matrix<const N: usize>(
     if out.is_empty() {
         return Ok(());
     }
-    let ((starts_at, starts_across), (goals_at, goals_across)) = (spread(view, starts), spread(view, goals));
+    let ((starts_at, starts_across), (goals_at, goals_across)) =
+        (bounding_box(view, starts), bounding_box(view, goals));
     let between = libm::sqrtf((goals_at - starts_at).norm_squared());
     let from_starts = starts.len() as f32 * (between + goals_across);
     let from_goals = goals.len() as f32 * (between + starts_across);
@@ -317,7 +318,7 @@ pub fn cost_matrix<const N: usize>(
 }
 
 /// Centre and diagonal of the box around some nodes.
-fn spread(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
+fn bounding_box(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
     let corners = nodes.iter().map(|&node| view.node(node));
     let (low, high) = corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
@@ -348,34 +349,34 @@ fn search<const N: usize>(
     for &target in targets {
         check_node(view, target)?;
     }
-    begin(view, from, ws)?;
+    start_search(view, from, ws)?;
     let mut gains = [0; 256];
     let informed = targets.len() <= MAX_GUIDED_TARGETS;
     for &target in targets {
-        let (goal, [goal_a, goal_b]) = (view.node(target), view.ways_to_landmarks_m(target));
+        let (goal, [goal_a, goal_b]) = (view.node(target), view.landmark_distances_m(target));
         let heuristic = |node: u16| {
             if !informed {
                 return 0.0;
             }
-            let [a, b] = view.ways_to_landmarks_m(node);
+            let [a, b] = view.landmark_distances_m(node);
             let straight = libm::sqrtf((view.node(node) - goal).norm_squared());
             straight.max(libm::fabsf(a - goal_a)).max(libm::fabsf(b - goal_b))
         };
-        if informed && ws.heap.place(target) != SETTLED {
+        if informed && ws.heap.entry_index(target) != SETTLED {
             let distance = &ws.distance;
             ws.heap.reorder(|node| distance[usize::from(node)] + heuristic(node));
         }
-        while ws.heap.place(target) != SETTLED
+        while ws.heap.entry_index(target) != SETTLED
             && let Some(node) = ws.heap.pop()
         {
-            relax(graph, node, &passable, heuristic, ws, &mut gains);
+            relax_edges(graph, node, &passable, heuristic, ws, &mut gains);
         }
     }
     Ok(())
 }
 
 /// Empties the workspace but for `from`.
-fn begin<const N: usize>(
+fn start_search<const N: usize>(
     view: &RoadmapView<'_>,
     from: u16,
     ws: &mut SearchWorkspace<N>,
@@ -395,25 +396,25 @@ fn begin<const N: usize>(
 
 /// Offers the settled `node`'s edges to its neighbours.
 #[inline]
-fn relax<const N: usize>(
+fn relax_edges<const N: usize>(
     graph: &impl Graph,
     node: u16,
     passable: &impl Fn(u16, &HalfEdge) -> bool,
     heuristic: impl Fn(u16) -> f32,
     ws: &mut SearchWorkspace<N>,
-    gains: &mut Gains,
+    gains: &mut Improvements,
 ) {
     let view = graph.view();
     let distance = &mut ws.distance;
     let (here, reached) = (view.node(node), distance[usize::from(node)]);
-    let (first, row) = view.row(node);
+    let (first, row) = view.half_edges_of(node);
     for (chunk, half_edges) in row.chunks(HALF_EDGE_CHUNK).enumerate() {
         let first = first + chunk * HALF_EDGE_CHUNK;
-        let count = graph.gains(first, half_edges, &here, reached, distance, gains);
+        let count = graph.find_improvements(first, half_edges, &here, reached, distance, gains);
         for &place in gains.iter().take(count) {
             let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
             let length = reached + graph.length(k, &here, target);
-            let gain = length < distance[usize::from(target)] && ws.heap.place(target) != SETTLED;
+            let gain = length < distance[usize::from(target)] && ws.heap.entry_index(target) != SETTLED;
             if gain && passable(node, &view.half_edge(k)) {
                 distance[usize::from(target)] = length;
                 ws.parent[usize::from(target)] = node;

@@ -8,7 +8,7 @@
 //!
 //! Both ends are first snapped to a lattice of 2⁻¹⁴ cell ([`snap`]). From there on all arithmetic is integer and without
 //! rounding or overflow: a closed cell is met iff none of the six separating axes of a segment and a cube (three face
-//! normals, three cross products) tells them apart, and those tests are 64-bit products of 31-bit numbers. What walks
+//! normals, three cross products) separates them, and those tests are 64-bit products of 31-bit numbers. What walks
 //! the map to find occupied cells may therefore be generous, and is: it visits a superset of the touched cells.
 //!
 //! So the answer is the true one, touching included, for ends on the lattice (multiples of resolution / 16384; also
@@ -19,7 +19,7 @@
 //! # Cost
 //!
 //! Clearance 0: one word of 4 × 4 × 4 cells a step of four cells along the longest axis (up to four words where the
-//! segment runs near a brick's border); cells are looked at only in bricks that hold an obstacle near the line. With a clearance:
+//! segment runs near a brick's border); cells are checked only in bricks that hold an obstacle near the line. With a clearance:
 //! the words whose cells lie in the bounding boxes of the swept volume, and a distance for each obstacle in them.
 
 mod distance;

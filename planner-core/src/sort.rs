@@ -8,7 +8,7 @@ use core::cmp::Ordering;
 /// Sorts by an order, the least first.
 // Apart: callers are large, and what is inlined into them is there as often as they are.
 #[inline(never)]
-pub(crate) fn by<T>(items: &mut [T], mut order: impl FnMut(&T, &T) -> Ordering) {
+pub(crate) fn sort_by<T>(items: &mut [T], mut order: impl FnMut(&T, &T) -> Ordering) {
     let mut len = items.len();
     let mut root = len / 2;
     while len > 1 {
@@ -43,7 +43,7 @@ mod tests {
         #[test]
         fn sorts_as_the_standard_library_does(numbers in proptest::collection::vec(0u8..40, 0..120)) {
             let (mut sorted, mut expected) = (numbers.clone(), numbers);
-            by(&mut sorted, Ord::cmp);
+            sort_by(&mut sorted, Ord::cmp);
             expected.sort_unstable();
             prop_assert_eq!(sorted, expected);
         }

@@ -116,12 +116,12 @@ const WALKING_SPEED_MPS: f32 = 2.0;
 const PATH_END_M: f32 = 0.01;
 
 /// Half of the clearance a leg leaves beyond the body, within the configured bounds.
-fn deviation(cfg: &TrackConfig, clearance_m: f32) -> f32 {
+fn allowed_deviation_m(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
 }
 
-/// The way from one waypoint to the next, as a unit vector.
-fn direction(from: &Waypoint, to: &Waypoint) -> Point {
+/// Unit vector from one waypoint to the next.
+fn unit_direction(from: &Waypoint, to: &Waypoint) -> Point {
     (to.position - from.position) / (to.along_m - from.along_m)
 }
 
@@ -142,31 +142,31 @@ fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
 /// square roots by software.
 fn corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &Point) -> f32 {
     let change_sq = (after - before).norm_squared();
-    let sweep = deviation(cfg, clearance_m) / cfg.response_s;
+    let sweep = allowed_deviation_m(cfg, clearance_m) / cfg.response_s;
     fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
 }
 
-/// The speed from which a way of `2 · accel · way = room` is enough to brake, if braking begins after `later_s`.
+/// Greatest speed that can be braked to rest within `room / (2 · accel)` metres if braking begins after `later_s`.
 fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
     let lost = accel * later_s;
     sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
 }
 
 /// The path ahead of the reference.
-struct Ahead<'a> {
+struct PathAhead<'a> {
     points: &'a [Waypoint],
     /// Index of the next waypoint.
     next: usize,
     along_m: f32,
     /// Distance within which to stop, metres.
     stop_m: f32,
-    /// Direction of the leg at hand.
+    /// Direction of the current leg.
     direction: Point,
-    /// Acceleration of the leg at hand, m/s².
+    /// Acceleration of the current leg, m/s².
     accel: f32,
 }
 
-impl Ahead<'_> {
+impl PathAhead<'_> {
     /// Squares of what can be braked from, summed up leg by leg: each has its acceleration.
     fn braking_sq(&self, cfg: &TrackConfig) -> f32 {
         let mut before = self.direction;
@@ -186,7 +186,7 @@ impl Ahead<'_> {
             }
             let corner_sq = match self.points.get(i + 1) {
                 Some(end) => {
-                    let after = direction(waypoint, end);
+                    let after = unit_direction(waypoint, end);
                     let clearance_m = fminf(waypoint.clearance_m, end.clearance_m);
                     let (fastest, after_accel) = limits_along(cfg, &after);
                     let corner_sq = corner_speed_sq(cfg, clearance_m, &before, &after);
@@ -218,9 +218,9 @@ pub fn advance<const W: usize>(
     let dt_s = if dt_s > 0.0 { fminf(dt_s, 1.0) } else { 0.0 };
     let length_m = path.length_m();
     let next = points.partition_point(|w| w.along_m <= tracker.along_m);
-    let leg = next.clamp(1, fmaxi(points.len(), 2) - 1);
+    let leg = next.clamp(1, max_index(points.len(), 2) - 1);
     let along_leg = |i: usize| match (points.get(i.wrapping_sub(1)), points.get(i)) {
-        (Some(from), Some(to)) => direction(from, to),
+        (Some(from), Some(to)) => unit_direction(from, to),
         _ => Point::zeros(),
     };
     let before = along_leg(leg);
@@ -228,7 +228,7 @@ pub fn advance<const W: usize>(
     // NaN stops.
     let top_mps = if advice.speed_scale > 0.0 { top_mps * fminf(advice.speed_scale, 1.0) } else { 0.0 };
     let stop_m = if advice.stop_within_m > 0.0 { advice.stop_within_m } else { 0.0 };
-    let ahead = Ahead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
+    let ahead = PathAhead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
     let braking_sq = ahead.braking_sq(cfg);
     let speed_before = tracker.speed_mps;
     // No faster than the leg's acceleration can brake from, beginning with the next step.
@@ -246,15 +246,15 @@ pub fn advance<const W: usize>(
     Some(Reference {
         position: path.point_at(tracker.along_m)?,
         along_m: tracker.along_m,
-        lead_m: lead_m(cfg, clearance_m, tracker.speed_mps),
+        lead_m: max_lead_m(cfg, clearance_m, tracker.speed_mps),
         finished: tracker.along_m >= length_m,
     })
 }
 
 /// Greatest lead of the reference over the vehicle on a leg of this clearance at this speed of the
 /// reference, metres.
-fn lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
-    let deviation_m = deviation(cfg, clearance_m);
+fn max_lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
+    let deviation_m = allowed_deviation_m(cfg, clearance_m);
     let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, MIN_LEAD_M));
     // Between walls a vehicle that lags may cut a corner, however fast it is.
     let open = deviation_m >= cfg.deviation_max_m;
@@ -264,7 +264,7 @@ fn lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
 /// A reference slower than this is about to stop, m/s.
 const ABOUT_TO_STOP_MPS: f32 = 0.05;
 
-fn fmaxi(a: usize, b: usize) -> usize {
+fn max_index(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
 }
 

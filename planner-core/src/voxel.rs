@@ -9,7 +9,7 @@ use crate::Point;
 /// Cells along one edge of a brick.
 pub const BRICK_CELLS: u32 = 4;
 
-/// Why a grid was refused.
+/// Reason why a grid was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridError {
     /// A dimension is zero or beyond [`MAX_DIM`], or all together are more words than 32 bits can index.

@@ -12,7 +12,7 @@
 use planner_core::Point;
 
 use super::command::Command;
-use super::messages::scaled;
+use super::messages::to_mavlink_units;
 use super::port::Port;
 use super::snapshot::Snapshot;
 use crate::AutopilotKind;
@@ -37,51 +37,51 @@ pub struct Photo {
 
 /// The camera's trigger.
 #[derive(Clone, Debug, Default)]
-pub struct Camera {
+pub struct CameraTrigger {
     /// Metres between pictures while it triggers by distance.
     distance_m: Option<f32>,
     /// The estimated place, east and north, that the distance counts from.
     last: Option<[f32; 2]>,
     /// A picture was asked for at once.
-    once: bool,
-    look_us: u64,
+    picture_requested: bool,
+    next_poll_us: u64,
     /// Pictures since boot.
     taken: u32,
     photos: Vec<Photo>,
 }
 
-impl Camera {
+impl CameraTrigger {
     /// DO_SET_CAM_TRIGG_DIST: metres in parameter 1, 0 and less stop it; parameter 3 asks for one picture at once.
-    pub(super) fn set_distance(&mut self, command: &Command) {
+    pub(super) fn handle_trigger_distance(&mut self, command: &Command) {
         let distance_m = command.param[0];
         self.distance_m = (distance_m > 0.0).then_some(distance_m);
         self.last = None;
-        self.once |= command.param[2] > 0.0;
+        self.picture_requested |= command.param[2] > 0.0;
     }
 
     /// DO_DIGICAM_CONTROL: 1 in parameter 5 asks for a picture.
-    pub(super) fn control(&mut self, command: &Command) {
-        self.once |= libm::roundf(command.number5) == 1.0;
+    pub(super) fn handle_digicam_control(&mut self, command: &Command) {
+        self.picture_requested |= libm::roundf(command.param5) == 1.0;
     }
 
     /// The state that a reboot leaves: the photos taken.
-    pub(super) fn rebooted(&mut self) -> Self {
+    pub(super) fn after_reboot(&mut self) -> Self {
         Self { photos: core::mem::take(&mut self.photos), ..Self::default() }
     }
 
-    /// Hands over what was photographed since the last call.
+    /// Returns the pictures taken since the last call.
     pub(super) fn take_photos(&mut self) -> Vec<Photo> {
         core::mem::take(&mut self.photos)
     }
 
     /// Pictures since boot.
-    pub(super) fn taken(&self) -> u32 {
+    pub(super) fn picture_count(&self) -> u32 {
         self.taken
     }
 
-    /// When it looks next, microseconds since boot.
-    pub(super) fn looks_us(&self) -> u64 {
-        self.look_us
+    /// Time of the next trigger check, microseconds since boot.
+    pub(super) fn next_poll_us(&self) -> u64 {
+        self.next_poll_us
     }
 
     /// One step: the message to announce, if a picture was taken. `estimate` is none without a position.
@@ -92,11 +92,11 @@ impl Camera {
         estimate: Option<Point>,
     ) -> Option<u32> {
         let px4 = personality == AutopilotKind::Px4;
-        let looks = truth.time_us >= self.look_us;
+        let looks = truth.time_us >= self.next_poll_us;
         if looks {
-            self.look_us += TRIGGER_CHECK_EVERY_US[usize::from(!px4)];
+            self.next_poll_us += TRIGGER_CHECK_EVERY_US[usize::from(!px4)];
         }
-        let mut shoot = (looks || !px4) && core::mem::take(&mut self.once);
+        let mut shoot = (looks || !px4) && core::mem::take(&mut self.picture_requested);
         if shoot {
             self.last = estimate.map(|at| [at.x, at.y]);
         }
@@ -125,7 +125,7 @@ impl Camera {
 impl Snapshot {
     /// Reports of the picture taken in this step.
     pub(super) fn send_camera(&self, id: u32, port: &mut Port) -> bool {
-        let (latitude, longitude, altitude_mm) = scaled(&self.geodetic);
+        let (latitude, longitude, altitude_mm) = to_mavlink_units(&self.geodetic);
         let relative_m = (self.geodetic.alt_m - self.home.0.alt_m) as f32;
         match id {
             CAMERA_IMAGE_CAPTURED => {

@@ -1,6 +1,6 @@
 //! COMMAND_LONG and COMMAND_INT, read alike, and the results they are answered with.
 
-use super::wire::Fields;
+use super::wire::PayloadReader;
 
 pub const ACCEPTED: u8 = 0;
 pub const TEMPORARILY_REJECTED: u8 = 1;
@@ -25,7 +25,7 @@ pub struct Command {
     /// Parameters 1 to 4.
     pub param: [f32; 4],
     /// Parameter 5 where it is no place.
-    pub number5: f32,
+    pub param5: f32,
     /// Latitude and longitude in degrees, where given.
     pub place: [f64; 2],
     /// Parameter 7.
@@ -36,12 +36,12 @@ pub struct Command {
 
 impl Command {
     /// The command of a COMMAND_LONG.
-    pub fn long(fields: &Fields<'_>) -> Self {
+    pub fn from_command_long(fields: &PayloadReader<'_>) -> Self {
         let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
         Self {
             id: fields.u16(28),
             param: first_four(fields),
-            number5: fields.f32(16),
+            param5: fields.f32(16),
             place,
             z: fields.f32(24),
             relative: false,
@@ -49,7 +49,7 @@ impl Command {
     }
 
     /// The command of a COMMAND_INT.
-    pub fn int(fields: &Fields<'_>) -> Self {
+    pub fn from_command_int(fields: &PayloadReader<'_>) -> Self {
         let degrees = |at: usize| match fields.i32(at) {
             i32::MAX => f64::NAN,
             scaled => f64::from(scaled) * 1e-7,
@@ -59,7 +59,7 @@ impl Command {
         Self {
             id: fields.u16(28),
             param: first_four(fields),
-            number5: fields.i32(16) as f32,
+            param5: fields.i32(16) as f32,
             place,
             z: fields.f32(24),
             relative,
@@ -67,12 +67,12 @@ impl Command {
     }
 }
 
-fn first_four(fields: &Fields<'_>) -> [f32; 4] {
+fn first_four(fields: &PayloadReader<'_>) -> [f32; 4] {
     [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
 }
 
 /// The result of what was done, or cannot be done now.
-pub fn accept(done: bool) -> u8 {
+pub fn accepted_or_rejected(done: bool) -> u8 {
     if done { ACCEPTED } else { TEMPORARILY_REJECTED }
 }
 

@@ -3,7 +3,7 @@
 use planner_core::Point;
 use planner_core::frames::{Geodetic, Projection};
 
-use super::estimator::Errors;
+use super::estimator::EstimateErrors;
 use super::vehicle::VehicleLimits;
 use crate::{AutopilotKind, Estimator};
 
@@ -39,7 +39,7 @@ pub struct Config {
     /// MAVLink system id, 1 to 255.
     pub system_id: u8,
     /// Which autopilot it is.
-    pub personality: AutopilotKind,
+    pub autopilot: AutopilotKind,
     /// Origin of the mission frame.
     pub world_origin: Geodetic,
     /// Origin of the autopilot's own local frame.
@@ -73,7 +73,7 @@ pub struct Config {
     /// Whether it has one more port, with a ground station's rates.
     pub ground_port: bool,
     /// Whether it passes on what is for others, from port to port.
-    pub routes: bool,
+    pub forwards: bool,
 }
 
 impl Default for Config {
@@ -83,7 +83,7 @@ impl Default for Config {
         let vehicle = VehicleLimits::default();
         Self {
             system_id: 1,
-            personality: AutopilotKind::Px4,
+            autopilot: AutopilotKind::Px4,
             world_origin: origin,
             ekf_origin: origin,
             home: None,
@@ -100,7 +100,7 @@ impl Default for Config {
             estimator_ready_s: 40.0,
             ports: 1,
             ground_port: false,
-            routes: false,
+            forwards: false,
         }
     }
 }
@@ -114,11 +114,11 @@ impl Config {
     /// Error of the estimated height for the whole flight, metres: the EKF origin is off by as
     /// much, if the receiver set it.
     pub fn height_error_m(&self) -> f32 {
-        Errors::new(self.estimator, self.personality, self.vehicle_seed()).height_m()
+        EstimateErrors::new(self.estimator, self.autopilot, self.vehicle_seed()).height_m()
     }
 }
 
-/// Why no autopilot can be made from a [`Config`].
+/// Reason why no autopilot can be made from a [`Config`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     /// A latitude, longitude or altitude out of range.

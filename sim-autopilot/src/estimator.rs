@@ -33,34 +33,34 @@ impl Estimator {
 /// Standard deviation of the velocity's error (m/s), its time constant (s), the time in which the receiver pulls the
 /// position back (s), and what the position's error never exceeds (m).
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct ErrorModel {
     sigma_mps: f32,
     tau_s: f32,
     pull_s: f32,
     most_m: f32,
 }
 
-impl Axis {
+impl ErrorModel {
     const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, pull_s: 1.0, most_m: 0.0 };
 }
 
 /// Across, up, and the most that a height is wrong for good, below and above.
-fn model(estimator: Estimator, autopilot: AutopilotKind) -> (Axis, Axis, [f32; 2]) {
+fn error_models(estimator: Estimator, autopilot: AutopilotKind) -> (ErrorModel, ErrorModel, [f32; 2]) {
     match (estimator, autopilot) {
-        (Estimator::Perfect, _) => (Axis::NONE, Axis::NONE, [0.0, 0.0]),
+        (Estimator::Perfect, _) => (ErrorModel::NONE, ErrorModel::NONE, [0.0, 0.0]),
         (Estimator::Rtk, _) => (
-            Axis { sigma_mps: 0.02, tau_s: 3.0, pull_s: 1.5, most_m: 0.1 },
-            Axis { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, most_m: 0.15 },
+            ErrorModel { sigma_mps: 0.02, tau_s: 3.0, pull_s: 1.5, most_m: 0.1 },
+            ErrorModel { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, most_m: 0.15 },
             [0.0, 0.0],
         ),
         (Estimator::Recorded, AutopilotKind::Px4) => (
-            Axis { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, most_m: 0.75 },
-            Axis { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, most_m: 0.7 },
+            ErrorModel { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, most_m: 0.75 },
+            ErrorModel { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, most_m: 0.7 },
             [-0.43, 0.34],
         ),
         (Estimator::Recorded, AutopilotKind::Ardupilot) => (
-            Axis { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, most_m: 0.11 },
-            Axis { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, most_m: 0.08 },
+            ErrorModel { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, most_m: 0.11 },
+            ErrorModel { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, most_m: 0.08 },
             [0.0, 0.0],
         ),
     }
@@ -68,9 +68,9 @@ fn model(estimator: Estimator, autopilot: AutopilotKind) -> (Axis, Axis, [f32; 2
 
 /// One vehicle's errors, estimated minus true.
 #[derive(Clone, Debug)]
-pub struct Errors {
+pub struct EstimateErrors {
     random: Gaussian,
-    axes: [Axis; 3],
+    axes: [ErrorModel; 3],
     drift: Point,
     height_m: f32,
     /// ENU metres.
@@ -81,11 +81,11 @@ pub struct Errors {
     pub rate: Point,
 }
 
-impl Errors {
+impl EstimateErrors {
     /// Errors as they may be at any time, from the first sample on.
     pub fn new(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
-        let (across, up, height_m) = model(estimator, autopilot);
+        let (across, up, height_m) = error_models(estimator, autopilot);
         // The sum of uniform numbers that a Gaussian is made of has its bound at 3.46; half of that is beyond any likely one.
         let share = (0.5 + random.sample() / 3.5).clamp(0.0, 1.0);
         let mut errors = Self {
@@ -142,7 +142,7 @@ mod tests {
     }
 
     fn flight(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Flight {
-        let mut errors = Errors::new(estimator, autopilot, seed);
+        let mut errors = EstimateErrors::new(estimator, autopilot, seed);
         let (mut positions, mut across_v, mut up_v) = (Vec::new(), 0.0, 0.0);
         for _ in 0..3000 {
             errors.advance();

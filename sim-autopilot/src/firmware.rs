@@ -4,13 +4,13 @@ use super::ardupilot::{self, Copter};
 use super::command::Command;
 use super::config::Config;
 use super::params::Params;
-use super::platform::{Order, Platform, SensorReadings};
+use super::platform::{ActuatorCommand, Platform, SensorReadings};
 use super::port::Sender;
 use super::px4::{self, Px4};
-use super::status::Status;
+use super::status::FirmwareStatus;
 use super::telemetry;
 use super::vehicle::Gains;
-use super::wire::Fields;
+use super::wire::PayloadReader;
 use crate::AutopilotKind;
 
 /// The firmware of one vehicle.
@@ -24,7 +24,7 @@ pub enum Firmware {
 
 impl Firmware {
     pub(super) fn new(config: &Config) -> Self {
-        match config.personality {
+        match config.autopilot {
             AutopilotKind::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
             AutopilotKind::Ardupilot => Self::Copter(Box::new(Copter::new(
                 config.system_id,
@@ -42,11 +42,11 @@ impl Firmware {
         }
     }
 
-    /// Sends what it says unasked when it has booted.
-    pub(super) fn boot(&mut self, platform: &mut Platform) {
+    /// Sends the boot messages.
+    pub(super) fn send_boot_messages(&mut self, platform: &mut Platform) {
         match self {
             Self::Px4(_) => platform.announce_origin(),
-            Self::Copter(copter) => copter.boot(platform),
+            Self::Copter(copter) => copter.send_boot_messages(platform),
         }
     }
 
@@ -78,14 +78,19 @@ impl Firmware {
         }
     }
 
-    pub(super) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> Order {
+    pub(super) fn update(
+        &mut self,
+        platform: &mut Platform,
+        sensors: &SensorReadings,
+        dt_s: f32,
+    ) -> ActuatorCommand {
         match self {
             Self::Px4(px4) => px4.update(platform, sensors),
             Self::Copter(copter) => copter.update(platform, sensors, dt_s),
         }
     }
 
-    pub(super) fn status(&self, platform: &Platform, sensors: &SensorReadings) -> Status {
+    pub(super) fn status(&self, platform: &Platform, sensors: &SensorReadings) -> FirmwareStatus {
         match self {
             Self::Px4(px4) => px4.status(platform, sensors),
             Self::Copter(copter) => copter.status(sensors),
@@ -99,7 +104,12 @@ impl Firmware {
         }
     }
 
-    pub(super) fn handle_set_mode(&mut self, platform: &mut Platform, from: Sender, fields: &Fields<'_>) {
+    pub(super) fn handle_set_mode(
+        &mut self,
+        platform: &mut Platform,
+        from: Sender,
+        fields: &PayloadReader<'_>,
+    ) {
         match self {
             Self::Px4(px4) => px4.handle_set_mode(platform, fields),
             Self::Copter(copter) => copter.handle_set_mode(platform, from, fields),
@@ -107,7 +117,7 @@ impl Firmware {
     }
 
     /// SET_POSITION_TARGET_LOCAL_NED (84) or _GLOBAL_INT (86).
-    pub(super) fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &Fields<'_>) {
+    pub(super) fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
         match self {
             Self::Px4(px4) => px4.handle_setpoint(platform, id, fields),
             Self::Copter(copter) => copter.handle_setpoint(platform, id, fields),
@@ -119,7 +129,7 @@ impl Firmware {
         &mut self,
         platform: &mut Platform,
         from: Sender,
-        fields: &Fields<'_>,
+        fields: &PayloadReader<'_>,
     ) {
         if let Self::Copter(_) = self {
             ardupilot::handle_stream_request(platform, from, fields);
@@ -159,7 +169,7 @@ impl Firmware {
         let params = self.params();
         let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else { return false };
         let Some(new) = old.with_integer(value) else { return false };
-        let wire = params.wire(new);
+        let wire = params.to_wire(new);
         self.set_param(name, wire, new.wire_type());
         true
     }

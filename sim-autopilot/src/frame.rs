@@ -47,7 +47,7 @@ impl Frame {
     }
 
     /// The frame of these bytes, signature left out.
-    fn read(bytes: &[u8]) -> Self {
+    fn from_bytes(bytes: &[u8]) -> Self {
         let header = header_len(bytes);
         // Sequence number, system and component stand before the id.
         let at = if header == V1_HEADER { 2 } else { 4 };
@@ -66,7 +66,7 @@ impl Frame {
 
     /// Appends it to `out` as a V2 frame of the same sender.
     pub fn write(&self, out: &mut Vec<u8>) {
-        if let Some(seed) = seed(self.message_id) {
+        if let Some(seed) = crc_seed(self.message_id) {
             let sender = (self.system, self.component, self.sequence);
             write_raw(sender, self.message_id, seed, &self.payload[..self.len], out);
         }
@@ -74,19 +74,19 @@ impl Frame {
 }
 
 /// The CRC seed of a message id; `None` where the dialect does not know the id.
-pub fn seed(message_id: u32) -> Option<u8> {
+pub fn crc_seed(message_id: u32) -> Option<u8> {
     let seed = MavMessage::extra_crc(message_id);
     (seed != 0 || message_id == SEED_ZERO).then_some(seed)
 }
 
 /// Appends a message to `out` as a V2 frame; the sender is its system, component and sequence number.
-pub fn write<M: MessageData>(sender: (u8, u8, u8), message: &M, out: &mut Vec<u8>) {
+pub fn write_message<M: MessageData>(sender: (u8, u8, u8), message: &M, out: &mut Vec<u8>) {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
     write_raw(sender, M::ID, M::EXTRA_CRC, &payload[..len], out);
 }
 
-/// As [`write`], of a payload of at most 255 bytes that the caller laid out; zeros at its end are cut, but for one.
+/// As [`write_message`], of a payload of at most 255 bytes that the caller laid out; zeros at its end are cut, but for one.
 pub fn write_raw(sender: (u8, u8, u8), message_id: u32, seed: u8, payload: &[u8], out: &mut Vec<u8>) {
     let cut = payload.iter().rev().take_while(|&&byte| byte == 0).count();
     let len = (payload.len() - cut).max(payload.len().min(1));
@@ -127,9 +127,9 @@ impl Framer {
             let noise = self.bytes.iter().position(|byte| matches!(*byte, V1_START | V2_START));
             self.drop_first(noise.unwrap_or(self.bytes.len()));
             let first_us = *self.came_us.first()?;
-            match front(&self.bytes) {
+            match parse_front(&self.bytes) {
                 ParseStatus::Whole(total) => {
-                    let frame = Frame::read(&self.bytes[..total]);
+                    let frame = Frame::from_bytes(&self.bytes[..total]);
                     self.drop_first(total);
                     return Some(frame);
                 }
@@ -145,7 +145,7 @@ impl Framer {
     }
 }
 
-fn front(bytes: &[u8]) -> ParseStatus {
+fn parse_front(bytes: &[u8]) -> ParseStatus {
     let header = header_len(bytes);
     if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !FLAG_SIGNED != 0) {
         return ParseStatus::Noise;
@@ -153,7 +153,7 @@ fn front(bytes: &[u8]) -> ParseStatus {
     if bytes.len() < header {
         return ParseStatus::Partial;
     }
-    let Some(seed) = seed(message_id(bytes)) else { return ParseStatus::Noise };
+    let Some(seed) = crc_seed(message_id(bytes)) else { return ParseStatus::Noise };
     let end = header + usize::from(bytes[1]);
     let Some(&[low, high]) = bytes.get(end..end + 2) else { return ParseStatus::Partial };
     if calculate_crc(&bytes[1..end], seed) == u16::from_le_bytes([low, high]) {

@@ -66,14 +66,14 @@ impl LocalFrame {
     }
 
     /// Keeps the linear map near the vehicle; cheap when it is.
-    pub fn follow(&mut self, enu: &Vector3<f64>) {
+    pub fn recentre(&mut self, enu: &Vector3<f64>) {
         if (enu - self.centre).norm_squared() > RENEW_MAP_M * RENEW_MAP_M {
             self.linearise(*enu);
         }
     }
 
     /// NED about the EKF origin of an ENU point.
-    pub fn ned(&self, enu: &Vector3<f64>) -> Vector3<f64> {
+    pub fn ned_from_enu(&self, enu: &Vector3<f64>) -> Vector3<f64> {
         let d = enu - self.centre;
         if d.norm_squared() < LINEAR_WITHIN_M * LINEAR_WITHIN_M {
             return self.centre_ned + self.ned_slope * d;
@@ -82,26 +82,26 @@ impl LocalFrame {
     }
 
     /// ENU of NED about the EKF origin.
-    pub fn enu(&self, ned: &Vector3<f64>) -> Vector3<f64> {
+    pub fn enu_from_ned(&self, ned: &Vector3<f64>) -> Vector3<f64> {
         let d = ned - self.centre_ned;
         if d.norm_squared() < LINEAR_WITHIN_M * LINEAR_WITHIN_M {
             return self.centre + self.enu_slope * d;
         }
-        self.enu_of_geodetic(&frames::ned_to_geodetic(self.projection, &self.ekf_origin, ned))
+        self.enu_from_geodetic(&frames::ned_to_geodetic(self.projection, &self.ekf_origin, ned))
     }
 
     /// NED velocity of an ENU velocity.
-    pub fn ned_rate(&self, enu: &Point) -> Vector3<f64> {
+    pub fn ned_velocity_from_enu(&self, enu: &Point) -> Vector3<f64> {
         self.ned_slope * enu.cast::<f64>()
     }
 
     /// ENU velocity of a NED velocity.
-    pub fn enu_rate(&self, ned: &Vector3<f64>) -> Vector3<f64> {
+    pub fn enu_velocity_from_ned(&self, ned: &Vector3<f64>) -> Vector3<f64> {
         self.enu_slope * ned
     }
 
     /// Latitude, longitude and altitude of an ENU point.
-    pub fn geodetic(&self, enu: &Vector3<f64>) -> Geodetic {
+    pub fn geodetic_from_enu(&self, enu: &Vector3<f64>) -> Geodetic {
         let d = enu - self.centre;
         if d.norm_squared() >= LINEAR_WITHIN_M * LINEAR_WITHIN_M {
             return frames::enu_to_geodetic(&self.world_origin, &enu.cast::<f32>());
@@ -115,7 +115,7 @@ impl LocalFrame {
     }
 
     /// ENU of a geodetic position.
-    pub fn enu_of_geodetic(&self, position: &Geodetic) -> Vector3<f64> {
+    pub fn enu_from_geodetic(&self, position: &Geodetic) -> Vector3<f64> {
         frames::geodetic_to_enu(&self.world_origin, position).cast::<f64>()
     }
 
@@ -164,11 +164,11 @@ mod tests {
                 Vector3::new(0.5, 0.25, 0.0),
             ] {
                 let enu = at + offset;
-                let error = (frame.ned(&enu) - frame.exact_ned(&enu)).norm();
+                let error = (frame.ned_from_enu(&enu) - frame.exact_ned(&enu)).norm();
                 assert!(error < 2e-3, "{error} m at {enu}");
-                assert!((frame.enu(&frame.ned(&enu)) - enu).norm() < 1e-6);
+                assert!((frame.enu_from_ned(&frame.ned_from_enu(&enu)) - enu).norm() < 1e-6);
                 let exact = frames::enu_to_geodetic(&WORLD, &enu.cast::<f32>());
-                let linear = frame.geodetic(&enu);
+                let linear = frame.geodetic_from_enu(&enu);
                 assert!(
                     (exact.lat_deg - linear.lat_deg).abs() < 2e-8
                         && (exact.lon_deg - linear.lon_deg).abs() < 2e-8
@@ -183,14 +183,14 @@ mod tests {
         let frame = LocalFrame::new(Projection::Px4, WORLD, EKF, Vector3::zeros());
         let ned = Vector3::new(2500.0, 1800.0, -40.0);
         let exact = frames::geodetic_to_enu(&WORLD, &frames::ned_to_geodetic(Projection::Px4, &EKF, &ned));
-        assert!((frame.enu(&ned) - exact.cast::<f64>()).norm() < 1e-6);
+        assert!((frame.enu_from_ned(&ned) - exact.cast::<f64>()).norm() < 1e-6);
     }
 
     #[test]
     fn a_moved_origin_moves_what_the_autopilot_says() {
         let mut frame = LocalFrame::new(Projection::Px4, WORLD, WORLD, Vector3::zeros());
-        assert!(frame.ned(&Vector3::zeros()).norm() < 1e-3);
+        assert!(frame.ned_from_enu(&Vector3::zeros()).norm() < 1e-3);
         frame.set_ekf_origin(EKF);
-        assert!(frame.ned(&Vector3::zeros()).norm() > 1000.0);
+        assert!(frame.ned_from_enu(&Vector3::zeros()).norm() > 1000.0);
     }
 }

@@ -1,6 +1,6 @@
 //! What the simulated autopilot does with each message that comes in.
 //!
-//! Read by field ([`Fields`]): offsets are those of the wire order. What is for another system or component, or of an id
+//! Read by field ([`PayloadReader`]): offsets are those of the wire order. What is for another system or component, or of an id
 //! not listed here, changes nothing and is not answered, as on PX4 and ArduPilot.
 
 use mavlink::dialects::ardupilotmega as dialect;
@@ -9,12 +9,12 @@ use super::command::Command;
 use super::frame::Frame;
 use super::params::Encoding;
 use super::port::{AUTOPILOT_COMPONENT, Sender};
-use super::wire::Fields;
+use super::wire::PayloadReader;
 use super::{Autopilot, telemetry};
 
 impl Autopilot {
     pub(super) fn handle_frame(&mut self, port: usize, frame: &Frame) {
-        let fields = Fields::new(frame);
+        let fields = PayloadReader::new(frame);
         let system_id = self.platform.config.system_id;
         let from = Sender { port, system: frame.system, component: frame.component };
         let for_us = |system: usize, component: usize| {
@@ -25,7 +25,8 @@ impl Autopilot {
         match frame.message_id {
             0 => firmware.handle_heartbeat(platform, from),
             4 if fields.u8(12) == 0 && fields.u8(13) == 0 => {
-                let answer = telemetry::ping(fields.u64(0), fields.u32(8), from.system, from.component);
+                let answer =
+                    telemetry::ping_payload(fields.u64(0), fields.u32(8), from.system, from.component);
                 platform.ports[port].send_raw(4, &answer);
             }
             11 if fields.u8(4) == system_id => firmware.handle_set_mode(platform, from, &fields),
@@ -39,8 +40,12 @@ impl Autopilot {
             }
             39 | 73 if for_us(32, 33) => platform.handle_mission(from, frame.message_id, &fields),
             66 if for_us(2, 3) => firmware.handle_stream_request(platform, from, &fields),
-            75 if for_us(30, 31) => firmware.handle_command(platform, from, &Command::int(&fields)),
-            76 if for_us(30, 31) => firmware.handle_command(platform, from, &Command::long(&fields)),
+            75 if for_us(30, 31) => {
+                firmware.handle_command(platform, from, &Command::from_command_int(&fields))
+            }
+            76 if for_us(30, 31) => {
+                firmware.handle_command(platform, from, &Command::from_command_long(&fields))
+            }
             84 | 86 if for_us(50, 51) => firmware.handle_setpoint(platform, frame.message_id, &fields),
             111 if fields.i64(0) == 0 => {
                 let message =
@@ -51,7 +56,7 @@ impl Autopilot {
         }
     }
 
-    fn handle_param_read(&mut self, port: usize, fields: &Fields<'_>) {
+    fn handle_param_read(&mut self, port: usize, fields: &PayloadReader<'_>) {
         let index = fields.u16(0) as i16;
         match usize::try_from(index) {
             Ok(index) => self.send_param(port, index, index as u16),
@@ -59,7 +64,7 @@ impl Autopilot {
         }
     }
 
-    fn handle_param_set(&mut self, port: usize, fields: &Fields<'_>) {
+    fn handle_param_set(&mut self, port: usize, fields: &PayloadReader<'_>) {
         let name = fields.text::<16>(6);
         if let Some(name) = name {
             self.firmware.set_param(name, fields.f32(0), fields.u8(22));
@@ -82,7 +87,7 @@ impl Autopilot {
         let Some((name, value)) = params.get(index) else { return };
         // Encoded field by field: value, count, index, name, type.
         let mut payload = [0; 25];
-        payload[..4].copy_from_slice(&params.wire(value).to_le_bytes());
+        payload[..4].copy_from_slice(&params.to_wire(value).to_le_bytes());
         payload[4..6].copy_from_slice(&(params.len() as u16).to_le_bytes());
         payload[6..8].copy_from_slice(&reported.to_le_bytes());
         payload[8..8 + name.len()].copy_from_slice(name.as_bytes());

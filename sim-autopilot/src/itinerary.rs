@@ -10,7 +10,7 @@ use planner_core::Point;
 use planner_core::frames::Geodetic;
 
 use super::command::{Command, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST};
-use super::mission::{Item, Progress};
+use super::mission::{MissionItem, MissionProgress};
 use super::platform::{Platform, SensorReadings};
 use super::vehicle::wrap_pi;
 use crate::AutopilotKind;
@@ -32,7 +32,7 @@ const MAX_YAW_ERROR_RAD: f32 = 0.21;
 
 /// Action that is flown for an item.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Leg {
+pub(super) enum MissionLeg {
     /// Wait so long, seconds.
     Wait(f32),
     /// Climb to a height.
@@ -45,9 +45,9 @@ pub(super) enum Leg {
     Return,
 }
 
-impl Leg {
-    /// Begin of the leg after this one: its point, or the place of the vehicle.
-    pub(super) fn end(leg: Option<Self>, here: &Point) -> Point {
+impl MissionLeg {
+    /// Start of the leg after this one: its point, or the place of the vehicle.
+    pub(super) fn leg_end(leg: Option<Self>, here: &Point) -> Point {
         match leg {
             Some(Self::To { at, .. }) => at,
             _ => *here,
@@ -57,7 +57,7 @@ impl Leg {
 
 /// Height, and change of it, on the straight line between two items abreast of a vehicle. Both fly along it: PX4's
 /// `PositionSmoothing` makes one velocity of all three axes towards its end, ArduCopter's `AC_WPNav` one S-curve.
-pub(super) fn on_line(from: &Point, at: &Point, here: &Point, velocity: &Point) -> (f32, f32) {
+pub(super) fn interpolate_height(from: &Point, at: &Point, here: &Point, velocity: &Point) -> (f32, f32) {
     let (way, up) = ((at - from).xy(), at.z - from.z);
     let length = way.norm();
     if length < REACHED_M {
@@ -68,22 +68,22 @@ pub(super) fn on_line(from: &Point, at: &Point, here: &Point, velocity: &Point) 
     (from.z + up * share, rate)
 }
 
-fn real(item: &Item, at: usize) -> f32 {
+fn item_f32(item: &MissionItem, at: usize) -> f32 {
     f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
 }
 
-fn whole(item: &Item, at: usize) -> i32 {
+fn item_i32(item: &MissionItem, at: usize) -> i32 {
     i32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
 }
 
-fn command_of(item: &Item) -> u16 {
+fn item_command(item: &MissionItem) -> u16 {
     u16::from_le_bytes([item[30], item[31]])
 }
 
 impl Platform {
     /// The first item that is flown.
     fn first_item(&self) -> u16 {
-        u16::from(self.config.personality == AutopilotKind::Ardupilot)
+        u16::from(self.config.autopilot == AutopilotKind::Ardupilot)
     }
 
     /// Whether a mission is stored that can be flown.
@@ -94,19 +94,19 @@ impl Platform {
     /// Whether the first thing that the mission flies is a take-off; it may wait before.
     pub(super) fn mission_takes_off(&self) -> bool {
         let flown = self.missions.items().iter().skip(usize::from(self.first_item()));
-        let mut legs = flown.map(command_of).filter(|&id| is_flown(id) && id != NAV_DELAY);
+        let mut legs = flown.map(item_command).filter(|&id| is_flown(id) && id != NAV_DELAY);
         legs.next() == Some(NAV_TAKEOFF)
     }
 
-    /// Does what is to be done at once and says what is to be flown; `None` once all is done. The next
+    /// Executes the commands that are due and returns the leg to fly; `None` once the mission is complete. The next
     /// call begins with the first item again.
-    pub(super) fn fly_mission(&mut self, sensors: &SensorReadings, landed: bool) -> Option<Leg> {
+    pub(super) fn fly_mission(&mut self, sensors: &SensorReadings, landed: bool) -> Option<MissionLeg> {
         let first = self.first_item();
         let progress = &mut self.missions.progress;
         progress.current = progress.current.max(first);
         while let Some(item) = self.missions.items().get(usize::from(self.missions.progress.current)).copied()
         {
-            match self.leg(&item) {
+            match self.leg_of_item(&item) {
                 Some(leg) => {
                     let begun = self.missions.progress.since_us.is_some();
                     self.missions.progress.since_us.get_or_insert(sensors.now_us);
@@ -114,49 +114,49 @@ impl Platform {
                         return Some(leg);
                     }
                 }
-                None => self.do_at_once(&item),
+                None => self.execute_item(&item),
             }
-            self.pass_item();
+            self.complete_item();
         }
         None
     }
 
     /// The item under way is done.
-    pub(super) fn pass_item(&mut self) {
+    pub(super) fn complete_item(&mut self) {
         let passed = self.missions.progress.current;
-        self.missions.progress = Progress::at(passed + 1);
+        self.missions.progress = MissionProgress::starting_at(passed + 1);
         let reached = passed.to_le_bytes();
         self.ports.iter_mut().for_each(|port| port.send_raw(MISSION_ITEM_REACHED, &reached));
-        self.announce(MISSION_CURRENT);
+        self.send_on_all_ports(MISSION_CURRENT);
     }
 
     /// The next flight begins with the first item.
     pub(super) fn rewind_mission(&mut self) {
-        self.missions.progress = Progress::default();
+        self.missions.progress = MissionProgress::default();
     }
 
-    fn leg(&self, item: &Item) -> Option<Leg> {
-        let heading = real(item, 12);
+    fn leg_of_item(&self, item: &MissionItem) -> Option<MissionLeg> {
+        let heading = item_f32(item, 12);
         let turn = core::f32::consts::TAU;
-        let leg = match command_of(item) {
-            NAV_DELAY => Leg::Wait(real(item, 0)),
-            NAV_TAKEOFF => Leg::TakeOff { up: self.place(item).z },
+        let leg = match item_command(item) {
+            NAV_DELAY => MissionLeg::Wait(item_f32(item, 0)),
+            NAV_TAKEOFF => MissionLeg::TakeOff { up: self.item_position(item).z },
             NAV_WAYPOINT => {
                 let radians = heading.to_radians();
-                let asked_m = real(item, 4);
-                Leg::To {
-                    at: self.place(item),
+                let asked_m = item_f32(item, 4);
+                MissionLeg::To {
+                    at: self.item_position(item),
                     heading: radians - turn * libm::roundf(radians / turn),
-                    stay_s: real(item, 0),
+                    stay_s: item_f32(item, 0),
                     reached_m: if asked_m > 0.0 { asked_m } else { REACHED_M },
                 }
             }
             NAV_LAND => {
-                let at = self.place(item);
-                let given = whole(item, 16) != 0 || whole(item, 20) != 0;
-                Leg::Land { at: given.then_some([at.x, at.y]) }
+                let at = self.item_position(item);
+                let given = item_i32(item, 16) != 0 || item_i32(item, 20) != 0;
+                MissionLeg::Land { at: given.then_some([at.x, at.y]) }
             }
-            NAV_RETURN_TO_LAUNCH => Leg::Return,
+            NAV_RETURN_TO_LAUNCH => MissionLeg::Return,
             _ => return None,
         };
         Some(leg)
@@ -164,30 +164,30 @@ impl Platform {
 
     /// Place of an item; a coordinate that the item leaves out is the vehicle's. A place that is
     /// none on earth is home.
-    fn place(&self, item: &Item) -> Point {
+    fn item_position(&self, item: &MissionItem) -> Point {
         let base = if matches!(item[34], 3 | 6 | 10 | 11) { self.home.alt_m } else { 0.0 };
-        let here = self.frame.geodetic(self.vehicle.position());
-        let degrees = |at: usize| f64::from(whole(item, at)) * 1e-7;
-        let given = whole(item, 16) != 0 || whole(item, 20) != 0;
+        let here = self.frame.geodetic_from_enu(self.vehicle.position());
+        let degrees = |at: usize| f64::from(item_i32(item, at)) * 1e-7;
+        let given = item_i32(item, 16) != 0 || item_i32(item, 20) != 0;
         let asked = Geodetic {
             lat_deg: if given { degrees(16) } else { here.lat_deg },
             lon_deg: if given { degrees(20) } else { here.lon_deg },
-            alt_m: f64::from(real(item, 24)) + base,
+            alt_m: f64::from(item_f32(item, 24)) + base,
         };
         let place = if asked.is_valid() { asked } else { self.home };
-        self.frame.enu_of_geodetic(&place).cast::<f32>()
+        self.frame.enu_from_geodetic(&place).cast::<f32>()
     }
 
-    fn do_at_once(&mut self, item: &Item) {
-        match command_of(item) {
-            DO_CHANGE_SPEED => self.missions.speed = Some(real(item, 4)),
+    fn execute_item(&mut self, item: &MissionItem) {
+        match item_command(item) {
+            DO_CHANGE_SPEED => self.missions.speed = Some(item_f32(item, 4)),
             id @ (DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST) => {
-                self.do_camera(&Command {
+                self.execute_camera_command(&Command {
                     id,
-                    param: [0, 4, 8, 12].map(|at| real(item, at)),
-                    number5: whole(item, 16) as f32,
+                    param: [0, 4, 8, 12].map(|at| item_f32(item, at)),
+                    param5: item_i32(item, 16) as f32,
                     place: [f64::NAN; 2],
-                    z: real(item, 24),
+                    z: item_f32(item, 24),
                     relative: false,
                 });
             }
@@ -195,26 +195,25 @@ impl Platform {
         }
     }
 
-    fn is_done(&mut self, leg: &Leg, sensors: &SensorReadings, landed: bool) -> bool {
+    fn is_done(&mut self, leg: &MissionLeg, sensors: &SensorReadings, landed: bool) -> bool {
         let progress = &mut self.missions.progress;
         let since =
             |us: Option<u64>| sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6;
         match *leg {
-            Leg::Wait(s) => since(progress.since_us) >= s,
-            Leg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_HEIGHT_M,
-            Leg::To { at, heading, stay_s, reached_m } => {
+            MissionLeg::Wait(s) => since(progress.since_us) >= s,
+            MissionLeg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_HEIGHT_M,
+            MissionLeg::To { at, heading, stay_s, reached_m } => {
                 let off = at - sensors.position;
                 // NaN is no heading to wait for.
                 let turned = wrap_pi(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
-                let turned =
-                    turned || heading.is_nan() || self.config.personality == AutopilotKind::Ardupilot;
+                let turned = turned || heading.is_nan() || self.config.autopilot == AutopilotKind::Ardupilot;
                 if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_HEIGHT_M && turned {
                     progress.inside_us.get_or_insert(sensors.now_us);
                 }
                 let stayed = progress.inside_us.is_some() && since(progress.inside_us) >= stay_s;
                 !landed && (stayed || progress.inside_us.is_some() && stay_s.is_nan())
             }
-            Leg::Land { .. } | Leg::Return => false,
+            MissionLeg::Land { .. } | MissionLeg::Return => false,
         }
     }
 }

@@ -10,7 +10,7 @@ pub enum AutopilotKind {
     Ardupilot,
 }
 
-/// How good an estimate is.
+/// Quality of an estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {
     /// The truth.

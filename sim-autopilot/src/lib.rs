@@ -10,7 +10,7 @@
 //! ```
 //! use sim_autopilot::{Autopilot, Config};
 //!
-//! let mut autopilot = Autopilot::new(&Config::default()).unwrap();
+//! let mut autopilot = Autopilot::new(&PowellConfig::default()).unwrap();
 //! let mut buffer = [0; 512];
 //! let mut bytes = 0;
 //! for _ in 0..250 {
@@ -63,18 +63,18 @@ pub use self::camera::Photo;
 pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
 pub use self::kinds::{AutopilotKind, Estimator};
-use self::platform::{Integral, Platform};
+use self::platform::{IntegralAction, Platform};
 use self::port::Port;
 pub use self::px4::Mode;
 use self::snapshot::Snapshot;
-pub use self::vehicle::{State, VehicleLimits, cruise_load};
+pub use self::vehicle::{TrueState, VehicleLimits, power_ratio_at_speed};
 
 /// One simulated vehicle with its autopilot.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     platform: Platform,
     firmware: Firmware,
-    due: Vec<u32>,
+    due_messages: Vec<u32>,
 }
 
 impl Autopilot {
@@ -84,14 +84,14 @@ impl Autopilot {
     /// Refuses what [`ConfigError`] names.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config::check(config)?;
-        let mut platform = Platform::new(config, Firmware::streams(config.personality));
+        let mut platform = Platform::new(config, Firmware::streams(config.autopilot));
         let mut firmware = Firmware::new(config);
-        firmware.boot(&mut platform);
-        Ok(Self { platform, firmware, due: Vec::new() })
+        firmware.send_boot_messages(&mut platform);
+        Ok(Self { platform, firmware, due_messages: Vec::new() })
     }
 
     /// The truth about the vehicle.
-    pub fn truth(&self) -> &State {
+    pub fn true_state(&self) -> &TrueState {
         self.platform.vehicle.state()
     }
 
@@ -106,8 +106,8 @@ impl Autopilot {
     }
 
     /// Whether it lands where it is, by itself.
-    pub fn lands(&self) -> bool {
-        let land = match self.platform.config.personality {
+    pub fn is_landing(&self) -> bool {
+        let land = match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Land.custom_mode(),
             AutopilotKind::Ardupilot => ardupilot::Mode::Land.number(),
         };
@@ -141,8 +141,13 @@ impl Autopilot {
         }
         let now_us = self.platform.time_us;
         while let Some(frame) = self.platform.ports[port].next_frame(now_us, &mut bytes) {
-            if self.platform.config.routes {
-                routing::forward(&mut self.platform.ports, port, self.platform.config.system_id, &frame);
+            if self.platform.config.forwards {
+                routing::forward_to_other_ports(
+                    &mut self.platform.ports,
+                    port,
+                    self.platform.config.system_id,
+                    &frame,
+                );
             }
             self.handle_frame(port, &frame);
         }
@@ -163,7 +168,7 @@ impl Autopilot {
         let config = &mut self.platform.config;
         if !config.ground_port {
             config.ground_port = true;
-            let streams = Firmware::streams(config.personality);
+            let streams = Firmware::streams(config.autopilot);
             self.platform.ports.push(Port::for_ground(config.system_id, streams));
         }
     }
@@ -191,9 +196,9 @@ impl Autopilot {
         let platform = &mut self.platform;
         platform.vehicle.set_flags(armed, landed);
         match order.integral {
-            Integral::Keep => {}
-            Integral::Clear => platform.vehicle.reset_integral(),
-            Integral::Match => platform.vehicle.match_integral(),
+            IntegralAction::Keep => {}
+            IntegralAction::Clear => platform.vehicle.reset_integral(),
+            IntegralAction::Match => platform.vehicle.match_integral_to_demand(),
         }
         if order.lift {
             let gains = self.firmware.gains();
@@ -203,7 +208,7 @@ impl Autopilot {
         }
         platform.demand = armed.then_some(order.demand);
         platform.vehicle.advance(order.lift, &platform.disturbance.wind, ground_up_m, dt_s);
-        platform.frame.follow(platform.vehicle.position());
+        platform.frame.recentre(platform.vehicle.position());
         if was_armed && !armed {
             platform.vehicle.set_flags(false, landed);
         }
@@ -218,7 +223,7 @@ impl Autopilot {
         let now_us = self.platform.time_us;
         let mut snapshot = None;
         for index in 0..self.platform.ports.len() {
-            let once = core::mem::take(&mut self.platform.ports[index].once);
+            let once = core::mem::take(&mut self.platform.ports[index].requested_once);
             if !once.is_empty() {
                 let snapshot = snapshot.get_or_insert_with(|| self.snapshot());
                 once.iter().for_each(|&id| {
@@ -227,7 +232,7 @@ impl Autopilot {
             }
             let port = &mut self.platform.ports[index];
             port.send_due_acks(now_us);
-            self.platform.missions.ask_again(now_us, index, port);
+            self.platform.missions.retry_item_request(now_us, index, port);
             if let Some(next) = port.param_cursor
                 && !port.is_congested()
             {
@@ -239,7 +244,7 @@ impl Autopilot {
             if !port.is_due(now_us) {
                 continue;
             }
-            let mut due = core::mem::take(&mut self.due);
+            let mut due = core::mem::take(&mut self.due_messages);
             port.take_due(now_us, &mut due);
             if !due.is_empty() {
                 let snapshot = snapshot.get_or_insert_with(|| self.snapshot());
@@ -247,7 +252,7 @@ impl Autopilot {
                     snapshot.send(id, &mut self.platform.ports[index]);
                 }
             }
-            self.due = due;
+            self.due_messages = due;
         }
     }
 
@@ -264,9 +269,9 @@ impl Autopilot {
         let nan = Vector3::repeat(f64::NAN);
         let target = match &platform.demand {
             Some(demand) => [
-                platform.frame.ned(&demand.position.cast::<f64>()),
-                platform.frame.ned_rate(&platform.vehicle.velocity_setpoint),
-                platform.frame.ned_rate(&platform.vehicle.acceleration_setpoint),
+                platform.frame.ned_from_enu(&demand.position.cast::<f64>()),
+                platform.frame.ned_velocity_from_enu(&platform.vehicle.velocity_setpoint),
+                platform.frame.ned_velocity_from_enu(&platform.vehicle.acceleration_setpoint),
             ],
             None => [nan, nan, Vector3::new(0.0, 0.0, 100.0)],
         };
@@ -274,7 +279,11 @@ impl Autopilot {
         let noise =
             if platform.config.position_noise_m > 0.0 { platform.config.position_noise_m } else { 0.0 };
         let gps = if noise > 0.0 {
-            (noise * platform.disturbance.sensor(), noise * platform.disturbance.sensor(), platform.gps_ok)
+            (
+                noise * platform.disturbance.sensor_noise(),
+                noise * platform.disturbance.sensor_noise(),
+                platform.gps_ok,
+            )
         } else {
             (0.0, 0.0, platform.gps_ok)
         };
@@ -285,12 +294,12 @@ impl Autopilot {
             status,
             armed,
             mission: (platform.missions.progress.current, platform.missions.items().len() as u16),
-            pictures: platform.camera.taken(),
-            ned: platform.frame.ned(&position),
-            velocity: platform.frame.ned_rate(&sensors.velocity),
-            geodetic: platform.frame.geodetic(&position),
+            pictures: platform.camera.picture_count(),
+            ned: platform.frame.ned_from_enu(&position),
+            velocity: platform.frame.ned_velocity_from_enu(&sensors.velocity),
+            geodetic: platform.frame.geodetic_from_enu(&position),
             gps,
-            home: (platform.home, platform.frame.ned(&platform.home_enu.cast::<f64>())),
+            home: (platform.home, platform.frame.ned_from_enu(&platform.home_enu.cast::<f64>())),
             ekf_origin: *platform.frame.ekf_origin(),
             specific_force: frames::swap_enu_ned(&force),
             heading: (sensors.heading, heading_rate),
@@ -315,7 +324,7 @@ impl Autopilot {
         if let Ok(mut booted) = Self::new(&fresh) {
             booted.platform.vehicle.set_battery(battery);
             booted.platform.missions = self.platform.missions.clone();
-            booted.platform.camera = self.platform.camera.rebooted();
+            booted.platform.camera = self.platform.camera.after_reboot();
             booted.firmware.keep_params(&self.firmware);
             *self = booted;
         }
@@ -332,16 +341,16 @@ impl Autopilot {
     }
 
     /// The pilot takes over: PX4's Position, ArduCopter's BRAKE, which hold where it is.
-    pub fn pilot_takes_over(&mut self) {
-        self.set_pilot_mode(match self.platform.config.personality {
+    pub fn take_over_by_pilot(&mut self) {
+        self.set_pilot_mode(match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Position.custom_mode(),
             AutopilotKind::Ardupilot => ardupilot::Mode::Brake.number(),
         });
     }
 
     /// The pilot gives it back to Offboard or Guided.
-    pub fn pilot_returns(&mut self) {
-        self.set_pilot_mode(match self.platform.config.personality {
+    pub fn return_from_pilot(&mut self) {
+        self.set_pilot_mode(match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Offboard.custom_mode(),
             AutopilotKind::Ardupilot => ardupilot::Mode::Guided.number(),
         });
@@ -354,13 +363,13 @@ impl Autopilot {
 
     /// Shifts the position estimate by ENU metres from now on.
     pub fn jump_position(&mut self, offset: &Point) {
-        self.platform.jump += offset;
+        self.platform.position_offset += offset;
     }
 
     /// Sets the errors of the estimate, estimated minus true, ENU metres and m/s, and how fast that of the height changes: a
     /// replay imposes those that were recorded.
     pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
-        (self.platform.jump, self.platform.velocity_bias) = (*position, *velocity);
+        (self.platform.position_offset, self.platform.velocity_bias) = (*position, *velocity);
         self.platform.height_error_rate = height_rate;
     }
 
@@ -385,7 +394,7 @@ impl Autopilot {
     /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights under a ceiling: its default
     /// is to climb and return. ArduCopter has no such parameter and brakes.
     pub fn land_on_stream_loss(&mut self) {
-        if self.platform.config.personality == AutopilotKind::Px4 {
+        if self.platform.config.autopilot == AutopilotKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }
     }

@@ -73,7 +73,7 @@ impl Snapshot {
             onboard_control_sensors_enabled: bits(enabled),
             onboard_control_sensors_health: bits(health),
             load: 300,
-            voltage_battery: (1000.0 * self.volts()) as u16,
+            voltage_battery: (1000.0 * self.battery_volts()) as u16,
             current_battery: -100,
             drop_rate_comm: 0,
             errors_comm: 0,
@@ -93,7 +93,7 @@ impl Snapshot {
             lon_deg: self.geodetic.lon_deg + f64::from(east) / (111_195.0 * cos),
             ..self.geodetic
         };
-        let (lat, lon, alt) = scaled(&at);
+        let (lat, lon, alt) = to_mavlink_units(&at);
         let v = self.velocity.cast::<f32>();
         let course = libm::atan2f(v.y, v.x).to_degrees();
         port.send(&dialect::GPS_RAW_INT_DATA {
@@ -117,7 +117,7 @@ impl Snapshot {
     pub(super) fn send_global_position(&self, port: &mut Port) {
         let unknown = Geodetic::default();
         let known = self.status.origin_known;
-        let (lat, lon, alt) = scaled(if known { &self.geodetic } else { &unknown });
+        let (lat, lon, alt) = to_mavlink_units(if known { &self.geodetic } else { &unknown });
         let above_home = if known { self.geodetic.alt_m - self.home.0.alt_m } else { 0.0 };
         let centimetres = |v: f64| (100.0 * v) as i16;
         port.send(&dialect::GLOBAL_POSITION_INT_DATA {
@@ -207,7 +207,7 @@ impl Snapshot {
 
     pub(super) fn send_battery(&self, port: &mut Port) {
         let mut voltages = [u16::MAX; 10];
-        voltages[0] = (1000.0 * self.volts()) as u16;
+        voltages[0] = (1000.0 * self.battery_volts()) as u16;
         port.send(&dialect::BATTERY_STATUS_DATA {
             current_consumed: (5000.0 * (1.0 - self.battery)) as i32,
             energy_consumed: -1,
@@ -256,7 +256,7 @@ impl Snapshot {
 
     pub(super) fn send_home(&self, port: &mut Port) {
         let (home, ned) = &self.home;
-        let (latitude, longitude, altitude) = scaled(home);
+        let (latitude, longitude, altitude) = to_mavlink_units(home);
         let ned = ned.cast::<f32>();
         port.send(&dialect::HOME_POSITION_DATA {
             latitude,
@@ -305,7 +305,7 @@ impl Snapshot {
 }
 
 /// Latitude and longitude in 1e-7 degrees and altitude in millimetres, rounded.
-pub(super) fn scaled(position: &Geodetic) -> (i32, i32, i32) {
+pub(super) fn to_mavlink_units(position: &Geodetic) -> (i32, i32, i32) {
     (
         libm::round(position.lat_deg * 1e7) as i32,
         libm::round(position.lon_deg * 1e7) as i32,

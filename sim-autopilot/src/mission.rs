@@ -4,7 +4,7 @@
 //! COUNT, then each item as it is asked for. Source: MAVLink guide, "Mission Protocol".
 
 use super::port::{Port, Sender};
-use super::wire::Fields;
+use super::wire::PayloadReader;
 
 const MISSION_ITEM: u32 = 39;
 const REQUEST: u32 = 40;
@@ -32,36 +32,36 @@ const RETRY_US: u64 = 250_000;
 const RETRIES: u32 = 20;
 
 /// An item as it travels: 37 bytes of MISSION_ITEM_INT, less the kind.
-pub(super) type Item = [u8; 37];
+pub(super) type MissionItem = [u8; 37];
 
 /// An upload under way.
 #[derive(Clone, Debug)]
-struct Upload {
+struct MissionUpload {
     from: Sender,
     kind: u8,
     count: u16,
-    items: Vec<Item>,
+    items: Vec<MissionItem>,
     asked_us: u64,
     retries: u32,
 }
 
 /// Progress of a mission.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Progress {
+pub(super) struct MissionProgress {
     /// The item under way; the number of items when all are done.
     pub current: u16,
     pub(super) since_us: Option<u64>,
     pub(super) inside_us: Option<u64>,
 }
 
-impl Progress {
+impl MissionProgress {
     /// Progress from an item on.
-    pub(super) fn at(current: u16) -> Self {
+    pub(super) fn starting_at(current: u16) -> Self {
         Self { current, ..Self::default() }
     }
 
-    /// The item is begun again when the mission goes on.
-    pub(super) fn interrupt(&mut self) {
+    /// The item is begun again when the mission continues.
+    pub(super) fn restart_item(&mut self) {
         (self.since_us, self.inside_us) = (None, None);
     }
 }
@@ -69,22 +69,22 @@ impl Progress {
 /// The stored mission.
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
-    stored: [Vec<Item>; MISSION_TYPES],
-    upload: Option<Upload>,
+    stored: [Vec<MissionItem>; MISSION_TYPES],
+    upload: Option<MissionUpload>,
     /// Progress of the mission.
-    pub(super) progress: Progress,
+    pub(super) progress: MissionProgress,
     /// A speed that the mission asked for, m/s, until the firmware takes it.
     pub(super) speed: Option<f32>,
 }
 
 impl Missions {
     /// The items of the mission.
-    pub(super) fn items(&self) -> &[Item] {
+    pub(super) fn items(&self) -> &[MissionItem] {
         &self.stored[0]
     }
 
     /// Asks again for an item that does not come; gives up in the end.
-    pub(super) fn ask_again(&mut self, now_us: u64, index: usize, port: &mut Port) {
+    pub(super) fn retry_item_request(&mut self, now_us: u64, index: usize, port: &mut Port) {
         let Some(upload) = &mut self.upload else { return };
         if upload.from.port != index || now_us < upload.asked_us + RETRY_US {
             return;
@@ -94,12 +94,12 @@ impl Missions {
             self.upload = None;
             return;
         }
-        upload.ask(now_us, port);
+        upload.request_item(now_us, port);
     }
 }
 
-impl Upload {
-    fn ask(&mut self, now_us: u64, port: &mut Port) {
+impl MissionUpload {
+    fn request_item(&mut self, now_us: u64, port: &mut Port) {
         self.asked_us = now_us;
         let [low, high] = (self.items.len() as u16).to_le_bytes();
         port.send_raw(REQUEST_INT, &[low, high, self.from.system, self.from.component, self.kind]);
@@ -108,13 +108,13 @@ impl Upload {
 
 impl Missions {
     /// Takes a message of the mission protocol that came by `port`, from a sender there.
-    pub(super) fn handle(
+    pub(super) fn handle_message(
         &mut self,
         now_us: u64,
         port: &mut Port,
         from: Sender,
         id: u32,
-        fields: &Fields<'_>,
+        fields: &PayloadReader<'_>,
     ) {
         let kind_at = match id {
             REQUEST_LIST | CLEAR_ALL => 2,
@@ -127,7 +127,7 @@ impl Missions {
         let kind = fields.u8(kind_at);
         let slot = usize::from(kind);
         if slot >= MISSION_TYPES && !(id == CLEAR_ALL && kind == u8::MAX) {
-            return answer(port, from, UNSUPPORTED, kind);
+            return send_mission_ack(port, from, UNSUPPORTED, kind);
         }
         match id {
             REQUEST_LIST => {
@@ -142,17 +142,23 @@ impl Missions {
                     payload[37] = kind;
                     port.send_raw(MISSION_ITEM_INT, &payload);
                 }
-                None => answer(port, from, INVALID_SEQUENCE, kind),
+                None => send_mission_ack(port, from, INVALID_SEQUENCE, kind),
             },
-            COUNT if fields.u16(0) > MAX_ITEMS => answer(port, from, NO_SPACE, kind),
+            COUNT if fields.u16(0) > MAX_ITEMS => send_mission_ack(port, from, NO_SPACE, kind),
             COUNT if fields.u16(0) == 0 => {
                 self.stored[slot].clear();
-                answer(port, from, ACCEPTED, kind);
+                send_mission_ack(port, from, ACCEPTED, kind);
             }
             COUNT => {
-                let mut upload =
-                    Upload { from, kind, count: fields.u16(0), items: Vec::new(), asked_us: 0, retries: 0 };
-                upload.ask(now_us, port);
+                let mut upload = MissionUpload {
+                    from,
+                    kind,
+                    count: fields.u16(0),
+                    items: Vec::new(),
+                    asked_us: 0,
+                    retries: 0,
+                };
+                upload.request_item(now_us, port);
                 self.upload = Some(upload);
             }
             CLEAR_ALL => {
@@ -162,26 +168,26 @@ impl Missions {
                         stored.clear();
                     }
                 }
-                answer(port, from, ACCEPTED, kind);
+                send_mission_ack(port, from, ACCEPTED, kind);
             }
-            _ => self.take_item(now_us, port, from, id, kind, fields),
+            _ => self.handle_item(now_us, port, from, id, kind, fields),
         }
     }
 
-    fn take_item(
+    fn handle_item(
         &mut self,
         now_us: u64,
         port: &mut Port,
         from: Sender,
         id: u32,
         kind: u8,
-        fields: &Fields<'_>,
+        fields: &PayloadReader<'_>,
     ) {
         let Some(upload) = &mut self.upload else {
-            return answer(port, from, INVALID_SEQUENCE, kind);
+            return send_mission_ack(port, from, INVALID_SEQUENCE, kind);
         };
-        if upload.from.id() != from.id() || upload.kind != kind {
-            return answer(port, from, INVALID_SEQUENCE, kind);
+        if upload.from.system_and_component() != from.system_and_component() || upload.kind != kind {
+            return send_mission_ack(port, from, INVALID_SEQUENCE, kind);
         }
         let sequence = usize::from(fields.u16(28));
         if sequence < upload.items.len() {
@@ -190,39 +196,39 @@ impl Missions {
         }
         let Some(item) = read_item(id, fields) else {
             self.upload = None;
-            return answer(port, from, INVALID, kind);
+            return send_mission_ack(port, from, INVALID, kind);
         };
         if sequence == upload.items.len() {
             upload.items.push(item);
             upload.retries = 0;
         }
         if upload.items.len() < usize::from(upload.count) {
-            upload.ask(now_us, port);
+            upload.request_item(now_us, port);
         } else if let Some(done) = self.upload.take() {
             self.stored[usize::from(kind)] = done.items;
             if kind == 0 {
-                self.progress = Progress::default();
+                self.progress = MissionProgress::default();
             }
-            answer(port, from, ACCEPTED, kind);
+            send_mission_ack(port, from, ACCEPTED, kind);
         }
     }
 
     fn set_current(&mut self, port: &mut Port, from: Sender, sequence: u16) {
         if usize::from(sequence) < self.stored[0].len() {
-            self.progress = Progress::at(sequence);
+            self.progress = MissionProgress::starting_at(sequence);
             port.send_raw(CURRENT, &sequence.to_le_bytes());
         } else {
-            answer(port, from, INVALID_SEQUENCE, 0);
+            send_mission_ack(port, from, INVALID_SEQUENCE, 0);
         }
     }
 }
 
-fn answer(port: &mut Port, from: Sender, result: u8, kind: u8) {
+fn send_mission_ack(port: &mut Port, from: Sender, result: u8, kind: u8) {
     port.send_raw(ACK, &[from.system, from.component, result, kind]);
 }
 
 /// An item of either kind as MISSION_ITEM_INT; `None` if a number in it is infinite, or a place is none on earth.
-fn read_item(id: u32, fields: &Fields<'_>) -> Option<Item> {
+fn read_item(id: u32, fields: &PayloadReader<'_>) -> Option<MissionItem> {
     let mut item = [0; 37];
     for (at, byte) in item.iter_mut().enumerate() {
         *byte = fields.u8(at);

@@ -46,28 +46,28 @@ impl Gaussian {
         (sum as f32 - 131_070.0) * (1.732_050_8 / 65_536.0)
     }
 
-    fn vector(&mut self) -> Point {
+    fn sample_vector(&mut self) -> Point {
         Point::new(self.sample(), self.sample(), self.sample())
     }
 }
 
 /// One Ornstein–Uhlenbeck process on three axes, stationary from the first sample on.
 #[derive(Clone, Debug)]
-struct Wander {
+struct OrnsteinUhlenbeck {
     value: Point,
-    keep: f32,
-    kick: Point,
+    decay: f32,
+    noise_gain: Point,
 }
 
-impl Wander {
+impl OrnsteinUhlenbeck {
     fn new(sigma: Point, tau_s: f32, random: &mut Gaussian) -> Self {
         let keep = libm::expf(-SLOT_S / tau_s);
         let kick = sigma * libm::sqrtf(1.0 - keep * keep);
-        Self { value: random.vector().component_mul(&sigma), keep, kick }
+        Self { value: random.sample_vector().component_mul(&sigma), decay: keep, noise_gain: kick }
     }
 
     fn advance(&mut self, random: &mut Gaussian) {
-        self.value = self.value * self.keep + random.vector().component_mul(&self.kick);
+        self.value = self.value * self.decay + random.sample_vector().component_mul(&self.noise_gain);
     }
 }
 
@@ -75,9 +75,9 @@ impl Wander {
 #[derive(Clone, Debug)]
 pub struct Disturbance {
     random: Gaussian,
-    gust: Option<Wander>,
+    gust: Option<OrnsteinUhlenbeck>,
     gust_peak_mps: f32,
-    errors: Option<[Wander; 3]>,
+    errors: Option<[OrnsteinUhlenbeck; 3]>,
     mean_wind: Point,
     /// Wind, m/s, ENU.
     pub wind: Point,
@@ -94,14 +94,14 @@ impl Disturbance {
         let mut random = Gaussian::new(seed);
         let sigma = gust_peak_mps / PEAK_FACTOR;
         let sigma = Point::new(sigma, sigma, VERTICAL_SHARE * sigma);
-        let gust = (gust_peak_mps > 0.0).then(|| Wander::new(sigma, GUST_TAU_S, &mut random));
+        let gust = (gust_peak_mps > 0.0).then(|| OrnsteinUhlenbeck::new(sigma, GUST_TAU_S, &mut random));
         let errors = (position_noise_m > 0.0).then(|| {
             let half = position_noise_m * core::f32::consts::FRAC_1_SQRT_2;
             let all = |s: f32| Point::new(s, s, s);
             [
-                Wander::new(all(half), BIAS_TAU_S, &mut random),
-                Wander::new(all(half), JITTER_TAU_S, &mut random),
-                Wander::new(all(VELOCITY_SHARE * position_noise_m), JITTER_TAU_S, &mut random),
+                OrnsteinUhlenbeck::new(all(half), BIAS_TAU_S, &mut random),
+                OrnsteinUhlenbeck::new(all(half), JITTER_TAU_S, &mut random),
+                OrnsteinUhlenbeck::new(all(VELOCITY_SHARE * position_noise_m), JITTER_TAU_S, &mut random),
             ]
         });
         let mut new = Self {
@@ -114,7 +114,7 @@ impl Disturbance {
             position_error: Point::zeros(),
             velocity_error: Point::zeros(),
         };
-        new.publish();
+        new.update_outputs();
         new
     }
 
@@ -126,12 +126,12 @@ impl Disturbance {
         for wander in self.errors.iter_mut().flatten() {
             wander.advance(&mut self.random);
         }
-        self.publish();
+        self.update_outputs();
     }
 
-    fn publish(&mut self) {
+    fn update_outputs(&mut self) {
         if let Some(gust) = &self.gust {
-            self.wind = self.mean_wind + bounded(&gust.value, self.gust_peak_mps);
+            self.wind = self.mean_wind + clamp_gust(&gust.value, self.gust_peak_mps);
         }
         if let Some([bias, jitter, velocity]) = &self.errors {
             self.position_error = bias.value + jitter.value;
@@ -140,13 +140,13 @@ impl Disturbance {
     }
 
     /// Gaussian noise of a sensor, standard deviation 1.
-    pub fn sensor(&mut self) -> f32 {
+    pub fn sensor_noise(&mut self) -> f32 {
         self.random.sample()
     }
 }
 
 /// A gust no stronger than its peak.
-fn bounded(gust: &Point, peak_mps: f32) -> Point {
+fn clamp_gust(gust: &Point, peak_mps: f32) -> Point {
     let across = libm::sqrtf(gust.x * gust.x + gust.y * gust.y);
     let share = if across > peak_mps { peak_mps / across } else { 1.0 };
     let up = VERTICAL_SHARE * peak_mps;

@@ -15,7 +15,7 @@ pub enum Encoding {
 
 /// A parameter's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
+pub enum ParamValue {
     /// INT8.
     Int8(i8),
     /// INT16.
@@ -26,9 +26,9 @@ pub enum Value {
     Real(f32),
 }
 
-use Value::{Int, Int8, Int16, Real};
+use ParamValue::{Int, Int8, Int16, Real};
 
-impl Value {
+impl ParamValue {
     /// MAV_PARAM_TYPE.
     pub fn wire_type(self) -> u8 {
         match self {
@@ -40,7 +40,7 @@ impl Value {
     }
 
     /// The whole number, of the integer types.
-    fn integer(self) -> Option<i32> {
+    fn as_i32(self) -> Option<i32> {
         match self {
             Int8(i) => Some(i32::from(i)),
             Int16(i) => Some(i32::from(i)),
@@ -51,11 +51,11 @@ impl Value {
 
     /// A value of the same integer type; `None` of a float.
     pub fn with_integer(self, integer: i32) -> Option<Self> {
-        self.integer().map(|_| self.like(integer))
+        self.as_i32().map(|_| self.from_i32_like(integer))
     }
 
     /// A value of the same type from a whole number, kept within the type's range.
-    fn like(self, integer: i32) -> Self {
+    fn from_i32_like(self, integer: i32) -> Self {
         match self {
             Int8(_) => Int8(integer.clamp(i32::from(i8::MIN), i32::from(i8::MAX)) as i8),
             Int16(_) => Int16(integer.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16),
@@ -67,9 +67,9 @@ impl Value {
 /// The parameter table of one vehicle, sorted by name.
 #[derive(Clone, Debug)]
 pub struct Params {
-    table: &'static [(&'static str, Value)],
+    table: &'static [(&'static str, ParamValue)],
     encoding: Encoding,
-    values: Vec<Value>,
+    values: Vec<ParamValue>,
 }
 
 impl Params {
@@ -78,9 +78,9 @@ impl Params {
     /// # Panics
     /// If a name is not in the table.
     pub fn new(
-        table: &'static [(&'static str, Value)],
+        table: &'static [(&'static str, ParamValue)],
         encoding: Encoding,
-        own: &[(&'static str, Value)],
+        own: &[(&'static str, ParamValue)],
     ) -> Self {
         let mut params = Self { table, encoding, values: table.iter().map(|&(_, value)| value).collect() };
         for &(name, value) in own {
@@ -95,7 +95,7 @@ impl Params {
         self.values.len()
     }
 
-    /// Whether there are none.
+    /// Whether it is empty.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -111,16 +111,16 @@ impl Params {
     }
 
     /// Name and value at an index.
-    pub fn get(&self, index: usize) -> Option<(&'static str, Value)> {
+    pub fn get(&self, index: usize) -> Option<(&'static str, ParamValue)> {
         Some((self.table.get(index)?.0, *self.values.get(index)?))
     }
 
     /// The float a value travels in.
-    pub fn wire(&self, value: Value) -> f32 {
+    pub fn to_wire(&self, value: ParamValue) -> f32 {
         match (value, self.encoding) {
             (Real(real), _) => real,
-            (value, Encoding::Bytewise) => f32::from_bits(value.integer().unwrap_or(0) as u32),
-            (value, Encoding::Cast) => value.integer().unwrap_or(0) as f32,
+            (value, Encoding::Bytewise) => f32::from_bits(value.as_i32().unwrap_or(0) as u32),
+            (value, Encoding::Cast) => value.as_i32().unwrap_or(0) as f32,
         }
     }
 
@@ -133,15 +133,15 @@ impl Params {
             (_, Encoding::Bytewise) if foreign => return false,
             (Real(_), _) if wire.is_finite() => Real(wire),
             (Real(_), _) => return false,
-            (old, Encoding::Bytewise) => old.like(wire.to_bits() as i32),
+            (old, Encoding::Bytewise) => old.from_i32_like(wire.to_bits() as i32),
             (_, Encoding::Cast) if !wire.is_finite() => return false,
-            (old, Encoding::Cast) => old.like(libm::roundf(wire) as i32),
+            (old, Encoding::Cast) => old.from_i32_like(libm::roundf(wire) as i32),
         };
         true
     }
 
     /// The value of a float; 0 where there is none of that name.
-    pub fn real(&self, name: &str) -> f32 {
+    pub fn f32_value(&self, name: &str) -> f32 {
         match self.index(name).and_then(|index| self.values.get(index)) {
             Some(&Real(value)) => value,
             _ => 0.0,
@@ -149,8 +149,8 @@ impl Params {
     }
 
     /// The value of an integer; 0 where there is none of that name.
-    pub fn int(&self, name: &str) -> i32 {
-        self.index(name).and_then(|index| self.values[index].integer()).unwrap_or(0)
+    pub fn i32_value(&self, name: &str) -> i32 {
+        self.index(name).and_then(|index| self.values[index].as_i32()).unwrap_or(0)
     }
 }
 
@@ -158,19 +158,19 @@ impl Params {
 mod tests {
     use super::*;
 
-    const TABLE: &[(&str, Value)] =
+    const TABLE: &[(&str, ParamValue)] =
         &[("BYTE", Int8(1)), ("LONG", Int(5)), ("REAL", Real(2.5)), ("WORD", Int16(300))];
 
     #[test]
     fn integers_travel_bytewise_and_the_wrong_type_is_refused() {
         let mut params = Params::new(TABLE, Encoding::Bytewise, &[]);
         assert!(params.set("LONG", f32::from_bits(7), 6));
-        assert_eq!(params.int("LONG"), 7);
-        assert_eq!(params.wire(Int(7)).to_bits(), 7);
+        assert_eq!(params.i32_value("LONG"), 7);
+        assert_eq!(params.to_wire(Int(7)).to_bits(), 7);
         assert!(
             !params.set("LONG", 4.0, 9) && !params.set("REAL", f32::NAN, 9) && !params.set("NONE", 1.0, 9)
         );
-        assert_eq!((params.int("LONG"), params.real("REAL")), (7, 2.5));
+        assert_eq!((params.i32_value("LONG"), params.f32_value("REAL")), (7, 2.5));
     }
 
     #[test]
@@ -183,9 +183,9 @@ mod tests {
             ("BYTE", -300.0, 9, -128),
         ] {
             assert!(params.set(name, wire, kind));
-            assert_eq!(params.int(name), holds, "{name}");
+            assert_eq!(params.i32_value(name), holds, "{name}");
         }
-        assert_eq!(params.wire(Int16(-12)), -12.0);
+        assert_eq!(params.to_wire(Int16(-12)), -12.0);
         assert!(!params.set("LONG", f32::NAN, 6) && !params.set("REAL", f32::INFINITY, 9));
         assert_eq!((params.get(0), params.index("WORD")), (Some(("BYTE", Int8(-128))), Some(3)));
     }

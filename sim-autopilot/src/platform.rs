@@ -3,16 +3,16 @@
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
-use super::camera::{Camera, Photo};
+use super::camera::{CameraTrigger, Photo};
 use super::command::{ACCEPTED, Command, DO_DIGICAM_CONTROL, message_id};
 use super::config::Config;
-use super::estimator::Errors;
+use super::estimator::EstimateErrors;
 use super::geodesy::LocalFrame;
 use super::mission::Missions;
 use super::noise::{self, Disturbance};
-use super::port::{Ack, Port, Sender};
+use super::port::{PendingAck, Port, Sender};
 use super::vehicle::{Demand, Vehicle};
-use super::wire::Fields;
+use super::wire::PayloadReader;
 use crate::AutopilotKind;
 
 const MESSAGE_INTERVAL: u32 = 244;
@@ -51,19 +51,19 @@ pub struct SensorReadings {
 
 /// Control of the vehicle in this step.
 #[derive(Clone, Copy, Debug)]
-pub struct Order {
+pub struct ActuatorCommand {
     /// Motors carry weight.
     pub lift: bool,
     /// Treatment of the controller's integral.
-    pub integral: Integral,
+    pub integral: IntegralAction,
     /// Demand of the mode.
     pub demand: Demand,
 }
 
 /// Treatment of the velocity controller's integral in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Integral {
-    /// The integral goes on.
+pub enum IntegralAction {
+    /// The integral continues.
     Keep,
     /// The integral is zero, as on the ground.
     Clear,
@@ -77,11 +77,11 @@ pub enum Integral {
 pub struct Platform {
     pub(super) config: Config,
     pub(super) time_us: u64,
-    slot_us: u64,
+    next_noise_us: u64,
     pub(super) vehicle: Vehicle,
     pub(super) disturbance: Disturbance,
-    pub(super) errors: Errors,
-    pub(super) jump: Point,
+    pub(super) errors: EstimateErrors,
+    pub(super) position_offset: Point,
     /// Estimated minus true velocity that a replay imposes, ENU m/s.
     pub(super) velocity_bias: Point,
     /// Change of the estimate's error in height, m/s.
@@ -95,7 +95,7 @@ pub struct Platform {
     pub(super) demand: Option<Demand>,
     pub(super) ports: Vec<Port>,
     pub(super) missions: Missions,
-    pub(super) camera: Camera,
+    pub(super) camera: CameraTrigger,
     /// When to reboot, once that was commanded.
     pub(super) reboot_us: Option<u64>,
 }
@@ -103,23 +103,23 @@ pub struct Platform {
 impl Platform {
     pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
         let mut limits = config.vehicle;
-        limits.drag_per_s *= config.personality.drag_share();
-        limits.wind_per_s *= config.personality.wind_share();
+        limits.drag_per_s *= config.autopilot.drag_share();
+        limits.wind_per_s *= config.autopilot.wind_share();
         let mut vehicle = Vehicle::new(limits, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();
-        let projection = config.personality.projection();
+        let projection = config.autopilot.projection();
         let frame = LocalFrame::new(projection, config.world_origin, config.ekf_origin, start);
         let ports = (0..config.ports.max(1)).map(|_| Port::new(config.system_id, streams));
         let ground = config.ground_port.then(|| Port::for_ground(config.system_id, streams));
-        let home = config.home.unwrap_or_else(|| frame.geodetic(&start));
+        let home = config.home.unwrap_or_else(|| frame.geodetic_from_enu(&start));
         let seed = config.vehicle_seed();
         Self {
             time_us: 0,
-            slot_us: 0,
+            next_noise_us: 0,
             disturbance: Disturbance::new(config.wind, config.gust_mps, config.position_noise_m, seed),
-            errors: Errors::new(config.estimator, config.personality, seed),
-            jump: Point::zeros(),
+            errors: EstimateErrors::new(config.estimator, config.autopilot, seed),
+            position_offset: Point::zeros(),
             velocity_bias: Point::zeros(),
             height_error_rate: 0.0,
             gps_ok: true,
@@ -130,7 +130,7 @@ impl Platform {
             demand: None,
             ports: ports.chain(ground).collect(),
             missions: Missions::default(),
-            camera: Camera::default(),
+            camera: CameraTrigger::default(),
             reboot_us: None,
             vehicle,
             frame,
@@ -141,8 +141,8 @@ impl Platform {
     /// Lets time pass, wind change, and the ground be where it is.
     pub(super) fn advance_time(&mut self, dt_s: f32, ground_up_m: f32) {
         self.time_us += libm::roundf(dt_s * 1e6) as u64;
-        if self.time_us >= self.slot_us {
-            self.slot_us += (noise::SLOT_S * 1e6) as u64;
+        if self.time_us >= self.next_noise_us {
+            self.next_noise_us += (noise::SLOT_S * 1e6) as u64;
             self.disturbance.advance();
             self.errors.advance();
         }
@@ -170,14 +170,14 @@ impl Platform {
 
     /// Estimated minus true position, ENU metres.
     pub(super) fn position_error(&self) -> Point {
-        self.disturbance.position_error + self.errors.position + self.jump
+        self.disturbance.position_error + self.errors.position + self.position_offset
     }
 
     pub(super) fn set_fixed_home(&mut self, home: Geodetic) {
         self.home = home;
         self.home_enu = frames::geodetic_to_enu(&self.config.world_origin, &home);
         self.home_fixed = true;
-        self.announce(HOME_POSITION);
+        self.send_on_all_ports(HOME_POSITION);
     }
 
     /// Home where it stands, as both firmwares set it on arming.
@@ -187,28 +187,28 @@ impl Platform {
         }
         let position = self.sensors().position;
         self.home_enu = position;
-        self.home = self.frame.geodetic(&position.cast::<f64>());
-        self.announce(HOME_POSITION);
+        self.home = self.frame.geodetic_from_enu(&position.cast::<f64>());
+        self.send_on_all_ports(HOME_POSITION);
     }
 
     /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has looked.
-    pub(super) fn control_camera(&mut self, from: Sender, command: &Command) {
-        self.do_camera(command);
+    pub(super) fn handle_camera_command(&mut self, from: Sender, command: &Command) {
+        self.execute_camera_command(command);
         let soon_us = self.time_us + ANSWER_DELAY_US;
-        let answer_us = match self.config.personality {
-            AutopilotKind::Px4 => self.camera.looks_us().max(soon_us),
+        let answer_us = match self.config.autopilot {
+            AutopilotKind::Px4 => self.camera.next_poll_us().max(soon_us),
             AutopilotKind::Ardupilot => soon_us,
         };
-        let ack = Ack { command: command.id, result: ACCEPTED, to: from.id() };
-        self.ports[from.port].later.push((answer_us, ack));
+        let ack = PendingAck { command: command.id, result: ACCEPTED, to: from.system_and_component() };
+        self.ports[from.port].pending_acks.push((answer_us, ack));
     }
 
-    /// As `control_camera`, without an answer.
-    pub(super) fn do_camera(&mut self, command: &Command) {
+    /// As `handle_camera_command`, without an answer.
+    pub(super) fn execute_camera_command(&mut self, command: &Command) {
         if command.id == DO_DIGICAM_CONTROL {
-            self.camera.control(command);
+            self.camera.handle_digicam_control(command);
         } else {
-            self.camera.set_distance(command);
+            self.camera.handle_trigger_distance(command);
         }
     }
 
@@ -217,48 +217,48 @@ impl Platform {
         let state = self.vehicle.state();
         let truth = Photo { time_us: self.time_us, position: state.position, heading_rad: state.heading_rad };
         let estimate = self.gps_ok.then(|| state.position + self.position_error());
-        if let Some(message) = self.camera.update(self.config.personality, truth, estimate) {
-            self.announce(message);
+        if let Some(message) = self.camera.update(self.config.autopilot, truth, estimate) {
+            self.send_on_all_ports(message);
         }
     }
 
     /// Reboots when the answer is out.
-    pub(super) fn reboot_soon(&mut self) {
+    pub(super) fn schedule_reboot(&mut self) {
         self.reboot_us = Some(self.time_us + REBOOT_DELAY_US);
     }
 
     pub(super) fn announce_origin(&mut self) {
-        self.announce(GPS_GLOBAL_ORIGIN);
+        self.send_on_all_ports(GPS_GLOBAL_ORIGIN);
     }
 
     /// Sends one message through every port in the next step.
-    pub(super) fn announce(&mut self, id: u32) {
+    pub(super) fn send_on_all_ports(&mut self, id: u32) {
         for port in &mut self.ports {
-            if !port.once.contains(&id) {
-                port.once.push(id);
+            if !port.requested_once.contains(&id) {
+                port.requested_once.push(id);
             }
         }
     }
 
     /// Sends STATUSTEXT through every port.
-    pub(super) fn say(&mut self, severity: u8, text: &str) {
+    pub(super) fn send_text(&mut self, severity: u8, text: &str) {
         self.ports.iter_mut().for_each(|port| port.send_text(severity, text));
     }
 
     /// Takes a message of the mission protocol.
-    pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &Fields<'_>) {
-        self.missions.handle(self.time_us, &mut self.ports[from.port], from, id, fields);
+    pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &PayloadReader<'_>) {
+        self.missions.handle_message(self.time_us, &mut self.ports[from.port], from, id, fields);
     }
 
     pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {
-        let ack = Ack { command, result, to: from.id() };
-        self.ports[from.port].later.push((self.time_us + ANSWER_DELAY_US, ack));
+        let ack = PendingAck { command, result, to: from.system_and_component() };
+        self.ports[from.port].pending_acks.push((self.time_us + ANSWER_DELAY_US, ack));
     }
 
     /// Target of DO_REPOSITION, ENU with NaN for coordinates that it leaves out; `None` for no
     /// place on earth.
     pub(super) fn reposition_target(&self, command: &Command) -> Option<Point> {
-        let here = self.frame.geodetic(self.vehicle.position());
+        let here = self.frame.geodetic_from_enu(self.vehicle.position());
         let [lat_deg, lon_deg] = command.place;
         let base = if command.relative { self.home.alt_m } else { 0.0 };
         let across = lat_deg.is_finite() && lon_deg.is_finite();
@@ -270,16 +270,16 @@ impl Platform {
         if !asked.is_valid() {
             return None;
         }
-        let enu = self.frame.enu_of_geodetic(&asked).cast::<f32>();
+        let enu = self.frame.enu_from_geodetic(&asked).cast::<f32>();
         let (east, north) = if across { (enu.x, enu.y) } else { (f32::NAN, f32::NAN) };
         Some(Point::new(east, north, if command.z.is_finite() { enu.z } else { f32::NAN }))
     }
 
     /// Executes DO_SET_HOME; false where its position is not valid.
-    pub(super) fn set_home(&mut self, command: &Command) -> bool {
+    pub(super) fn handle_set_home(&mut self, command: &Command) -> bool {
         let [lat_deg, lon_deg] = command.place;
         let home = if command.param[0] == 1.0 {
-            self.frame.geodetic(self.vehicle.position())
+            self.frame.geodetic_from_enu(self.vehicle.position())
         } else {
             Geodetic { lat_deg, lon_deg, alt_m: f64::from(command.z) }
         };

@@ -41,7 +41,7 @@ pub struct Stream {
 
 /// An answer that goes out one step later.
 #[derive(Clone, Copy, Debug)]
-pub struct Ack {
+pub struct PendingAck {
     /// MAV_CMD.
     pub command: u16,
     /// MAV_RESULT.
@@ -59,7 +59,7 @@ pub(crate) struct Sender {
 }
 
 impl Sender {
-    pub(crate) fn id(self) -> (u8, u8) {
+    pub(crate) fn system_and_component(self) -> (u8, u8) {
         (self.system, self.component)
     }
 }
@@ -78,9 +78,9 @@ pub struct Port {
     pub streams: Vec<Stream>,
     next_due_us: u64,
     /// Acks, and when each is due.
-    pub later: Vec<(u64, Ack)>,
+    pub pending_acks: Vec<(u64, PendingAck)>,
     /// Messages to be sent once, in the next step.
-    pub once: Vec<u32>,
+    pub requested_once: Vec<u32>,
     /// The next parameter of a list being sent.
     pub param_cursor: Option<usize>,
     /// PING messages sent.
@@ -111,8 +111,8 @@ impl Port {
             dropped: 0,
             streams,
             next_due_us: 0,
-            later: Vec::new(),
-            once: Vec::new(),
+            pending_acks: Vec::new(),
+            requested_once: Vec::new(),
             param_cursor: None,
             pings: 0,
             heard: Vec::new(),
@@ -131,14 +131,14 @@ impl Port {
         self.framer.next(now_us, input)
     }
 
-    fn sender(&mut self) -> (u8, u8, u8) {
+    fn next_sender(&mut self) -> (u8, u8, u8) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         (self.system_id, AUTOPILOT_COMPONENT, sequence)
     }
 
     /// Whether there is room for one more frame; what there is none for counts as dropped.
-    fn has_room(&mut self) -> bool {
+    fn reserve_frame(&mut self) -> bool {
         if self.sent == self.queue.len() {
             self.queue.clear();
             self.sent = 0;
@@ -149,50 +149,50 @@ impl Port {
     }
 
     /// Remembers that a component is reached here.
-    pub fn learn(&mut self, sender: (u8, u8)) {
+    pub fn learn_route(&mut self, sender: (u8, u8)) {
         if !self.heard.contains(&sender) && self.heard.len() < MAX_ROUTES {
             self.heard.push(sender);
         }
     }
 
-    /// Whether somebody whom a message is for was heard here; 0 is all.
-    pub fn leads_to(&self, (system, component): (u8, u8)) -> bool {
+    /// Whether the addressee of a message was heard on this port; 0 addresses all.
+    pub fn is_route_to(&self, (system, component): (u8, u8)) -> bool {
         let meant = |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
         self.heard.iter().any(meant)
     }
 
-    /// Queues a frame of somebody else's as it came.
-    pub fn pass(&mut self, frame: &Frame) {
-        if self.has_room() {
+    /// Queues another sender's frame unchanged.
+    pub fn forward_frame(&mut self, frame: &Frame) {
+        if self.reserve_frame() {
             frame.write(&mut self.queue);
         }
     }
 
     /// Queues a message.
     pub fn send<M: MessageData>(&mut self, message: &M) {
-        if self.has_room() {
-            let sender = self.sender();
-            frame::write(sender, message, &mut self.queue);
+        if self.reserve_frame() {
+            let sender = self.next_sender();
+            frame::write_message(sender, message, &mut self.queue);
         }
     }
 
     /// Queues a message whose payload the caller laid out, for what the crate's types cannot hold.
     pub fn send_raw(&mut self, id: u32, payload: &[u8]) {
-        if let Some(seed) = frame::seed(id) {
+        if let Some(seed) = frame::crc_seed(id) {
             self.send_seeded(id, seed, payload);
         }
     }
 
     /// Sends a message that the crate does not know, with its CRC seed.
     pub fn send_seeded(&mut self, id: u32, seed: u8, payload: &[u8]) {
-        if self.has_room() {
-            let sender = self.sender();
+        if self.reserve_frame() {
+            let sender = self.next_sender();
             frame::write_raw(sender, id, seed, payload, &mut self.queue);
         }
     }
 
     /// Queues a COMMAND_ACK; the command may be one the crate does not know.
-    pub fn send_ack(&mut self, ack: Ack) {
+    pub fn send_ack(&mut self, ack: PendingAck) {
         let [low, high] = ack.command.to_le_bytes();
         self.send_raw(77, &[low, high, ack.result, 0, 0, 0, 0, 0, ack.to.0, ack.to.1]);
     }
@@ -208,7 +208,7 @@ impl Port {
 
     /// Queues the acks that are due.
     pub fn send_due_acks(&mut self, now_us: u64) {
-        let mut waiting = core::mem::take(&mut self.later);
+        let mut waiting = core::mem::take(&mut self.pending_acks);
         waiting.retain(|&(due_us, ack)| {
             let due = now_us >= due_us;
             if due {
@@ -216,7 +216,7 @@ impl Port {
             }
             !due
         });
-        self.later = waiting;
+        self.pending_acks = waiting;
     }
 
     /// Whether telemetry would be dropped now.

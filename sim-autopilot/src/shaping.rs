@@ -1,7 +1,7 @@
 //! How autopilots approach what is asked for within limits on acceleration and jerk.
 
 /// Rate at which an error is closed: proportional near zero, and no faster than can be stopped (`sqrt_controller`).
-pub fn approach(error: f32, gain: f32, limit: f32) -> f32 {
+pub fn approach_rate(error: f32, gain: f32, limit: f32) -> f32 {
     let linear = limit / (gain * gain);
     if error.abs() <= linear {
         return error * gain;
@@ -14,17 +14,17 @@ const RAMP_END_RATE_PER_S: f32 = 6.0;
 
 /// A rate that changes within limits, as PX4's `VelocitySmoothing` changes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ramp {
+pub struct JerkLimitedRate {
     /// m/s.
     pub rate: f32,
     /// Rate of change of the ramp's value, m/s².
     pub change: f32,
 }
 
-impl Ramp {
+impl JerkLimitedRate {
     /// One step of `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
-        let wanted = approach(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
+        let wanted = approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
         self.change += (wanted - self.change).clamp(-jerk * dt, jerk * dt);
         self.rate += self.change * dt;
     }
@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn a_ramp_arrives_within_its_limits_and_hardly_overshoots() {
-        let mut ramp = Ramp { rate: 0.0, change: 0.0 };
+        let mut ramp = JerkLimitedRate { rate: 0.0, change: 0.0 };
         let (mut most, mut fastest, mut arrived_s) = (0.0_f32, 0.0_f32, 0.0);
         for step in 0..2000_u16 {
             let before = ramp.change;

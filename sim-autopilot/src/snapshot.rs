@@ -5,7 +5,7 @@ use core::cell::OnceCell;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
-use super::status::Status;
+use super::status::FirmwareStatus;
 use crate::AutopilotKind;
 
 /// Everything telemetry is made of, at one instant.
@@ -18,7 +18,7 @@ pub struct Snapshot {
     /// System id.
     pub system_id: u8,
     /// The firmware's state.
-    pub status: Status,
+    pub status: FirmwareStatus,
     /// Armed.
     pub armed: bool,
     /// The item of the mission under way, and how many there are.
@@ -63,7 +63,7 @@ pub struct Attitude {
 }
 
 /// The attitude whose thrust axis lies along a specific force (NED, pointing up) at a heading.
-pub fn attitude(force: &Vector3<f32>, heading: f32) -> Attitude {
+pub fn attitude_from_force(force: &Vector3<f32>, heading: f32) -> Attitude {
     let norm = force.norm().max(0.1);
     let (sin, cos) = libm::sincosf(heading);
     // The body's z axis, down, in a frame turned by the heading: (cos φ sin θ, −sin φ, cos φ cos θ).
@@ -85,18 +85,18 @@ pub fn attitude(force: &Vector3<f32>, heading: f32) -> Attitude {
 
 impl Snapshot {
     pub(super) fn attitude(&self) -> &Attitude {
-        self.attitude.get_or_init(|| attitude(&self.specific_force, self.heading.0))
+        self.attitude.get_or_init(|| attitude_from_force(&self.specific_force, self.heading.0))
     }
 
     pub(super) fn is_px4(&self) -> bool {
-        self.status.personality == AutopilotKind::Px4
+        self.status.autopilot == AutopilotKind::Px4
     }
 
     pub(super) fn boot_ms(&self) -> u32 {
         (self.time_us / 1000) as u32
     }
 
-    pub(super) fn volts(&self) -> f32 {
+    pub(super) fn battery_volts(&self) -> f32 {
         // Four cells between BAT1_V_EMPTY and BAT1_V_CHARGED.
         4.0 * (3.6 + 0.45 * self.battery)
     }

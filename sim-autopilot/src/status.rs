@@ -4,9 +4,9 @@ use crate::AutopilotKind;
 
 /// State of the firmware that telemetry reports.
 #[derive(Clone, Copy, Debug)]
-pub struct Status {
+pub struct FirmwareStatus {
     /// Which firmware it is.
-    pub personality: AutopilotKind,
+    pub autopilot: AutopilotKind,
     /// `custom_mode` of HEARTBEAT.
     pub custom_mode: u32,
     /// The mode that was asked for, whatever a failsafe flies.

@@ -6,7 +6,7 @@
 use mavlink::dialects::ardupilotmega as dialect;
 
 use super::command::{AUTOPILOT_VERSION, PROTOCOL_VERSION};
-use super::messages::{self, scaled};
+use super::messages::{self, to_mavlink_units};
 use super::port::Port;
 use super::snapshot::Snapshot;
 
@@ -68,7 +68,7 @@ impl Snapshot {
             4 => {
                 port.pings = port.pings.wrapping_add(1);
                 let seq = port.pings;
-                port.send_raw(4, &ping(self.time_us, seq, 0, 0));
+                port.send_raw(4, &ping_payload(self.time_us, seq, 0, 0));
             }
             8 | 380 | 410 | 411 | 441 => messages::send_recorded(id, port),
             42 => {
@@ -102,7 +102,7 @@ impl Snapshot {
         true
     }
 
-    /// How it is turned.
+    /// Sends attitude messages.
     fn send_attitude(&self, id: u32, port: &mut Port) -> bool {
         match id {
             30 => {
@@ -165,7 +165,7 @@ impl Snapshot {
             // Not before there is an origin.
             49 if !self.status.origin_known => {}
             49 => {
-                let (latitude, longitude, altitude) = scaled(&self.ekf_origin);
+                let (latitude, longitude, altitude) = to_mavlink_units(&self.ekf_origin);
                 port.send(&dialect::GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude });
             }
             74 => {
@@ -241,7 +241,7 @@ impl Snapshot {
 }
 
 /// The payload of PING, whose type the crate calls deprecated.
-pub fn ping(time_us: u64, seq: u32, system: u8, component: u8) -> [u8; 14] {
+pub fn ping_payload(time_us: u64, seq: u32, system: u8, component: u8) -> [u8; 14] {
     let mut payload = [0; 14];
     payload[..8].copy_from_slice(&time_us.to_le_bytes());
     payload[8..12].copy_from_slice(&seq.to_le_bytes());

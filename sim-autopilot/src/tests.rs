@@ -94,7 +94,7 @@ impl Bench {
     fn until(&mut self, limit: f64, mut done: impl FnMut(&Autopilot) -> bool) -> f64 {
         let start = self.now();
         while !done(&self.autopilot) {
-            assert!(self.now() - start < limit, "not within {limit} s: {:?}", self.autopilot.truth());
+            assert!(self.now() - start < limit, "not within {limit} s: {:?}", self.autopilot.true_state());
             self.run(0.004);
         }
         self.now() - start
@@ -160,7 +160,7 @@ impl Bench {
         bench.run(1.0);
         assert_eq!(bench.set_mode(6.0, 0.0), [0, 0]);
         assert_eq!(bench.arm(), [0]);
-        bench.until(20.0, |a| a.truth().position.z > up - 0.3);
+        bench.until(20.0, |a| a.true_state().position.z > up - 0.3);
         bench.run(4.0);
         bench
     }
@@ -184,17 +184,17 @@ fn it_arms_goes_offboard_follows_setpoints_and_lands() {
     assert_eq!(bench.heartbeat(), (OFFBOARD, 145, 4));
     bench.stream(20.0, setpoint(POSITION, 1, [10.0, 4.0, -5.0], [0.0; 3], 0.0));
     bench.run(12.0);
-    let at = bench.autopilot.truth().position;
+    let at = bench.autopilot.true_state().position;
     // 10 m north and 4 m east of the EKF origin, which is the mission origin here; ground is 0 and rest 0.3.
     assert!((at - Point::new(4.0, 10.0, 5.0)).norm() < 0.2, "at {at}");
     assert_eq!(bench.set_mode(4.0, 6.0), [0, 0]);
     bench.run(1.5);
     assert_eq!(bench.landed_state(), 4);
     assert_eq!(bench.heartbeat(), (LAND, 157, 4));
-    bench.until(30.0, |a| a.truth().landed);
-    let to_disarm = bench.until(5.0, |a| !a.truth().armed);
+    bench.until(30.0, |a| a.true_state().landed);
+    let to_disarm = bench.until(5.0, |a| !a.true_state().armed);
     assert!((2.2..=2.4).contains(&to_disarm), "disarmed {to_disarm} s after ON_GROUND");
-    assert!((bench.autopilot.truth().position - Point::new(4.0, 10.0, 0.3)).norm() < 0.3);
+    assert!((bench.autopilot.true_state().position - Point::new(4.0, 10.0, 0.3)).norm() < 0.3);
 }
 
 #[test]
@@ -230,7 +230,7 @@ fn position_setpoints_alone_lift_it_off_in_px4s_time() {
     bench.set_mode(6.0, 0.0);
     bench.arm();
     // 6.3 s to within 5 %.
-    let took = bench.until(10.0, |a| a.truth().position.z - 0.3 > 4.6);
+    let took = bench.until(10.0, |a| a.true_state().position.z - 0.3 > 4.6);
     assert!((5.0..7.5).contains(&took), "{took} s");
 }
 
@@ -318,21 +318,21 @@ fn velocity_position_with_feed_forward_and_yaw_masks_fly() {
     let mut bench = Bench::hovering(5.0);
     bench.stream(20.0, setpoint(VELOCITY, 1, [0.0; 3], [0.0, 2.0, 0.0], 0.0));
     bench.run(4.0);
-    let v = bench.autopilot.truth().velocity;
+    let v = bench.autopilot.true_state().velocity;
     assert!((1.6..1.95).contains(&v.x) && v.y.abs() < 0.1, "east 2 m/s asked, {v} flown");
     // Position and velocity together, mask 0xDC0.
     bench.stream(20.0, setpoint(0xDC0, 1, [3.0, 1.0, -6.0], [0.0; 3], 0.0));
     bench.run(12.0);
-    let at = bench.autopilot.truth().position;
+    let at = bench.autopilot.true_state().position;
     assert!((at - Point::new(1.0, 3.0, 6.0)).norm() < 0.3, "at {at}");
     // Position and yaw, mask 0x9F8.
     bench.stream(20.0, setpoint(0x9F8, 1, [3.0, 1.0, -6.0], [0.0; 3], 1.57));
     bench.run(5.0);
-    assert!((bench.autopilot.truth().heading_rad - 1.57).abs() < 0.02);
+    assert!((bench.autopilot.true_state().heading_rad - 1.57).abs() < 0.02);
     // Velocity ahead of the body, mask 0x5C7 with a yaw rate of zero: ahead is east now.
     bench.stream(20.0, setpoint(0x5C7, 8, [0.0; 3], [1.5, 0.0, 0.0], 0.0));
     bench.run(4.0);
-    let v = bench.autopilot.truth().velocity;
+    let v = bench.autopilot.true_state().velocity;
     assert!(v.x > 1.1 && v.y.abs() < 0.15, "ahead asked, {v} flown");
 }
 
@@ -351,9 +351,9 @@ fn global_setpoints_fly_to_the_same_place() {
         bench.run(0.05);
     }
     assert!(
-        (bench.autopilot.truth().position - goal).norm() < 0.3,
+        (bench.autopilot.true_state().position - goal).norm() < 0.3,
         "at {}",
-        bench.autopilot.truth().position
+        bench.autopilot.true_state().position
     );
 }
 
@@ -366,12 +366,16 @@ fn takeoff_is_to_an_altitude_above_the_sea_and_ends_in_hold() {
     bench.run(1.0);
     assert_eq!(bench.heartbeat().0, TAKEOFF);
     assert_eq!(bench.arm(), [0]);
-    bench.until(10.0, |a| a.truth().position.z > 2.0);
+    bench.until(10.0, |a| a.true_state().position.z > 2.0);
     bench.run(0.3);
     assert_eq!(bench.landed_state(), 3);
     bench.run(15.0);
     assert_eq!(bench.heartbeat(), (HOLD, 157, 4));
-    assert!((bench.autopilot.truth().position.z - 8.0).abs() < 0.1, "{}", bench.autopilot.truth().position);
+    assert!(
+        (bench.autopilot.true_state().position.z - 8.0).abs() < 0.1,
+        "{}",
+        bench.autopilot.true_state().position
+    );
 }
 
 #[test]
@@ -379,7 +383,7 @@ fn armed_and_left_alone_it_disarms_after_ten_seconds() {
     let mut bench = Bench::new();
     bench.run(0.5);
     assert_eq!(bench.arm(), [0]);
-    let took = bench.until(12.0, |a| !a.truth().armed);
+    let took = bench.until(12.0, |a| !a.true_state().armed);
     assert!((9.9..=11.2).contains(&took), "{took} s");
 }
 
@@ -387,17 +391,17 @@ fn armed_and_left_alone_it_disarms_after_ten_seconds() {
 fn disarming_in_the_air_is_refused_unless_forced() {
     let mut bench = Bench::hovering(5.0);
     assert_eq!(bench.command(400, [0.0; 7]), [1]);
-    assert!(bench.autopilot.truth().armed);
+    assert!(bench.autopilot.true_state().armed);
     assert_eq!(bench.command(400, [0.0, 21_196.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [0]);
     bench.run(2.0);
-    assert!(!bench.autopilot.truth().armed && bench.autopilot.truth().position.z < 0.31, "it fell");
+    assert!(!bench.autopilot.true_state().armed && bench.autopilot.true_state().position.z < 0.31, "it fell");
 }
 
 #[test]
 fn after_landing_and_disarming_it_shows_offboard_again() {
     let mut bench = Bench::hovering(3.0);
     bench.set_mode(4.0, 6.0);
-    bench.until(30.0, |a| !a.truth().armed);
+    bench.until(30.0, |a| !a.true_state().armed);
     bench.stream = None;
     bench.run(3.0);
     assert_eq!(bench.heartbeat(), (OFFBOARD, 17, 0));
@@ -413,10 +417,10 @@ fn return_climbs_comes_home_and_lands() {
     assert_eq!(bench.set_mode(4.0, 5.0), [0, 0]);
     let mut highest = 0.0_f32;
     bench.until(90.0, |a| {
-        highest = highest.max(a.truth().position.z);
-        !a.truth().armed
+        highest = highest.max(a.true_state().position.z);
+        !a.true_state().armed
     });
-    let at = bench.autopilot.truth().position;
+    let at = bench.autopilot.true_state().position;
     assert!(at.xy().norm() < 0.7 && highest > 11.5, "landed at {at}, {highest} m at most");
 }
 
@@ -426,7 +430,7 @@ fn mpc_xy_vel_max_acts() {
     bench.set_param("MPC_XY_VEL_MAX", 2.0, 9);
     bench.stream(20.0, setpoint(POSITION, 1, [40.0, 0.0, -5.0], [0.0; 3], 0.0));
     bench.run(8.0);
-    let speed = bench.autopilot.truth().velocity.norm();
+    let speed = bench.autopilot.true_state().velocity.norm();
     assert!((1.6..2.2).contains(&speed), "{speed} m/s");
 }
 
@@ -436,7 +440,7 @@ fn the_pilots_switch_wins_and_needs_no_stream() {
     bench.autopilot.set_pilot_mode(Mode::Position);
     bench.run(3.0);
     assert_eq!(bench.heartbeat(), (0x0003_0000, 209, 4));
-    assert!((bench.autopilot.truth().position.z - 5.0).abs() < 0.2);
+    assert!((bench.autopilot.true_state().position.z - 5.0).abs() < 0.2);
 }
 
 #[test]
@@ -455,7 +459,7 @@ fn the_same_seed_flies_the_same_flight_bit_for_bit() {
         bench.set_mode(6.0, 0.0);
         bench.arm();
         bench.run(15.0);
-        (*bench.autopilot.truth(), bench.received.len())
+        (*bench.autopilot.true_state(), bench.received.len())
     };
     let once = fly(1);
     assert_eq!(once, fly(1));
@@ -469,7 +473,7 @@ fn without_gps_it_lands_where_it_is() {
     bench.autopilot.set_gps_ok(false);
     bench.run(1.5);
     assert_eq!(bench.heartbeat(), (LAND, 157, 5));
-    bench.until(30.0, |a| !a.truth().armed);
+    bench.until(30.0, |a| !a.true_state().armed);
     assert_eq!(bench.arm(), [1]);
 }
 
@@ -487,5 +491,9 @@ fn a_jump_of_the_estimate_moves_the_vehicle_the_other_way() {
     let mut bench = Bench::hovering(5.0);
     bench.autopilot.jump_position(&Point::new(3.0, 0.0, 0.0));
     bench.run(12.0);
-    assert!((bench.autopilot.truth().position.x + 3.0).abs() < 0.2, "{}", bench.autopilot.truth().position);
+    assert!(
+        (bench.autopilot.true_state().position.x + 3.0).abs() < 0.2,
+        "{}",
+        bench.autopilot.true_state().position
+    );
 }

@@ -69,7 +69,7 @@ impl Default for VehicleLimits {
 
 /// True position and motion of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
+pub struct TrueState {
     /// Centre of the body, ENU metres.
     pub position: Point,
     /// ENU, m/s.
@@ -139,7 +139,7 @@ pub struct Gains {
 #[derive(Clone, Debug)]
 pub struct Vehicle {
     limits: VehicleLimits,
-    state: State,
+    state: TrueState,
     position: Vector3<f64>,
     thrust: Point,
     integral: Point,
@@ -152,7 +152,7 @@ pub struct Vehicle {
 impl Vehicle {
     /// A vehicle at rest.
     pub fn new(limits: VehicleLimits, position: Point) -> Self {
-        let state = State {
+        let state = TrueState {
             position,
             velocity: Point::zeros(),
             acceleration: Point::zeros(),
@@ -175,7 +175,7 @@ impl Vehicle {
     }
 
     /// The truth.
-    pub fn state(&self) -> &State {
+    pub fn state(&self) -> &TrueState {
         &self.state
     }
 
@@ -194,7 +194,7 @@ impl Vehicle {
         Point::new(self.thrust.x, self.thrust.y, self.thrust.z + GRAVITY)
     }
 
-    /// Takes the decision of the autopilot's state machine.
+    /// Sets the armed and landed flags that the autopilot's state machine decided.
     pub fn set_flags(&mut self, armed: bool, landed: bool) {
         self.state.armed = armed;
         self.state.landed = landed;
@@ -216,7 +216,7 @@ impl Vehicle {
     }
 
     /// Sets the integral to what was asked of the airframe beyond what it does.
-    pub fn match_integral(&mut self) {
+    pub fn match_integral_to_demand(&mut self) {
         self.integral = self.acceleration_setpoint - self.state.acceleration;
     }
 
@@ -274,10 +274,10 @@ impl Vehicle {
             }
         }
         self.acceleration_setpoint = asked;
-        self.turn(demand, gains, dt);
+        self.update_heading(demand, gains, dt);
     }
 
-    fn turn(&mut self, demand: &Demand, gains: &Gains, dt: f32) {
+    fn update_heading(&mut self, demand: &Demand, gains: &Gains, dt: f32) {
         let max = gains.heading_rate_max;
         let rate = if demand.heading.is_nan() {
             if demand.heading_rate.is_nan() { 0.0 } else { demand.heading_rate.clamp(-max, max) }
@@ -321,13 +321,16 @@ impl Vehicle {
         }
         self.state.acceleration = acceleration;
         self.state.position = self.position.cast::<f32>();
-        self.drain(lift, dt);
+        self.drain_battery(lift, dt);
     }
 
     /// Power grows with the acceleration beyond hovering and, slightly, with speed; idle motors and the board take 4 %.
-    fn drain(&mut self, lift: bool, dt: f32) {
-        let load =
-            if lift { cruise_load(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0) } else { 0.04 };
+    fn drain_battery(&mut self, lift: bool, dt: f32) {
+        let load = if lift {
+            power_ratio_at_speed(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0)
+        } else {
+            0.04
+        };
         self.state.battery = (self.state.battery - load * dt / self.limits.endurance_s).max(0.0);
     }
 }
@@ -346,7 +349,7 @@ pub fn wrap_pi(angle: f32) -> f32 {
 }
 
 /// Power at this speed, as a multiple of that in a hover.
-pub fn cruise_load(speed_mps: f32) -> f32 {
+pub fn power_ratio_at_speed(speed_mps: f32) -> f32 {
     1.0 + 0.004 * speed_mps * speed_mps
 }
 

@@ -7,9 +7,9 @@
 use super::frame::Frame;
 
 /// A payload with its cut zeros put back.
-pub struct Fields<'a>(&'a [u8; 255]);
+pub struct PayloadReader<'a>(&'a [u8; 255]);
 
-impl<'a> Fields<'a> {
+impl<'a> PayloadReader<'a> {
     /// Fields of a frame.
     pub fn new(frame: &'a Frame) -> Self {
         Self(frame.padded())
@@ -26,32 +26,32 @@ impl<'a> Fields<'a> {
         self.0[at]
     }
 
-    /// Little-endian.
+    /// The little-endian `u16` at an offset.
     pub fn u16(&self, at: usize) -> u16 {
         u16::from_le_bytes(self.bytes(at))
     }
 
-    /// Little-endian.
+    /// The little-endian `u32` at an offset.
     pub fn u32(&self, at: usize) -> u32 {
         u32::from_le_bytes(self.bytes(at))
     }
 
-    /// Little-endian.
+    /// The little-endian `i32` at an offset.
     pub fn i32(&self, at: usize) -> i32 {
         i32::from_le_bytes(self.bytes(at))
     }
 
-    /// Little-endian.
+    /// The little-endian `i64` at an offset.
     pub fn i64(&self, at: usize) -> i64 {
         i64::from_le_bytes(self.bytes(at))
     }
 
-    /// Little-endian.
+    /// The little-endian `u64` at an offset.
     pub fn u64(&self, at: usize) -> u64 {
         u64::from_le_bytes(self.bytes(at))
     }
 
-    /// Little-endian.
+    /// The little-endian `f32` at an offset.
     pub fn f32(&self, at: usize) -> f32 {
         f32::from_le_bytes(self.bytes(at))
     }

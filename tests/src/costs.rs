@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use host_sim::coverage::Planned;
+use host_sim::coverage::CoveragePlan;
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use rand_core::SeedableRng as _;
@@ -54,8 +54,8 @@ fn costs(seed: u64) -> Option<[f32; 4]> {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);
     let scenario = scenario::parse(&text, "random").ok()?;
-    let cost = |method| Planned::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
-    let bound_s = Planned::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
+    let cost = |method| CoveragePlan::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
+    let bound_s = CoveragePlan::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
     let costs = [
         cost(Method::SimpleBinpat)?,
         cost(Method::Binpat)?,

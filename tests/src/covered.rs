@@ -11,8 +11,8 @@ use host_sim::result::MissionResult;
 use host_sim::swarm::Flight;
 use host_sim::{scenario, swarm};
 
-/// Why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the lost one hovers
-/// where it was to fly.
+/// Reason why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the
+/// lost one hovers where it was to fly.
 pub const EXPLAINED: [&str; 6] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
@@ -25,7 +25,7 @@ pub const EXPLAINED: [&str; 6] = [
 /// Flies a coverage mission: its result with what its pictures show, and what was said.
 ///
 /// # Errors
-/// Why it cannot be planned, flown or judged.
+/// Reason why it cannot be planned, flown or judged.
 pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)> {
     fly_on(mission, &mut Vec::new())
 }
@@ -51,7 +51,7 @@ pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Res
     let mut flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
     pictures.iter_mut().for_each(|picture| picture.t_s = 0.0);
     pictures.append(&mut flight.pictures);
-    let judged = flown::judge(&mission.scenario, &plan, pictures.clone())?;
+    let judged = flown::judge_pictures(&mission.scenario, &plan, pictures.clone())?;
     flight.result.complete &= judged.complete;
     flight.result.coverage = Some(judged.result);
     Ok(flight)
@@ -60,7 +60,7 @@ pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Res
 /// The same from a scenario's text: its result, and what was said that matters.
 ///
 /// # Errors
-/// Why it is not flown.
+/// Reason why it is not flown.
 pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use host_sim::boards::Emulated;
+use host_sim::boards::EmulatedBoard;
 use object::{Object, ObjectSymbol, Symbol};
 
 /// An address of no memory.
@@ -75,7 +75,7 @@ impl Downfall {
     ///
     /// # Panics
     /// It does not start again by itself. The program has no function that panics by itself.
-    pub fn befall(self, board: &mut Emulated, program: &Path) {
+    pub fn befall(self, board: &mut EmulatedBoard, program: &Path) {
         let (address, argument) = match self {
             Self::Reset => (put(board, RESET), 0),
             Self::Fault => (NOWHERE, 0),
@@ -83,7 +83,7 @@ impl Downfall {
             Self::Hang => (put(board, SPIN), 0),
             Self::Overflow => (put(board, PUSH), STACK_END + STACK_LEFT),
         };
-        let answer = board.call(address, argument, PATIENCE).expect("a board");
+        let answer = board.call_function(address, argument, PATIENCE).expect("a board");
         assert!(answer.restarted, "{self:?}: the board goes on");
     }
 }
@@ -92,7 +92,7 @@ impl Downfall {
 ///
 /// # Panics
 /// It does not start again.
-pub fn reset(board: &mut Emulated) {
+pub fn reset(board: &mut EmulatedBoard) {
     // Nothing is called in the program.
     Downfall::Reset.befall(board, Path::new(""));
 }
@@ -101,27 +101,27 @@ pub fn reset(board: &mut Emulated) {
 ///
 /// # Panics
 /// The board is gone.
-pub fn block(board: &mut Emulated, time: Duration) {
+pub fn block(board: &mut EmulatedBoard, time: Duration) {
     let count = put(board, COUNT);
     let times = time.as_nanos() as u64 / COUNT_NS;
-    board.call(count, times as u32, PATIENCE).expect("a board");
+    board.call_function(count, times as u32, PATIENCE).expect("a board");
 }
 
 /// Has a board's planner fault whenever it plans, until the next start.
 ///
 /// # Panics
 /// The program has no planner.
-pub fn break_planner(board: &mut Emulated, program: &Path) {
-    board.poke(function(program, PLANS), &UNDEFINED.to_le_bytes()).expect("a board");
+pub fn break_planner(board: &mut EmulatedBoard, program: &Path) {
+    board.write_memory(function(program, PLANS), &UNDEFINED.to_le_bytes()).expect("a board");
 }
 
 /// Has a board's planner take so much longer, until the next start: where it begins, a branch leads to code that counts.
 ///
 /// # Panics
 /// The program has no planner.
-pub fn slow_planner(board: &mut Emulated, program: &Path, time: Duration) {
+pub fn slow_planner(board: &mut EmulatedBoard, program: &Path, time: Duration) {
     let plans = function(program, PLANS);
-    let begins = board.peek(plans, 16).expect("a board");
+    let begins = board.read_memory(plans, 16).expect("a board");
     let halves: Vec<u16> = begins.chunks(2).map(|half| u16::from_le_bytes([half[0], half[1]])).collect();
     // `ldr.w pc, [pc]` and the address after it: eight bytes, or ten where a half word fills up.
     let (fills, mut moved) = (usize::from(!plans.is_multiple_of(4)), 0);
@@ -142,21 +142,21 @@ pub fn slow_planner(board: &mut Emulated, program: &Path, time: Duration) {
     let code = put(board, &code);
     let nop = [0xBF00].repeat(fills);
     let branch: Vec<u16> = nop.into_iter().chain(far(code | 1)).collect();
-    board.poke(plans, &bytes(&branch)).expect("a board");
+    board.write_memory(plans, &bytes(&branch)).expect("a board");
 }
 
 /// Puts code where nothing uses the memory, and returns where.
-fn put(board: &mut Emulated, code: &[u16]) -> u32 {
-    board.poke(SPARE, &bytes(code)).expect("a board");
+fn put(board: &mut EmulatedBoard, code: &[u16]) -> u32 {
+    board.write_memory(SPARE, &bytes(code)).expect("a board");
     SPARE
 }
 
 /// Puts a `core::panic::Location` there, and returns where: file, its length, line, column.
-fn location(board: &mut Emulated) -> u32 {
+fn location(board: &mut EmulatedBoard) -> u32 {
     let words = [SPARE + 16, PLACE.len() as u32, LINE, 1];
     let bytes: Vec<u8> =
         words.iter().flat_map(|word| word.to_le_bytes()).chain(PLACE.iter().copied()).collect();
-    board.poke(SPARE, &bytes).expect("a board");
+    board.write_memory(SPARE, &bytes).expect("a board");
     SPARE
 }
 

@@ -6,14 +6,14 @@
 
 use core::ops::Range;
 
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
 use companion::{COMPANION_COMPONENT, Companion, Config, Duration, Event, Instant, Link, RosterEntry, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
-use planner_core::flight::{self, Look, Path, Photographs, Task, Trigger};
+use planner_core::flight::{self, HeadingMode, Path, PicturePlan, Task, Trigger};
 use planner_core::frames::{self, Geodetic};
 
 use crate::meeting::autopilot::Autopilot;
@@ -97,8 +97,8 @@ fn plan(over_area: bool) -> Plan16 {
         path.push(point, 1.5).expect("a short path");
     }
     let gates = heapless::Vec::new();
-    let mut photographs = Photographs::new(3.0, Look::Ahead, Trigger::Distance);
-    photographs.mark(1, 1, flight::Range { first: 0, end: 1 }).expect("room for one");
+    let mut photographs = PicturePlan::new(3.0, HeadingMode::Ahead, Trigger::Distance);
+    photographs.add_stretch(1, 1, flight::WaypointRange { first: 0, end: 1 }).expect("room for one");
     let task = if over_area { Task::Photograph(photographs) } else { Task::Goto(0) };
     Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }
@@ -110,7 +110,7 @@ pub const PHASES: usize = 8;
 
 impl Flight {
     /// On its pad.
-    fn new(kind: Kind, over_area: bool) -> Self {
+    fn new(kind: AutopilotKind, over_area: bool) -> Self {
         let start = Point::new(8.0, 12.0, 3.0);
         let mut config: Config<4> = Config::new(ID, start, ORIGIN);
         config.mission_crc = 0xC0FFEE;
@@ -141,7 +141,7 @@ impl Flight {
 
     /// One that has come to the phase of this number without an attack; from [`PHASES`] on the same over an area.
     pub fn at_phase(phase: usize) -> Self {
-        let kind = if phase.is_multiple_of(2) { Kind::Px4 } else { Kind::ArduPilot };
+        let kind = if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
         let mut flight = Self::new(kind, phase >= PHASES);
         let phase = phase % PHASES;
         flight.run(3.0);
@@ -215,7 +215,7 @@ impl Flight {
 
     /// An honest neighbour on its pad, five times a second.
     fn neighbour(&mut self) {
-        if !(self.now.micros() / 25_000).is_multiple_of(8) {
+        if !(self.now.as_micros() / 25_000).is_multiple_of(8) {
             return;
         }
         let place = Point::new(8.0, 30.0, 0.0);
@@ -230,7 +230,7 @@ impl Flight {
     fn give_neighbour(&mut self, intent: &Intent, place: &Point) {
         let geodetic = frames::enu_to_geodetic(&ORIGIN, place);
         let data = GLOBAL_POSITION_INT_DATA {
-            time_boot_ms: self.now.boot_ms(),
+            time_boot_ms: self.now.as_boot_ms(),
             lat: (geodetic.lat_deg * 1e7) as i32,
             lon: (geodetic.lon_deg * 1e7) as i32,
             alt: (geodetic.alt_m * 1e3) as i32,
@@ -252,7 +252,7 @@ impl Flight {
 
     fn broken(&mut self, what: &str) {
         if self.report.broken.len() < 8 {
-            let (state, at_s) = (self.companion.state(), self.now.micros() as f64 * 1e-6);
+            let (state, at_s) = (self.companion.state(), self.now.as_micros() as f64 * 1e-6);
             self.report.broken.push(format!("{at_s:.2} s, {state:?}: {what}"));
         }
     }
@@ -274,7 +274,7 @@ impl Flight {
         }
         while let Some(event) = self.companion.poll_event() {
             if let Event::PlanRequested(wanted) = event {
-                let answer = if self.companion.detour(|_| {}).is_some() {
+                let answer = if self.companion.detour_request(|_| {}).is_some() {
                     Err(companion::PlanFailure::Unreachable)
                 } else {
                     Ok(plan(self.over_area))
@@ -322,8 +322,8 @@ impl Flight {
             // In a mode that is none of setpoints, as far as was reported, they go with the vehicle.
             let telemetry = self.companion.telemetry();
             self.check.follows = telemetry.custom_mode != telemetry.kind.unwrap_or_default().setpoint_mode();
-            self.check.urgent = self.companion.stops_urgently();
-            self.check.take(self.now.micros() as f64 * 1e-6, &data);
+            self.check.urgent = self.companion.is_in_urgent_stop();
+            self.check.take(self.now.as_micros() as f64 * 1e-6, &data);
         }
     }
 
@@ -359,7 +359,13 @@ impl Flight {
 }
 
 fn intent() -> Intent {
-    Intent { system_id: NEIGHBOUR, mission_crc: 0xC0FFEE, plan_crc: 5, heard: u32::MAX, ..Intent::default() }
+    Intent {
+        system_id: NEIGHBOUR,
+        mission_crc: 0xC0FFEE,
+        plan_crc: 5,
+        heard_bits: u32::MAX,
+        ..Intent::default()
+    }
 }
 
 /// Frames of one attack.

@@ -1,6 +1,6 @@
 //! Divisions of numbered waypoints: what the models of fleets have in place of lanes and plans.
 
-use companion::swarm::fleet::{Fleet, Lot};
+use companion::swarm::fleet::{DivisionInput, Fleet};
 
 /// A waypoint is so long, decimetres.
 pub const WAYPOINT_DM: u16 = 100;
@@ -24,10 +24,10 @@ pub fn parts<const V: usize>(whole: &[u32], fleet: &Fleet<V>, count: usize) -> (
         let mut done = Vec::new();
         for (rank, lot) in lots.iter().enumerate() {
             let taken = usize::from(lot.along_dm / WAYPOINT_DM).min(parts[rank].len());
-            let sure = lot.lives || lot.along_dm == Lot::WHOLE_PATH;
+            let sure = lot.alive || lot.along_dm == DivisionInput::WHOLE_PATH;
             done.extend(&parts[rank][..if sure { taken } else { taken.saturating_sub(1) }]);
-            living[rank] = lot.lives;
-            hash = hash.wrapping_mul(31).wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.lives));
+            living[rank] = lot.alive;
+            hash = hash.wrapping_mul(31).wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.alive));
         }
         left.retain(|waypoint| !done.contains(waypoint));
         parts = share(&left, &living);

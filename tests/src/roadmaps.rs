@@ -18,7 +18,7 @@ use planner_core::roadmap::{
     Edge, HEADER_LEN, HalfEdge, LANDMARKS, RoadmapError, RoadmapHeader, RoadmapView, encoded_len,
     write_with_landmarks,
 };
-use planner_core::schedule::sipp::{self, Route, SippWorkspace};
+use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleConfig};
 use planner_core::search::{SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row};
 
@@ -78,7 +78,7 @@ impl Forger {
     /// Changes some of the roadmap's file, makes its CRC right again, and searches what is accepted.
     ///
     /// # Errors
-    /// Why the file is refused.
+    /// Reason why the file is refused.
     ///
     /// # Panics
     /// It is accepted and a search is wrong.
@@ -119,8 +119,14 @@ impl Forger {
         if starts == 0 || goals == 0 {
             return;
         }
-        let route =
-            Route { cfg: &SCHEDULE, from: 0, to: starts, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
+        let route = RouteQuery {
+            cfg: &SCHEDULE,
+            from: 0,
+            to: starts,
+            not_before_s: 0.0,
+            parked: &[],
+            handover_s: 0.0,
+        };
         let way = lengths_from(view, route.from, 0.0)[usize::from(route.to)];
         let mut flight = Flight::<NODES> {
             id: 1,
@@ -129,14 +135,14 @@ impl Forger {
             climb_m: 1.5,
             descent_m: 1.5,
             depart_s: 0.0,
-            piece_m: MAX_TIMED_SEGMENT_M,
+            segment_m: MAX_TIMED_SEGMENT_M,
         };
         let asked = Cell::new(0);
         let any = |_: u16, _: &HalfEdge| {
             asked.set(asked.get() + 1);
             true
         };
-        let found = sipp::route(view, &route, any, [].iter(), &mut self.sipp, &mut flight);
+        let found = sipp::find_route(view, &route, any, [].iter(), &mut self.sipp, &mut flight);
         assert!(asked.get() <= view.half_edge_count(), "{} half-edges asked about", asked.get());
         match found {
             Ok(()) => near(f64::from(flight.path.length_m()), way),
@@ -254,7 +260,7 @@ fn read_all(view: &RoadmapView<'_>) {
         let at = view.node(node);
         assert!(at.iter().all(|c| c.is_finite()));
         assert!(view.ground_m(node).is_none_or(|ground_m| ground_m <= at.z));
-        assert!(view.ground_around(&at).is_none_or(|(low_m, high_m)| low_m <= high_m && high_m <= at.z));
+        assert!(view.ground_range_near(&at).is_none_or(|(low_m, high_m)| low_m <= high_m && high_m <= at.z));
         for edge in view.half_edges(node) {
             assert!(view.distance_m(node, edge.target) > 0.0);
             let back = view.edge_between(edge.target, node).expect("each edge has its opposite");
@@ -274,7 +280,7 @@ fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> 
         if here > ways[usize::from(node)] {
             continue;
         }
-        for edge in view.half_edges(node).filter(|edge| view.clears(edge, required_m)) {
+        for edge in view.half_edges(node).filter(|edge| view.has_clearance(edge, required_m)) {
             let way = here + (view.node(edge.target) - view.node(node)).cast::<f64>().norm();
             if way < ways[usize::from(edge.target)] {
                 ways[usize::from(edge.target)] = way;
@@ -310,7 +316,7 @@ fn searches_are_right(
     let asked = Cell::new(0);
     let passable = |_: u16, edge: &HalfEdge| {
         asked.set(asked.get() + 1);
-        view.clears(edge, required_m)
+        view.has_clearance(edge, required_m)
     };
     let bounded = |searches: usize| {
         assert!(asked.get() <= searches * view.half_edge_count(), "{} half-edges asked about", asked.get());
@@ -326,7 +332,7 @@ fn searches_are_right(
             assert_eq!((path.first(), path.last()), (Some(&from[0]), Some(&to[0])));
             let legs = path.windows(2).map(|leg| {
                 let edge = view.edge_between(leg[0], leg[1]).expect("a path joins nodes by edges");
-                assert!(view.clears(&edge, required_m), "{edge:?}");
+                assert!(view.has_clearance(&edge, required_m), "{edge:?}");
                 f64::from(view.distance_m(leg[0], leg[1]))
             });
             near(legs.sum(), way(0, to[0]));

@@ -252,7 +252,7 @@ impl Swarm {
             descents_m: &self.descents_m,
             mode: self.mode,
             schedule: self.schedule,
-            gates_most: GATES,
+            max_gates: GATES,
         };
         let mut ws = on_heap(PlanWorkspace::<NODES, VEHICLES, PIECES>::new);
         let mut out = Box::new(Plan::new());
@@ -281,7 +281,7 @@ pub fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
 
 /// Where its flight ends, metres along its path.
 pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
-    if flight.task.flies() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
+    if flight.task.leaves_pad() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
 }
 
 /// A number from the environment.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use companion::Link as Port;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{COMPANION_COMPONENT, Instant, State};
-use host_sim::boards::{self, Emulated, Piece};
+use host_sim::boards::{self, EmulatedBoard, PortBytes};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -60,7 +60,7 @@ pub struct Heard {
 /// The vehicle.
 pub struct Vehicle {
     /// Its companion.
-    pub board: Emulated,
+    pub board: EmulatedBoard,
     /// Its autopilot and the vehicle itself.
     pub autopilot: Autopilot,
     /// What was heard from the board since this was last emptied.
@@ -75,7 +75,7 @@ pub struct Vehicle {
     started: Duration,
     plugged: [bool; 2],
     /// What it is about to receive.
-    pieces: Vec<Piece>,
+    pieces: Vec<PortBytes>,
     framers: [Framer; 2],
     ground_m: f32,
     sequence: u8,
@@ -108,9 +108,9 @@ impl Vehicle {
     /// The board does not start.
     pub fn new(program: &path::Path, mission: &Mission, known: &Mission, seed: u64) -> Self {
         let folder = tempfile::tempdir().expect("a temporary directory");
-        let mut board = Emulated::start(program, &folder.path().join("log")).expect("a board");
-        let bank = boards::bank(&known.roadmap_file, &known.mission_file).expect("it holds them");
-        board.load(&bank).expect("a board");
+        let mut board = EmulatedBoard::start(program, &folder.path().join("log")).expect("a board");
+        let bank = boards::flash_bank_image(&known.roadmap_file, &known.mission_file).expect("it holds them");
+        board.load_flash(&bank).expect("a board");
         let mut config = config(mission);
         config.seed = seed;
         let mut autopilot = Autopilot::new(&config).expect("the scenario is good");
@@ -201,7 +201,7 @@ impl Vehicle {
     pub fn send(&mut self, port: Port, bytes: &[u8]) {
         if self.plugged[port as usize] {
             let at_us = (self.time - self.started).as_micros() as u64;
-            self.pieces.push(Piece { port, at_us, bytes: bytes.to_owned() });
+            self.pieces.push(PortBytes { port, at_us, bytes: bytes.to_owned() });
         }
     }
 
@@ -211,7 +211,7 @@ impl Vehicle {
         self.time += STEP;
         let until_us = (self.time - self.started).as_micros() as u64;
         let pieces = core::mem::take(&mut self.pieces);
-        let answer = self.board.run(until_us, &pieces).expect("a board");
+        let answer = self.board.run_grant(until_us, &pieces).expect("a board");
         if answer.restarted {
             self.starts();
         }
@@ -242,7 +242,7 @@ impl Vehicle {
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
         let began = self.time;
         while !holds(self) {
-            let place = self.autopilot.truth().position;
+            let place = self.autopilot.true_state().position;
             assert!(
                 self.time - began < PATIENCE,
                 "not {what}: {:?} at {place:?}, {:?}",
@@ -277,11 +277,11 @@ impl Vehicle {
 
     /// Whether the vehicle is off the ground, in truth.
     pub fn flies(&self) -> bool {
-        !self.autopilot.truth().touching
+        !self.autopilot.true_state().touching
     }
 
     /// What the board sent arrives, if the cable is in.
-    fn hear(&mut self, Piece { port, at_us, bytes }: &Piece) {
+    fn hear(&mut self, PortBytes { port, at_us, bytes }: &PortBytes) {
         let line = *port as usize;
         if !self.plugged[line] {
             return;
@@ -327,11 +327,11 @@ impl Heard {
 /// The autopilot of a mission's first vehicle.
 fn config(mission: &Mission) -> Config {
     let (vehicle, origin) = (&mission.scenario.vehicles[0], mission.scenario.map.origin);
-    let pad = mission.pad(0);
+    let pad = mission.pad_position(0);
     let start: Point = geodetic_to_enu(&origin, &pad);
     Config {
         system_id: vehicle.id,
-        personality: vehicle.personality,
+        autopilot: vehicle.personality,
         world_origin: origin,
         ekf_origin: pad,
         start,

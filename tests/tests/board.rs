@@ -6,8 +6,8 @@
 
 use std::collections::HashMap;
 
-use firmware::calls::limits::{self, Answers, Listener};
-use firmware::calls::limits_routes::{self, Lent};
+use firmware::calls::limits::{self, CallListener, ResultChecksum};
+use firmware::calls::limits_routes::{self, RouteWorkspaces};
 use firmware::cases::{self, Workspace};
 use flockmate_tests::{board, workspace};
 use host_sim::map::{Unknown, building};
@@ -27,8 +27,9 @@ fn the_board_computes_what_the_desk_computes() {
     let scenario =
         scenario::load(&workspace().join("host-sim/scenarios/demo.toml")).expect("the demo is good");
     let mission = Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo can be prepared");
-    let map =
-        building::building(building::DEFAULT_SEED, 0.5).expect("the building").voxel_map(Unknown::Blocked);
+    let map = building::building_map(building::DEFAULT_SEED, 0.5)
+        .expect("the building")
+        .voxel_map(Unknown::Blocked);
     let lines = board::measure(&program, &mission.roadmap_file, &board::map_image(&map.grid()));
 
     let view = mission.view();
@@ -63,7 +64,7 @@ fn the_board_computes_what_the_desk_computes() {
 /// Counts calls.
 struct Calls(usize);
 
-impl Listener for Calls {
+impl CallListener for Calls {
     fn next(&mut self, _name: &'static str) {
         self.0 += 1;
     }
@@ -73,10 +74,10 @@ impl Listener for Calls {
 fn at_its_limits_the_board_answers_as_the_desk_does() {
     let Some(program) = board::program("limits") else { return };
     let mut calls = Calls(0);
-    let mut answers = Answers::new(&mut calls);
-    limits::places(&mut answers);
+    let mut answers = ResultChecksum::new(&mut calls);
+    limits::call_without_roadmap(&mut answers);
     let places = answers.sum();
-    let routes = limits_routes::routes(&mut answers, &mut Box::new(Lent::new()));
+    let routes = limits_routes::call_all(&mut answers, &mut Box::new(RouteWorkspaces::new()));
     let expected = format!("limits {} {places:08x} {routes:08x?}", calls.0);
     // Neither roadmap nor map is read.
     let lines = board::measure(&program, &[0], &[0]);
@@ -87,8 +88,8 @@ fn at_its_limits_the_board_answers_as_the_desk_does() {
 /// CRC of the plan for the whole swarm.
 fn swarm_crc(mission: &Mission) -> u32 {
     let view = mission.view();
-    let (vehicles, descents_m) = (cases::tasks(&view), cases::descents(&view));
-    let request = cases::request(&vehicles, &descents_m);
+    let (vehicles, descents_m) = (cases::vehicle_tasks(&view), cases::goal_descents(&view));
+    let request = cases::plan_request(&vehicles, &descents_m);
     let mut ws = host_sim::capacity::on_heap(PlanWorkspace::<4096, 32, 2048>::new);
     let mut plan = Box::new(SwarmPlan::<32, 64>::new());
     plan::plan_swarm(&view, &request, &mut ws, &mut plan).expect("a plan");

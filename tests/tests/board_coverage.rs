@@ -9,7 +9,7 @@ use host_sim::swarm::Flight;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 
-/// An area with a zone that nobody enters, small: boards in QEMU are no faster than a few times the clock.
+/// An area with a zone that no vehicle may enter, small: boards in QEMU are no faster than a few times the clock.
 const FIELD: &str = r#"
 [area]
 polygon = [[0, 0], [70, 0], [80, 45], [10, 50]]
@@ -97,7 +97,7 @@ fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
         let lots = &told[0].lots;
         let plan = mission.plan_rest(&[], std::iter::once(&lots[..])).expect("the desk divides it too");
         println!("{:?}", told[0]);
-        assert_eq!(lots.iter().map(|lot| lot.lives).collect::<Vec<_>>(), [true, true, false]);
+        assert_eq!(lots.iter().map(|lot| lot.alive).collect::<Vec<_>>(), [true, true, false]);
         assert_eq!(told[0].plan_crc, plan.crc, "vehicle {vehicle}: {lots:?}");
     }
 }

@@ -20,9 +20,9 @@ use companion::link::frame::{self, Header};
 use companion::storage::store::File;
 use flockmate_tests::board;
 use flockmate_tests::downfall::reset;
-use host_sim::boards::{Emulated, Piece};
+use host_sim::boards::{EmulatedBoard, PortBytes};
 use host_sim::link::Link;
-use host_sim::upload::{Client, crc32};
+use host_sim::upload::{FtpClient, crc32};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -72,14 +72,14 @@ enum Cut {
 }
 
 /// A board that its clients share, one after the other.
-type Shared = Arc<Mutex<Emulated>>;
+type Shared = Arc<Mutex<EmulatedBoard>>;
 
 /// What a client sees of its vehicle: the companion, and an autopilot that reports that it is there.
 struct Line {
     board: Shared,
     began: Instant,
     received: Vec<u8>,
-    sent: Vec<Piece>,
+    sent: Vec<PortBytes>,
     /// Whether the autopilot is armed; none is there if there is nothing in it.
     armed: Option<bool>,
     beat_at_us: u64,
@@ -105,7 +105,7 @@ impl Line {
 
     fn put(&mut self, bytes: &[u8]) {
         let at_us = self.now_us();
-        self.sent.push(Piece { port: Port::Autopilot, at_us, bytes: bytes.to_owned() });
+        self.sent.push(PortBytes { port: Port::Autopilot, at_us, bytes: bytes.to_owned() });
     }
 
     fn beat(&mut self, armed: bool) {
@@ -174,7 +174,7 @@ impl Link for Line {
             until_us = until_us.min(at_us);
         }
         let sent = core::mem::take(&mut self.sent);
-        let answer = self.board.lock().unwrap().run(until_us, &sent).expect("the board runs");
+        let answer = self.board.lock().unwrap().run_grant(until_us, &sent).expect("the board runs");
         let ours = answer.sent.into_iter().filter(|piece| piece.port == Port::Autopilot);
         self.received.extend(ours.flat_map(|piece| piece.bytes));
     }
@@ -201,14 +201,14 @@ fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
 }
 
 /// What a client sees of a board until a cut.
-fn client(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> Client {
-    Client::new(Line::new(board, armed, cut), None)
+fn client(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> FtpClient {
+    FtpClient::new(Line::new(board, armed, cut), None)
 }
 
 /// One that found it, and is never cut.
-fn uncut(board: &Shared, armed: Option<bool>) -> Client {
+fn uncut(board: &Shared, armed: Option<bool>) -> FtpClient {
     let mut client = client(board, armed, &Arc::new(Mutex::new(Cut::Never)));
-    client.find().expect("the board is there");
+    client.wait_for_companion().expect("the board is there");
     client
 }
 
@@ -271,27 +271,27 @@ fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool 
             *cut.lock().unwrap() = Cut::At(now_us() + seal_in_us);
         }
     };
-    client.find().and_then(|_| client.upload(File::Roadmap, file, sealing)).is_ok()
+    client.wait_for_companion().and_then(|_| client.upload(File::Roadmap, file, sealing)).is_ok()
 }
 
 /// Stops a board; every second time, if it may, where a word of the kind that the part has is torn. The torn words.
 fn stop(board: &Shared, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usize> {
     let mut board = board.lock().unwrap();
     for _ in 0..LOOKS {
-        let torn = board.torn().expect("a board");
+        let torn = board.torn_flash_words().expect("a board");
         let found = torn.first().is_some_and(|word| part != Part::Sealing || word % SLOT == SEAL);
         if found || !moves_on {
             return torn;
         }
         let until_us = board.now_us() + u64::from(rng.next_u32() % MOVE_US);
-        board.run(until_us, &[]).expect("a board");
+        board.run_grant(until_us, &[]).expect("a board");
     }
-    board.torn().expect("a board")
+    board.torn_flash_words().expect("a board")
 }
 
 /// A board, its flash empty.
 fn start(program: &Path, folder: &Path) -> Shared {
-    Arc::new(Mutex::new(Emulated::start(program, &folder.join("log")).expect("a board")))
+    Arc::new(Mutex::new(EmulatedBoard::start(program, &folder.join("log")).expect("a board")))
 }
 
 /// Cuts uploads to one board again and again.
@@ -313,7 +313,7 @@ fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
         let torn = stop(&board, part, cut % 2 == 0, &mut rng);
         reset(&mut board.lock().unwrap());
         tally.note_torn(&torn);
-        let now = uncut(&board, Some(false)).sum(File::Roadmap).expect("it holds a roadmap");
+        let now = uncut(&board, Some(false)).remote_crc(File::Roadmap).expect("it holds a roadmap");
         assert!(
             now == new || now == old && !whole,
             "seed {seed}, cut {cut}: the board holds {now:08x}, old is {old:08x}, new {new:08x}; torn: {torn:?}"
@@ -348,11 +348,11 @@ fn an_armed_board_erases_nothing() {
     let folder = tempfile::tempdir().expect("a temporary directory");
     let board = start(&program, folder.path());
     let file = roadmap(20, 0.0);
-    let torn = || board.lock().unwrap().torn().expect("a board");
+    let torn = || board.lock().unwrap().torn_flash_words().expect("a board");
     let run = |time_us: u64| {
         let mut board = board.lock().unwrap();
         let until_us = board.now_us() + time_us;
-        board.run(until_us, &[]).expect("a board");
+        board.run_grant(until_us, &[]).expect("a board");
     };
     let mut client = uncut(&board, Some(true));
     for _ in 0..3 {

@@ -18,7 +18,7 @@ use flockmate_tests::downfall::{self, Downfall};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
 use host_sim::link::Link;
 use host_sim::mission::Mission;
-use host_sim::upload::Client;
+use host_sim::upload::FtpClient;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavCmd, MavFrame};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
@@ -83,7 +83,7 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
     if is_over(vehicle) {
         return None;
     }
-    let (state, place) = (vehicle.heard.state, vehicle.autopilot.truth().position);
+    let (state, place) = (vehicle.heard.state, vehicle.autopilot.true_state().position);
     // A take-off by command is flown to its end.
     let top_m = place.z.max(CLIMBS_TO_M);
     vehicle.bring_down(how);
@@ -93,7 +93,7 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
     let mut farthest_m = 0_f32;
     let mut in_air = Duration::ZERO;
     vehicle.until("landed by itself, or hovering", |vehicle| {
-        let truth = vehicle.autopilot.truth();
+        let truth = vehicle.autopilot.true_state();
         let (away, armed, flies): (Point, _, _) = (truth.position - place, truth.armed, vehicle.flies());
         (farthest_m, highest_m) = (farthest_m.max(away.xy().norm()), highest_m.max(truth.position.z - top_m));
         let passed = Duration::from_micros(vehicle.autopilot.time_us() - began);
@@ -102,16 +102,16 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
         }
         !armed || brakes && passed > 2 * FINDS && flies
     });
-    if vehicle.autopilot.truth().armed {
+    if vehicle.autopilot.true_state().armed {
         // ArduCopter brakes and hovers until its pilot lands it.
         vehicle.autopilot.set_pilot_mode(ardupilot::Mode::Land.number());
-        vehicle.until("landed", |vehicle| !vehicle.autopilot.truth().armed);
+        vehicle.until("landed", |vehicle| !vehicle.autopilot.true_state().armed);
     }
     vehicle.until_said(FOUND);
     vehicle.run(FINDS);
     let heard = &vehicle.heard;
     let context = format!("{how:?} in {state:?} at {place:?}: {heard:?}");
-    assert!(!vehicle.autopilot.truth().armed, "{context}");
+    assert!(!vehicle.autopilot.true_state().armed, "{context}");
     assert!(heard.setpoints.is_empty(), "it sends setpoints, {context}");
     assert!(!heard.commands.iter().any(|(number, _)| FLIES.contains(number)), "it flies on, {context}");
     assert!(farthest_m < STOPS_M && highest_m < 1.0, "{farthest_m} m away, {highest_m} m up, {context}");
@@ -294,8 +294,8 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
     let began = Instant::now();
     let upload = thread::spawn(move || {
         let radio = Radio { turns, sends, now: began, heard: Vec::new(), sent: Vec::new() };
-        let mut client = Client::new(Box::new(radio), Some(1));
-        client.find().and_then(|_| client.upload(File::Roadmap, &other, |_| ()))
+        let mut client = FtpClient::new(Box::new(radio), Some(1));
+        client.wait_for_companion().and_then(|_| client.upload(File::Roadmap, &other, |_| ()))
     });
     block(&mut vehicle, &place);
     let mut rng = Pcg32::seed_from_u64(1);

@@ -9,7 +9,7 @@ use flockmate_tests::vehicle::mission;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::swarm::{self, Flight};
-use host_sim::upload::Client;
+use host_sim::upload::FtpClient;
 
 /// Three vehicles in the lobby of the built-in building; two of them cross.
 const THREE: &str = r#"
@@ -66,6 +66,6 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
 fn by_the_wall_clock_a_board_answers_through_its_port() {
     let Some(program) = board::program("flockmate") else { return };
     let (_board, [autopilot, _]) = board::by_the_clock(&program);
-    let mut client = Client::new(autopilot.open().expect("its port is open"), None);
-    assert_eq!(client.find().expect("it speaks"), 250);
+    let mut client = FtpClient::new(autopilot.open().expect("its port is open"), None);
+    assert_eq!(client.wait_for_companion().expect("it speaks"), 250);
 }

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use flockmate_tests::shared_data;
-use host_sim::capacity::{BOARDS, Board};
+use host_sim::capacity::{BOARDS, BoardCapacity};
 use host_sim::map::{self, Occupancy, OccupancyMap, Unknown, VoxelMap};
 use host_sim::roadmap::{self, Roadmap};
 use planner_core::Point;
@@ -36,7 +36,7 @@ fn ways(
     required_m: f32,
     workspace: &mut SearchWorkspace<4096>,
 ) -> Vec<f32> {
-    dijkstra_all(view, from, |_, edge| view.clears(edge, required_m), workspace).expect("it fits");
+    dijkstra_all(view, from, |_, edge| view.has_clearance(edge, required_m), workspace).expect("it fits");
     (0..view.node_count() as u16).map(|node| workspace.distance_m(node)).collect()
 }
 
@@ -76,12 +76,12 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
 }
 
 /// Builds a roadmap and cuts it down for a board.
-fn holds(name: &str, map: &VoxelMap, config: Config, board: &Board) {
+fn holds(name: &str, map: &VoxelMap, config: Config, board: &BoardCapacity) {
     let began = Instant::now();
     let (all, parts) = roadmap::build(map, &[], &config).expect("there is free space");
     let built = began.elapsed();
     let count = all.edges.len();
-    let kept = all.clone().fit(board).expect("it can be cut down");
+    let kept = all.clone().fit_to_board(board).expect("it can be cut down");
     let fitted = began.elapsed() - built;
     let (all, kept) = (file(&all, &config), file(&kept, &config));
     println!(
@@ -113,7 +113,7 @@ fn scanned_maps_fit_and_paths_stay_short() {
 /// A hall of 36 × 28 × 8 m with rows of shelves, at 0.05 m.
 fn hall() -> VoxelMap {
     let shape = GridShape { dims: [720, 560, 160], min: Point::zeros(), resolution_m: 0.05 };
-    let mut map = OccupancyMap::unknown(shape, "hall").unwrap();
+    let mut map = OccupancyMap::all_unknown(shape, "hall").unwrap();
     map.fill([0; 3], shape.dims, Occupancy::Occupied);
     map.fill([4; 3], [716, 556, 156], Occupancy::Free);
     for row in 0..7 {
@@ -133,7 +133,7 @@ fn a_fine_hall_of_a_million_edges_fits() {
     let config = config(4000);
     let (all, parts) = roadmap::build(&map, &[], &config).expect("there is free space");
     assert!(all.edges.len() >= 1_000_000, "only {} edges", all.edges.len());
-    let kept = all.clone().fit(&BOARDS[0]).expect("it can be cut down");
+    let kept = all.clone().fit_to_board(&BOARDS[0]).expect("it can be cut down");
     let bytes = file(&kept, &config);
     let took = began.elapsed();
     println!("hall: {} edges, {} bytes for a board, {took:.2?}: {parts:?}", all.edges.len(), bytes.len());
@@ -145,10 +145,10 @@ fn a_fine_hall_of_a_million_edges_fits() {
 #[test]
 fn boards_are_what_their_firmware_is() {
     use firmware::capacity::{GATES, HALF_EDGES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES};
-    let Board { nodes, half_edges, vehicles, gates, pieces, .. } = BOARDS[0];
+    let BoardCapacity { nodes, half_edges, vehicles, gates, pieces, .. } = BOARDS[0];
     let held = [ROADMAP_NODES, HALF_EDGES, VEHICLES, GATES, TIMED_SEGMENTS];
     assert_eq!([nodes, half_edges, vehicles, gates, pieces], held);
     let halved = [nodes / 2, half_edges / 2, vehicles / 2, gates, pieces / 2];
-    let Board { nodes, half_edges, vehicles, gates, pieces, .. } = BOARDS[2];
+    let BoardCapacity { nodes, half_edges, vehicles, gates, pieces, .. } = BOARDS[2];
     assert_eq!([nodes, half_edges, vehicles, gates, pieces], halved);
 }

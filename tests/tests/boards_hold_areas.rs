@@ -1,7 +1,7 @@
 //! What of an area a board does not hold is said when it is planned, before anything is uploaded.
 
 use host_sim::capacity::{BOARD_CORNERS, BOARDS};
-use host_sim::coverage::Planned;
+use host_sim::coverage::CoveragePlan;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -34,10 +34,10 @@ fn field(area: &str, height_m: f64, vehicles: usize, south_m: f64) -> String {
 /// What each board does not hold of it, and how many lanes it has.
 fn excess(text: &str) -> ([Option<String>; 3], usize) {
     let scenario = || scenario::parse(text, "area").expect("a good scenario");
-    let lanes = Planned::flown(&scenario()).expect("lanes").tracks.lanes().len();
+    let lanes = CoveragePlan::plan_as_companions(&scenario()).expect("lanes").tracks.lanes().len();
     let mut mission = Mission::prepare(scenario(), &Progress::hidden()).expect("an area");
     let plan = mission.plan().expect("a plan");
-    (BOARDS.each_ref().map(|board| mission.excess(&plan, board)), lanes)
+    (BOARDS.each_ref().map(|board| mission.board_limit_exceeded(&plan, board)), lanes)
 }
 
 #[test]

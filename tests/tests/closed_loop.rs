@@ -88,7 +88,7 @@ fn companion_and_autopilot_fly_in_two_processes() {
     let path = scenario_path("host-sim/scenarios/demo.toml");
     let mission = Mission::prepare(scenario::load(&path).expect("the scenario is good"), &Progress::hidden())
         .expect("the mission can be prepared");
-    let pad = mission.pad(mission.index_of(7).expect("the demo has a vehicle 7"));
+    let pad = mission.pad_position(mission.index_of(7).expect("the demo has a vehicle 7"));
     let home = format!("{:.8},{:.8},{:.3}", pad.lat_deg, pad.lon_deg, pad.alt_m);
     let (_autopilot, addresses) = autopilot(&["udp-listen:127.0.0.1:0"], &["--sysid", "7", "--home", &home]);
     let companion = Command::new(host_sim(Profile::Debug))

@@ -54,13 +54,15 @@ fn is_clear(map: &OccupancyMap, p: &Point, radius_m: f32, required_m: f32) -> bo
     let cell_m = f64::from(shape.resolution_m);
     let low = |axis: usize, cell: u32| f64::from(shape.min[axis]) + f64::from(cell) * cell_m;
     let Some([i, j, top]) = shape.cell_of(p) else { return false };
-    if map.at([i, j, top]) != Occupancy::Free {
+    if map.state_at([i, j, top]) != Occupancy::Free {
         return false;
     }
-    let Some(below) = (0..top).rev().find(|&k| map.at([i, j, k]) != Occupancy::Free) else { return false };
+    let Some(below) = (0..top).rev().find(|&k| map.state_at([i, j, k]) != Occupancy::Free) else {
+        return false;
+    };
     let stands_m = low(2, below + 1) + f64::from(radius_m);
     let [x, y, z] = [p.x, p.y, p.z].map(f64::from);
-    if map.at([i, j, below]) == Occupancy::Unknown || z < stands_m {
+    if map.state_at([i, j, below]) == Occupancy::Unknown || z < stands_m {
         return false;
     }
     let required_m = f64::from(required_m);
@@ -76,7 +78,7 @@ fn is_clear(map: &OccupancyMap, p: &Point, radius_m: f32, required_m: f32) -> bo
     (below + 1..shape.dims[2]).all(|k| {
         (0..shape.dims[1]).all(|j| {
             (0..shape.dims[0]).all(|i| {
-                map.at([i, j, k]) == Occupancy::Free || {
+                map.state_at([i, j, k]) == Occupancy::Free || {
                     let (dx, dy, dz) = (gap(0, i, x, x), gap(1, j, y, y), gap(2, k, stands_m, z));
                     dx * dx + dy * dy + dz * dz > required_m * required_m
                 }
@@ -93,7 +95,7 @@ fn uniform(rng: &mut Pcg32) -> f32 {
 fn is_low(map: &OccupancyMap, p: &Point, required_m: f32) -> bool {
     let shape = map.shape();
     let Some([i, j, top]) = shape.cell_of(p) else { return true };
-    let below = (0..top).rev().find(|&k| map.at([i, j, k]) != Occupancy::Free);
+    let below = (0..top).rev().find(|&k| map.state_at([i, j, k]) != Occupancy::Free);
     below.is_some_and(|below| p.z - shape.min.z - (below + 1) as f32 * shape.resolution_m <= required_m)
 }
 
@@ -102,7 +104,7 @@ fn place(map: &OccupancyMap, rng: &mut Pcg32) -> Point {
     let (min, size) = (map.shape().min, map.shape().max() - map.shape().min);
     loop {
         let p = min + Point::new(uniform(rng), uniform(rng), uniform(rng)).component_mul(&size);
-        if map.shape().cell_of(&p).is_some_and(|cell| map.at(cell) == Occupancy::Free) {
+        if map.shape().cell_of(&p).is_some_and(|cell| map.state_at(cell) == Occupancy::Free) {
             return p;
         }
     }
@@ -172,7 +174,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             let plan = |nodes| {
                 let mut mission = prepare(start, goal, nodes).ok()?;
                 let plan = mission.plan().ok()?;
-                let lines = shortage::lines(&mission, &plan);
+                let lines = shortage::shortage_lines(&mission, &plan);
                 Some((lines.iter().any(|line| line.contains("the map has one")), mission, plan))
             };
             // More nodes where the map itself has a way that the roadmap has not: as the program suggests.
@@ -181,7 +183,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 missed += 1;
                 continue;
             };
-            if !plan.flights[0].task.flies() {
+            if !plan.flights[0].task.leaves_pad() {
                 walled_off += 1;
                 continue;
             }

@@ -3,7 +3,7 @@
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::costs::Costs;
 use flockmate_tests::shared_data;
-use host_sim::coverage::Planned;
+use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::{Findings, check_plan};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -20,7 +20,7 @@ fn areas() -> u64 {
 }
 
 fn findings(scenario: &Scenario, method: Method) -> Result<Findings, String> {
-    let planned = Planned::new(scenario, method).map_err(|error| format!("{error:#}"))?;
+    let planned = CoveragePlan::new(scenario, method).map_err(|error| format!("{error:#}"))?;
     Ok(check_plan(&planned))
 }
 
@@ -66,7 +66,7 @@ fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
 }
 
 /// The least largest cost of waypoints `from` on for these vehicles and layers, by trying everything.
-fn brute_force(planned: &Planned<'_>, from: u32, vehicles: &[usize], layers: &[u8]) -> f64 {
+fn brute_force(planned: &CoveragePlan<'_>, from: u32, vehicles: &[usize], layers: &[u8]) -> f64 {
     let count = planned.tracks.waypoint_count();
     if from == count {
         return 0.0;
@@ -112,7 +112,7 @@ fn exact_is_what_trying_everything_finds() {
             text = text.replace(&format!("id = {id}\n"), &extra);
         }
         let Ok(scenario) = scenario::parse(&text, "random") else { continue };
-        let Ok(planned) = Planned::new(&scenario, Method::Exact) else { continue };
+        let Ok(planned) = CoveragePlan::new(&scenario, Method::Exact) else { continue };
         if !(2..=12).contains(&planned.tracks.waypoint_count()) {
             continue;
         }
@@ -153,7 +153,8 @@ fn real_areas_are_covered() {
         }
         let scenario = scenario::parse(&text, name).unwrap_or_else(|error| panic!("{error}"));
         for method in [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat, Method::Exact] {
-            let planned = Planned::new(&scenario, method).unwrap_or_else(|error| panic!("{name}: {error:#}"));
+            let planned =
+                CoveragePlan::new(&scenario, method).unwrap_or_else(|error| panic!("{name}: {error:#}"));
             let found = check_plan(&planned);
             println!(
                 "{name} {}: {} lanes, {} waypoints, {} cells, {:.1} s, bound {:.1} s",
@@ -279,10 +280,10 @@ fn exact_divisions_are_planned_by_companions_or_refused_by_name() {
             .replacen("[area]\n", "[area]\nmethod = \"exact\"\n", 1)
             .replace("id = ", "endurance_s = 7200\nid = ");
         let scenario = scenario::parse(&text, "exact").ok()?;
-        let best_s = Planned::flown(&scenario).ok()?.plan.max_cost_s();
+        let best_s = CoveragePlan::plan_as_companions(&scenario).ok()?.plan.max_cost_s();
         match Mission::prepare(scenario.clone(), &Progress::hidden()) {
             Ok(_) => {
-                let powell = Planned::new(&scenario, Method::PowellBinpat).expect("it was planned");
+                let powell = CoveragePlan::new(&scenario, Method::PowellBinpat).expect("it was planned");
                 assert!(best_s <= powell.plan.max_cost_s() * 1.0001, "seed {seed}");
                 Some(true)
             }
@@ -317,7 +318,8 @@ fn what_cannot_be_flown_is_refused_by_name() {
              start = [0, -10, 0]\n{more}\n"
         );
         let scenario = scenario::parse(&text, "asked").map_err(|error| error.to_string())?;
-        let planned = Planned::new(&scenario, Method::PowellBinpat).map_err(|error| error.to_string())?;
+        let planned =
+            CoveragePlan::new(&scenario, Method::PowellBinpat).map_err(|error| error.to_string())?;
         let longest_s = planned.sorties.iter().map(|sortie| sortie.flown_s).fold(0.0, f32::max);
         let costs_s = planned.max_cost_s();
         drop(planned);

@@ -13,7 +13,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Why a random area is not flown.
+/// Reason why a random area is not flown.
 const NO_FLIGHT: [&str; 6] = [
     "too many corners",
     "area too large",
@@ -183,7 +183,9 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
         let scenario = scenario::parse(&text, "area").expect("a scenario");
         let mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let radius_m = mission.scenario.vehicles[0].radius_m;
-        let pace = |bound_m: f32| margins::pace(bound_m, mission.tasks[0].required_clearance_m, radius_m);
+        let pace = |bound_m: f32| {
+            margins::speed_share_for_bound(bound_m, mission.tasks[0].required_clearance_m, radius_m)
+        };
         let room_m = (separation_m - safety_m) / 2.0 - TRACKING_M;
         assert_eq!(pace(room_m - 0.01), 1.0, "{separation_m} m beyond {safety_m} m");
         assert!(pace(room_m + 0.01) < 1.0, "{separation_m} m beyond {safety_m} m");

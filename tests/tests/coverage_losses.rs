@@ -2,13 +2,13 @@
 //!
 //! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
 
-use companion::swarm::fleet::Lot;
+use companion::swarm::fleet::DivisionInput;
 use flockmate_tests::areas::Shape;
 use flockmate_tests::{areas, covered, number};
 use host_sim::capacity::WAYPOINTS;
-use host_sim::coverage::Planned;
+use host_sim::coverage::CoveragePlan;
 use host_sim::mission::Mission;
-use host_sim::mission::stretches::next_lots;
+use host_sim::mission::stretches::next_division_inputs;
 use host_sim::progress::Progress;
 use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::scenario;
@@ -54,7 +54,7 @@ struct Draw {
     most_in_three: usize,
 }
 
-/// The row of a vehicle that nobody heard for so long that its part was divided among the others.
+/// The row of a vehicle that no other vehicle heard for so long that its part was divided among the others.
 const GIVEN_AWAY: &str = "Its part was given away: landing";
 
 /// What the radio does beside losing messages one by one.
@@ -262,7 +262,7 @@ fn are_whole(draw: Draw) {
 fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
     let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
     let places = photographs.stretches(&flight.path);
-    let places = places.flat_map(|shots| (0..shots.count).map(move |k| shots.place_m(k)));
+    let places = places.flat_map(|shots| (0..shots.count).map(move |k| shots.picture_at_m(k)));
     places.filter(|at_m| *at_m <= along_m + 0.01).filter_map(|at_m| flight.path.point_at(at_m)).collect()
 }
 
@@ -277,7 +277,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
         let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
         let Ok(mut plan) = mission.plan() else { return 0 };
         let mut whole: Vec<Point> = plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<Lot>>::new());
+        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
         let mut lives = vec![true; vehicles];
         let mut divided = 0;
         for _ in 0..3 {
@@ -291,9 +291,9 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
                 let dm = (flight.path.length_m() * 10.0) as u32;
                 let on_pad = flight.climb_m > 0.0 && random.next_u32().is_multiple_of(5);
                 let flown = if on_pad || dm == 0 { 0 } else { 1 + random.next_u32() % dm };
-                Lot { lives: lives[i], along_dm: flown.min(65_535) as u16 }
+                DivisionInput { alive: lives[i], along_dm: flown.min(65_535) as u16 }
             };
-            let lots: Vec<Lot> = (0..vehicles).map(|i| lot(i, &mut random)).collect();
+            let lots: Vec<DivisionInput> = (0..vehicles).map(|i| lot(i, &mut random)).collect();
             let before = plan;
             losses.push(lots.clone());
             // Where vehicles hold nearer to each other than any order of departures allows there is none, nor where a path
@@ -310,13 +310,13 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
             divided += 1;
             for (flight, lot) in before.flights.iter().zip(&lots) {
                 let mut done = pictures(flight, f32::from(lot.along_dm) / 10.0);
-                if !lot.lives {
+                if !lot.alive {
                     done.pop();
                 }
                 kept.extend(done);
             }
             for (i, flight) in plan.flights.iter().enumerate() {
-                assert!(lives[i] || !flight.task.flies(), "seed {seed}: {i} is lost");
+                assert!(lives[i] || !flight.task.leaves_pad(), "seed {seed}: {i} is lost");
             }
             let mut all = kept.clone();
             all.extend(plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)));
@@ -351,10 +351,10 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         let Ok(scenario) = scenario::parse(&text, "area") else { return 0 };
         let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
         let mut plan = mission.plan().expect("it was planned");
-        let planned = Planned::flown(&mission.scenario).expect("it was planned");
+        let planned = CoveragePlan::plan_as_companions(&mission.scenario).expect("it was planned");
         let whole = (0..planned.tracks.waypoint_count()).filter_map(|number| planned.tracks.waypoint(number));
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<Lot>>::new());
-        while let Some(lots) = next_lots(&plan) {
+        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
+        while let Some(lots) = next_division_inputs(&plan) {
             for (flight, lot) in plan.flights.iter().zip(&lots) {
                 kept.extend(pictures(flight, lot.along_m()));
             }

@@ -3,9 +3,9 @@
 
 use companion::link::frame::{self, Framer, Header};
 use companion::time::Instant;
-use host_sim::coverage::Planned;
+use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::export::{self, Item};
-use host_sim::coverage::flight::{Act, Stop};
+use host_sim::coverage::flight::{Stop, StopAction};
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use planner_core::Point;
@@ -109,11 +109,11 @@ impl Client {
 }
 
 /// Flies one vehicle's plan and returns its pictures.
-fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: AutopilotKind) -> Vec<Photo> {
+fn fly(planned: &CoveragePlan<'_>, stops: &[Stop], items: &[Item], personality: AutopilotKind) -> Vec<Photo> {
     let origin = planned.wanted.origin;
     let start = stops[0].position;
     let config = Config {
-        personality,
+        autopilot: personality,
         world_origin: origin,
         ekf_origin: origin,
         start,
@@ -136,18 +136,18 @@ fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: Autop
     }
     client.command(300, 0.0, 0.0);
     let mut seconds = 0;
-    while client.autopilot.truth().armed {
+    while client.autopilot.true_state().armed {
         client.run(1.0);
         seconds += 1;
         assert!(
             seconds < 600,
             "it flies for ever: {:?}, at item {:?}",
-            client.autopilot.truth(),
+            client.autopilot.true_state(),
             client.reached
         );
     }
     client.run(0.1);
-    let off = (client.autopilot.truth().position - stops[stops.len() - 1].position).xy().norm();
+    let off = (client.autopilot.true_state().position - stops[stops.len() - 1].position).xy().norm();
     assert!(off < 1.0, "{personality:?} came home {off} m off");
     let all: Vec<u16> = (u16::from(personality == AutopilotKind::Ardupilot)..items.len() as u16).collect();
     assert_eq!(client.reached, all, "each item is reported once");
@@ -164,13 +164,13 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
 /// Flies the plans of a scenario, and judges their pictures.
 fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
     let scenario = scenario::parse(text, "plans").expect("a scenario");
-    let planned = Planned::new(&scenario, Method::Binpat).expect("a plan");
+    let planned = CoveragePlan::new(&scenario, Method::Binpat).expect("a plan");
     let flights = planned.flights();
     assert_eq!(flights.len(), 2);
     for (sortie, stops, _) in &flights {
-        let items = export::items(&planned, sortie, stops);
+        let items = export::flight_items(&planned, sortie, stops);
         let photos = fly(&planned, stops, &items, personality);
-        let wanted: Vec<&Stop> = stops.iter().filter(|s| matches!(s.act, Act::Photo(_))).collect();
+        let wanted: Vec<&Stop> = stops.iter().filter(|s| matches!(s.act, StopAction::Photo(_))).collect();
         assert!(wanted.len() > 10);
         let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
         let label = format!("{personality:?}, {trigger}: {} of {}", photos.len(), wanted.len());
@@ -241,7 +241,7 @@ fn plans_above_terrain_are_flown_as_planned() {
             let text = scenario(name, trigger).replace("height_m", &terrain);
             judge(&text, personality, trigger);
             let found = scenario::parse(&text, "plans").expect("a scenario");
-            let planned = Planned::new(&found, Method::Binpat).expect("a plan");
+            let planned = CoveragePlan::new(&found, Method::Binpat).expect("a plan");
             let flights = planned.flights();
             let heights = flights.iter().flat_map(|(_, stops, _)| stops).filter(|stop| stop.lane.is_some());
             let heights: Vec<f32> = heights.map(|stop| stop.position.z).collect();

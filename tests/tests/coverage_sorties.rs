@@ -3,7 +3,7 @@
 use flockmate_tests::areas::{self, Shape};
 use host_sim::coverage::check::{Findings, check_plan};
 use host_sim::coverage::sorties::{BATTERY_SWAP_S, Sortie, USABLE_CHARGE};
-use host_sim::coverage::{Flight, Planned, export, flight};
+use host_sim::coverage::{CoveragePlan, Flight, export, flight};
 use host_sim::scenario::coverage::Method;
 use host_sim::scenario::{self, Scenario};
 use planner_core::coverage::pack::Route;
@@ -23,9 +23,9 @@ fn with_batteries(text: &str, endurance_s: f32) -> String {
 }
 
 /// From pad to pad, with stops at both ends of each lane and over the pad.
-fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
-    let stops = flight::stops(planned, route);
-    let steady_s = flight::times_s(planned, route, &stops).last().copied().expect("a flight has stops");
+fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
+    let stops = flight::route_stops(planned, route);
+    let steady_s = flight::stop_times_s(planned, route, &stops).last().copied().expect("a flight has stops");
     let (speed, accel) = (planned.vehicles[usize::from(route.vehicle)].cruise_mps, 1.5f32);
     // Over a leg from rest to rest.
     let lost_s = |leg_m: f32| match leg_m < speed * speed / accel {
@@ -38,7 +38,7 @@ fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
 }
 
 /// The lanes of a route, each with what of it belongs to the route, in the order of the path.
-fn lanes(planned: &Planned<'_>, route: &Route) -> Vec<Route> {
+fn lanes(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Route> {
     let numbers: Vec<u32> = (route.first..route.end).collect();
     let lanes = numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b));
     lanes.map(|lane| Route { first: lane[0], end: lane[lane.len() - 1] + 1, ..*route }).collect()
@@ -46,7 +46,7 @@ fn lanes(planned: &Planned<'_>, route: &Route) -> Vec<Route> {
 
 /// The fewest sorties within this time, one lane after the other as long as it fits: no part takes longer than what it
 /// is a part of. None where a lane alone does not fit.
-fn fewest(planned: &Planned<'_>, route: &Route, most_s: f32) -> Option<usize> {
+fn fewest(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Option<usize> {
     let (mut count, mut first) = (1, route.first);
     for lane in lanes(planned, route) {
         if flown_s(planned, &Route { first, end: lane.end, ..*route }) > most_s {
@@ -60,7 +60,7 @@ fn fewest(planned: &Planned<'_>, route: &Route, most_s: f32) -> Option<usize> {
 }
 
 /// The least time of so many sorties, by trying every cut.
-fn least_s(planned: &Planned<'_>, route: &Route, count: usize, most_s: f32) -> f32 {
+fn least_s(planned: &CoveragePlan<'_>, route: &Route, count: usize, most_s: f32) -> f32 {
     let lanes = lanes(planned, route);
     let cuts = (0..1u32 << (lanes.len() - 1)).filter(|cut| cut.count_ones() as usize == count - 1);
     let total_s = |cut: u32| {
@@ -87,7 +87,7 @@ struct Seen {
     every_cut: usize,
 }
 
-fn judge_route(planned: &Planned<'_>, route: &Route, most_s: f32, seen: &mut Seen) {
+fn judge_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32, seen: &mut Seen) {
     let sorties: Vec<_> = planned.sorties_of(route).collect();
     let flown: Vec<u32> = sorties.iter().flat_map(|sortie| sortie.route.waypoints()).collect();
     assert_eq!(flown, route.waypoints().collect::<Vec<_>>(), "the route's waypoints in their order");
@@ -116,7 +116,7 @@ fn judge_route(planned: &Planned<'_>, route: &Route, most_s: f32, seen: &mut See
 }
 
 /// In each round all begin together, when the last one is back.
-fn judge_rounds(planned: &Planned<'_>) {
+fn judge_rounds(planned: &CoveragePlan<'_>) {
     let rounds: Vec<_> = planned.sorties.chunk_by(|a, b| a.number == b.number).collect();
     let mut begin_s = 0.0;
     for round in rounds {
@@ -126,12 +126,12 @@ fn judge_rounds(planned: &Planned<'_>) {
     }
 }
 
-fn written(planned: &Planned<'_>, flights: &[Flight]) -> Vec<String> {
+fn written(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Vec<String> {
     let plan = |(sortie, stops, _): &Flight| {
-        let items = export::items(planned, sortie, stops);
-        export::plan(planned, &sortie.route, &items).to_string()
+        let items = export::flight_items(planned, sortie, stops);
+        export::qgc_plan(planned, &sortie.route, &items).to_string()
     };
-    flights.iter().map(plan).chain([export::csv(planned, flights)]).collect()
+    flights.iter().map(plan).chain([export::flights_csv(planned, flights)]).collect()
 }
 
 fn judge(seed: u64) -> Option<Seen> {
@@ -141,7 +141,7 @@ fn judge(seed: u64) -> Option<Seen> {
     let methods = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
     let method = methods[(seed % 3) as usize];
     let plain = scenario::parse(&text, "plain").ok()?;
-    let whole = Planned::new(&plain, method).ok()?;
+    let whole = CoveragePlan::new(&plain, method).ok()?;
     // From a little less than the longest lane takes alone to more than the longest route takes.
     let routes = &whole.plan.routes;
     let alone = routes.iter().flat_map(|route| lanes(&whole, route));
@@ -153,7 +153,7 @@ fn judge(seed: u64) -> Option<Seen> {
     let scenario: Scenario =
         scenario::parse(&with_batteries(&text, endurance_s), "batteries").expect("only batteries are new");
     let mut seen = Seen::default();
-    let planned = match Planned::new(&scenario, method) {
+    let planned = match CoveragePlan::new(&scenario, method) {
         Ok(planned) => planned,
         Err(error) => {
             let error = format!("{error:#}");
@@ -209,7 +209,8 @@ fn without_batteries_a_route_that_takes_longer_is_refused() {
                 endurance_s = 500\n";
     let sorties = |text: &str| -> Result<usize, String> {
         let scenario = scenario::parse(text, "one battery").expect("a scenario");
-        let planned = Planned::new(&scenario, Method::PowellBinpat).map_err(|error| format!("{error:#}"))?;
+        let planned =
+            CoveragePlan::new(&scenario, Method::PowellBinpat).map_err(|error| format!("{error:#}"))?;
         judge_route(&planned, &planned.plan.routes[0], 500.0 * USABLE_CHARGE, &mut Seen::default());
         Ok(planned.sorties.len())
     };

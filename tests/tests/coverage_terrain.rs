@@ -6,8 +6,8 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
 use flockmate_tests::shared_data;
 use host_sim::coverage::check::{Findings, check_plan};
-use host_sim::coverage::flight::{Act, Stop};
-use host_sim::coverage::{Planned, heights};
+use host_sim::coverage::flight::{Stop, StopAction};
+use host_sim::coverage::{CoveragePlan, heights};
 use host_sim::margins;
 use host_sim::scenario::{self, Scenario};
 use host_sim::terrain::HeightGrid;
@@ -49,11 +49,12 @@ struct Ceiling<'a> {
 }
 
 impl<'a> Ceiling<'a> {
-    fn of(planned: &Planned<'a>) -> Self {
+    fn of(planned: &CoveragePlan<'a>) -> Self {
         let terrain = planned.wanted.terrain.as_ref().unwrap();
         let field = FieldView::parse(&terrain.field).unwrap();
         let margin_m =
-            margins::needed(&planned.scenario.simulation, 0.0, &planned.scenario.vehicles).margin_m;
+            margins::required_distances(&planned.scenario.simulation, 0.0, &planned.scenario.vehicles)
+                .margin_m;
         let near_m = 3.0 * field.shape().cell_m + margin_m + 2.0 * terrain.grid.cell_m();
         Self { grid: &terrain.grid, near_m, slope: terrain.slope * 0.8 / std::f32::consts::SQRT_2 }
     }
@@ -64,10 +65,10 @@ impl<'a> Ceiling<'a> {
         for row in 0..rows {
             for column in 0..columns {
                 let cell = [column, row];
-                let Some(height_m) = self.grid.height(cell).filter(|height_m| *height_m > over) else {
+                let Some(height_m) = self.grid.cell_height(cell).filter(|height_m| *height_m > over) else {
                     continue;
                 };
-                let away = (self.grid.middle(cell) - place).abs();
+                let away = (self.grid.cell_centre(cell) - place).abs();
                 let far_m = (away.x - self.near_m).max(0.0) + (away.y - self.near_m).max(0.0);
                 over = over.max(height_m - self.slope * far_m);
             }
@@ -78,10 +79,13 @@ impl<'a> Ceiling<'a> {
 
 /// Random places around pictures that no picture shows where the ground is as high as there, not as below the camera: the
 /// plan need not see them, but overlaps should.
-fn hidden(planned: &Planned<'_>, stops: &[&Stop], places: usize) -> usize {
-    let (area, along) = (planned.wanted, planned.tracks.along());
-    let pictures: Vec<Point> =
-        stops.iter().filter(|stop| matches!(stop.act, Act::Photo(_))).map(|stop| stop.position).collect();
+fn hidden(planned: &CoveragePlan<'_>, stops: &[&Stop], places: usize) -> usize {
+    let (area, along) = (planned.wanted, planned.tracks.lane_direction());
+    let pictures: Vec<Point> = stops
+        .iter()
+        .filter(|stop| matches!(stop.act, StopAction::Photo(_)))
+        .map(|stop| stop.position)
+        .collect();
     let mut random = Pcg32::seed_from_u64(pictures.len() as u64);
     let mut beside = |side: f32| (areas::unit(&mut random) as f32 - 0.5) * side;
     let hidden = (0..places).filter(|k| {
@@ -105,7 +109,7 @@ fn hidden(planned: &Planned<'_>, stops: &[&Stop], places: usize) -> usize {
 /// What is wrong with a plan.
 fn judge(scenario: &Scenario, looks: usize) -> Result<Findings, String> {
     let method = scenario.area.as_ref().unwrap().method;
-    let planned = Planned::new(scenario, method).map_err(|error| format!("{error:#}"))?;
+    let planned = CoveragePlan::new(scenario, method).map_err(|error| format!("{error:#}"))?;
     let findings = check_plan(&planned);
     if !findings.is_clean() {
         return Err(format!("{:?}", Findings { over_time: Vec::new(), ..findings }));
@@ -113,7 +117,11 @@ fn judge(scenario: &Scenario, looks: usize) -> Result<Findings, String> {
     let (ceiling, area) = (Ceiling::of(&planned), planned.wanted);
     let tolerance_m = area.terrain.as_ref().unwrap().tolerance_m;
     let flights = planned.flights();
-    let low: Vec<_> = flights.iter().flat_map(|(_, stops, _)| stops).filter(|s| heights::is_low(s)).collect();
+    let low: Vec<_> = flights
+        .iter()
+        .flat_map(|(_, stops, _)| stops)
+        .filter(|s| heights::is_on_lane_or_transit(s))
+        .collect();
     let hidden = hidden(&planned, &low, 500);
     if hidden > 0 {
         return Err(format!("{hidden} of 500 places are hidden by their own height"));

@@ -9,7 +9,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Why a random area is not flown.
+/// Reason why a random area is not flown.
 const NO_FLIGHT: [&str; 5] =
     ["too many corners", "area too large", "bad area", "bad scenario", "no-fly zone"];
 

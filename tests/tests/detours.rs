@@ -1,7 +1,7 @@
 //! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of a planner that has the map.
 //!
 //! A vehicle flies from node to node; another one fell silent above its path and lies on the ground there. With a file of
-//! version 1 the whole column below is kept off.
+//! version 1 the whole column below is kept clear.
 
 use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::shared_data;
@@ -10,7 +10,7 @@ use host_sim::capacity::BOARDS;
 use host_sim::map::{self, Unknown, VoxelMap, building};
 use host_sim::roadmap::{self, Roadmap};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{Config, Sampling};
@@ -49,7 +49,7 @@ fn files(map: &VoxelMap, clearance_m: f32) -> Files {
         sampling: Sampling::Uniform,
     };
     let (roadmap, _) = roadmap::build(map, &[], &config).expect("there is free space");
-    let roadmap = roadmap.fit(&BOARDS[0]).expect("it can be cut down");
+    let roadmap = roadmap.fit_to_board(&BOARDS[0]).expect("it can be cut down");
     let header = roadmap::header(&config, Geodetic::default(), 0, GOALS);
     let Roadmap { nodes, edges, .. } = &roadmap;
     let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
@@ -78,7 +78,7 @@ fn grounds(name: &str, map: &VoxelMap, view: &RoadmapView<'_>, dice: &mut Dice) 
     for _ in 0..PLACES {
         let place = on_edge(view, dice);
         let truth_m = map.ground_below(&place).unwrap_or(f32::NEG_INFINITY);
-        match view.ground_around(&place) {
+        match view.ground_range_near(&place) {
             None => unknown += 1,
             Some((low_m, high_m)) => {
                 deeper += usize::from(truth_m < low_m - 0.5);
@@ -104,11 +104,11 @@ type Planned = Result<Vec<Point>, DetourError>;
 fn planned<const N: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
-    thing: KeepOff,
+    thing: KeepOutZone,
     ws: &mut SearchWorkspace<N>,
 ) -> Planned {
     let (mut nodes, mut path) = (Few::<u16, 64>::new(), Path::<64>::new());
-    detour::plan(view, request, &mut [thing], ws, &mut nodes, &mut path)?;
+    detour::plan_detour(view, request, &mut [thing], ws, &mut nodes, &mut path)?;
     Ok(path.waypoints().iter().map(|w| w.position).collect())
 }
 
@@ -151,8 +151,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
             fence: None,
         };
         let deep = Point::new(silent.x, silent.y, silent.z - 60.0);
-        let column = KeepOff { from: silent, to: deep, radius_m: KEPT_M, nature: Nature::Lying };
-        let exact = KeepOff { from: lies, to: lies, ..column };
+        let column = KeepOutZone { from: silent, to: deep, radius_m: KEPT_M, kind: ZoneKind::Grounded };
+        let exact = KeepOutZone { from: lies, to: lies, ..column };
         let by_desk = planned(&new, &request, column, &mut desk);
         let by_board = planned(&new, &request, column, &mut board);
         assert_eq!(by_desk, by_board, "desk and board fly other ways");
@@ -183,7 +183,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
 
 #[test]
 fn desk_and_board_find_the_detours_that_the_map_gives() {
-    let map = building::building(building::DEFAULT_SEED, 0.25).expect("the building");
+    let map = building::building_map(building::DEFAULT_SEED, 0.25).expect("the building");
     detours("building", &map.voxel_map(Unknown::Blocked), 0.8);
     for (name, resolution_m, clearance_m) in
         [("geb079", 0.08, 0.2), ("manufacturing", 0.086_642_2, 0.3), ("maze", 0.195_32, 0.3)]

@@ -10,8 +10,8 @@
 
 use std::collections::VecDeque;
 
-use companion::link::roster::{Roster, Standing};
-use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
+use companion::link::roster::{MemberStatus, RosterReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
 use companion::time::{Duration, Instant};
 use flockmate_tests::number;
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
@@ -56,19 +56,20 @@ struct Vehicle {
     dead: bool,
     heard_at: Vec<Option<Instant>>,
     heard_bits: Vec<u32>,
-    inbox: VecDeque<(f32, usize, u32, Option<Roster>)>,
+    inbox: VecDeque<(f32, usize, u32, Option<RosterReport>)>,
     left_by: bool,
 }
 
 impl Vehicle {
-    /// The waypoints of its path, and whether its part goes on after them.
+    /// The waypoints of its path, and whether its part continues after them.
     fn path(&self) -> (&[u32], bool) {
         (&self.part[..self.part.len().min(self.most)], self.part.len() > self.most)
     }
 
     /// Once it has photographed its part it flies home along its path, and down.
     fn fly_home(&mut self, done: bool) {
-        if self.home_s > 0.0 || (done && !self.fleet.is_dividing() && self.fleet.division() == self.division)
+        if self.home_s > 0.0
+            || (done && !self.fleet.is_dividing() && self.fleet.division_count() == self.division)
         {
             self.home_s += STEP_S;
             self.down |= self.home_s >= HOME_S;
@@ -131,8 +132,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let zero = Instant::ZERO;
     let mut vehicles: Vec<Vehicle> = (0..count)
         .map(|own| {
-            let mut fleet = Whole::new(own, count, Limits::of_flight(Duration::from_secs(60)));
-            fleet.begin(zero);
+            let mut fleet = Whole::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
+            fleet.begin_flight(zero);
             let part = parts(&whole, &fleet, count).0.swap_remove(own);
             Vehicle {
                 fleet,
@@ -176,15 +177,16 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 vehicle.heard_at[from] = Some(now);
                 vehicle.heard_bits[from] = bits;
                 if let Some(roster) = roster {
-                    vehicle.fleet.handle(from, &roster, false);
+                    vehicle.fleet.handle_roster(from, &roster, false);
                 }
             }
             let fresh = |at: Option<Instant>| at.is_some_and(|at| now - at <= Duration::from_secs(1));
             let (heard_at, bits) = (vehicle.heard_at.clone(), vehicle.heard_bits.clone());
-            let hearing = |rank: usize| Hearing {
-                direct_at: heard_at[rank],
+            let hearing = |rank: usize| MemberReception {
+                heard_at: heard_at[rank],
                 hears_us: bits[rank] >> own & 1 != 0,
-                by_others: (0..count).any(|j| j != rank && fresh(heard_at[j]) && bits[j] >> rank & 1 != 0),
+                heard_by_others: (0..count)
+                    .any(|j| j != rank && fresh(heard_at[j]) && bits[j] >> rank & 1 != 0),
             };
             let at = usize::from(vehicle.along_dm / WAYPOINT_DM);
             let (path, goes_on) = vehicle.path();
@@ -196,35 +198,35 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
             let ends = vehicle.left_by || vehicle.down || vehicle.fleet.is_excluded();
             let standing = match (ends, done && !goes_on) {
-                (false, _) => Standing::Alive,
-                (true, false) => Standing::Left,
-                (true, true) => Standing::Finished,
+                (false, _) => MemberStatus::Alive,
+                (true, false) => MemberStatus::Left,
+                (true, true) => MemberStatus::Finished,
             };
             vehicle.down |= ends;
             let stop_dm = vehicle.along_dm.saturating_add((STOP_S * PER_S * f32::from(WAYPOINT_DM)) as u16);
-            // On its way home it promises a place beyond its waypoints.
+            // On its path home it promises a place beyond its waypoints.
             let last_dm = if goes_on { length as u16 * WAYPOINT_DM } else { u16::MAX };
             let promise_dm = stop_dm.next_multiple_of(WAYPOINT_DM).min(last_dm);
-            let holds = vehicle.fleet.promise_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);
-            let own_view = Own {
-                standing,
+            let holds = vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);
+            let own_view = OwnReport {
+                status: standing,
                 waits: false,
                 division: vehicle.division,
-                done_dm: vehicle.along_dm,
-                promise_dm: Some(promise_dm),
+                progress_dm: vehicle.along_dm,
+                commitment_dm: Some(promise_dm),
                 holds,
-                asks,
+                wants_division: asks,
             };
             vehicle.fleet.step(now, &own_view, hearing);
             if vehicle.fleet.is_dividing() {
                 detected_s.get_or_insert(t_s);
             }
-            if vehicle.fleet.wants_hash() {
+            if vehicle.fleet.needs_division() {
                 let hash = parts(&whole, &vehicle.fleet, count).1;
                 vehicle.fleet.take_plan_crc(hash);
             }
-            if vehicle.fleet.division() > vehicle.division {
-                vehicle.division = vehicle.fleet.division();
+            if vehicle.fleet.division_count() > vehicle.division {
+                vehicle.division = vehicle.fleet.division_count();
                 // What is under way now is not part of it.
                 vehicle.part = counted_parts(&whole, &vehicle.fleet, count).swap_remove(own);
                 (vehicle.along_dm, vehicle.home_s) = (0, 0.0);
@@ -234,7 +236,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
             if lease == Lease::Ignored || vehicle.fleet.has_lease(now) {
                 vehicle.unheld_s = 0.0;
-                let most = vehicle.fleet.promise_dm().unwrap_or(u16::MAX);
+                let most = vehicle.fleet.commitment_dm().unwrap_or(u16::MAX);
                 let next = (vehicle.along_dm + (PER_S * STEP_S * f32::from(WAYPOINT_DM)) as u16).min(most);
                 for k in vehicle.along_dm / WAYPOINT_DM..next / WAYPOINT_DM {
                     if let Some(waypoint) = vehicle.path().0.get(usize::from(k)) {
@@ -265,7 +267,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             });
             let bits = bits.fold(0u32, |bits, j| bits | 1 << j);
             let due = step.is_multiple_of(2) || vehicles[own].fleet.is_dividing();
-            let roster = due.then(|| vehicles[own].fleet.message(0));
+            let roster = due.then(|| vehicles[own].fleet.roster_message(0));
             for (to, vehicle) in vehicles.iter_mut().enumerate() {
                 let cut = apart.is_some_and(|(from_s, to_s, side)| {
                     (from_s..to_s).contains(&t_s) && (side >> own & 1) != (side >> to & 1)
@@ -306,8 +308,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         needless: vehicles.iter().enumerate().filter(|_| clean).find_map(|(rank, vehicle)| {
             let given_away = vehicle.fleet.is_excluded() && !lost(rank);
             // Where half of the messages are lost, what others said may be known before what a vehicle said of itself.
-            let needless =
-                given_away || (loss < 0.5 && most == usize::MAX && vehicle.fleet.division() > losses.len());
+            let needless = given_away
+                || (loss < 0.5 && most == usize::MAX && vehicle.fleet.division_count() > losses.len());
             needless
                 .then(|| format!("seed {seed}, vehicle {rank}: given away {given_away}, {:?}", vehicle.fleet))
         }),
@@ -316,13 +318,13 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
 
 /// Whether it knows that all that live have computed its division.
 fn has_all_hashes(fleet: &Whole) -> bool {
-    let roster = fleet.message(0);
-    roster.hash != 0 && roster.entries.iter().all(|e| e.standing != Standing::Alive || e.agrees)
+    let roster = fleet.roster_message(0);
+    roster.hash != 0 && roster.entries.iter().all(|e| e.status != MemberStatus::Alive || e.agrees)
 }
 
 /// The parts by what counts alone.
 fn counted_parts(whole: &[u32], fleet: &Whole, count: usize) -> Vec<Vec<u32>> {
-    assert!(!fleet.wants_hash(), "what begins to count leaves nothing under way");
+    assert!(!fleet.needs_division(), "what begins to count leaves nothing under way");
     parts(whole, fleet, count).0
 }
 
@@ -333,7 +335,7 @@ fn owned_twice(vehicles: &[Vehicle], whole: &[u32], lease: Lease, now: Instant) 
         if vehicle.down || (lease == Lease::Obeyed && !vehicle.fleet.has_lease(now)) {
             continue;
         }
-        let end = vehicle.fleet.promise_dm().map_or(usize::MAX, |dm| usize::from(dm / WAYPOINT_DM));
+        let end = vehicle.fleet.commitment_dm().map_or(usize::MAX, |dm| usize::from(dm / WAYPOINT_DM));
         let from = usize::from(vehicle.along_dm / WAYPOINT_DM);
         for waypoint in vehicle.path().0.iter().take(end).skip(from) {
             if let Some(other) = owner[*waypoint as usize].replace(rank) {
@@ -384,19 +386,19 @@ fn vehicles_that_fly_on_without_their_lease_are_found() {
 /// The model found that such a vehicle flew on, while its promise already counted for another one.
 #[test]
 fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
-    let mut fleet = Whole::new(1, 3, Limits::of_flight(Duration::from_secs(60)));
-    fleet.begin(Instant::ZERO);
-    let own = Own { promise_dm: Some(WAYPOINT_DM), ..Own::default() };
+    let mut fleet = Whole::new(1, 3, FleetTimeouts::of_flight(Duration::from_secs(60)));
+    fleet.begin_flight(Instant::ZERO);
+    let own = OwnReport { commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
     let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);
-        let hears = Hearing { direct_at: Some(now), hears_us: true, by_others: false };
-        fleet.step(now, &own, |rank| if rank == heard { hears } else { Hearing::default() });
+        let hears = MemberReception { heard_at: Some(now), hears_us: true, heard_by_others: false };
+        fleet.step(now, &own, |rank| if rank == heard { hears } else { MemberReception::default() });
     };
     (1..50).for_each(|at_s| step(&mut fleet, at_s, 0));
-    assert_eq!(fleet.promise_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
-    let mut finished = fleet.message(0);
-    finished.entries[2].standing = Standing::Finished;
-    fleet.handle(2, &finished, false);
+    assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
+    let mut finished = fleet.roster_message(0);
+    finished.entries[2].status = MemberStatus::Finished;
+    fleet.handle_roster(2, &finished, false);
     step(&mut fleet, 50, 2);
-    assert_eq!(fleet.promise_dm(), Some(WAYPOINT_DM));
+    assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM));
 }

@@ -33,7 +33,7 @@ struct Pair {
 impl Pair {
     fn new(personality: AutopilotKind) -> Self {
         let config = sim_autopilot::Config {
-            personality,
+            autopilot: personality,
             estimator_ready_s: READY_S,
             ..sim_autopilot::Config::default()
         };
@@ -167,7 +167,7 @@ impl Pair {
     }
 
     fn at(&self) -> Point {
-        self.autopilot.truth().position
+        self.autopilot.true_state().position
     }
 
     fn entered(&self, state: State) -> u64 {
@@ -209,7 +209,7 @@ fn px4s_failsafe_is_left_alone_to_the_ground() {
     pair.until(State::Failsafe);
     // One setpoint would bring it back to Offboard by itself; the gimbal commands it sends are not ours to answer.
     pair.until(State::Aborted);
-    assert!(!pair.autopilot.truth().armed && pair.at().z < 0.31, "landed by its failsafe");
+    assert!(!pair.autopilot.true_state().armed && pair.at().z < 0.31, "landed by its failsafe");
     assert_eq!((pair.count(resumed_us, SETPOINT), pair.count(resumed_us, 77)), (0, 0));
     assert!(pair.asked(resumed_us, SET_MODE).is_empty() && pair.asked(resumed_us, ARM).is_empty());
 }
@@ -236,7 +236,7 @@ fn a_hold_px4s_pilot_chose_stays_until_offboard_and_a_word() {
     pair.run(5.0);
     assert_eq!(pair.companion.state(), State::PilotControl);
     assert!(pair.count(since_us, SETPOINT) > 40, "the place it is at, so that Offboard can be entered");
-    pair.autopilot.pilot_returns();
+    pair.autopilot.return_from_pilot();
     pair.run(5.0);
     assert_eq!(pair.companion.state(), State::PilotReturned, "Offboard without a resume");
     assert!(pair.asked(since_us, SET_MODE).is_empty());
@@ -303,7 +303,7 @@ fn a_stream_that_still_runs_when_arducopters_pilot_returns_holds_the_place() {
     pair.until(State::PilotControl);
     pair.run(3.0);
     let at = pair.at();
-    pair.autopilot.pilot_returns();
+    pair.autopilot.return_from_pilot();
     pair.run(5.0);
     assert!((pair.at() - at).norm() < 0.2, "moved from {at} to {}", pair.at());
     assert_eq!(pair.companion.state(), State::PilotReturned);
@@ -327,7 +327,7 @@ fn arducopters_ground_station_failsafe_ends_the_mission() {
     pair.ground(1, HEARTBEAT, &beat);
     pair.until(State::Aborted);
     assert_eq!((pair.count(since_us, SETPOINT), pair.asked(since_us, SET_MODE).len()), (0, 0));
-    assert!(!pair.autopilot.truth().armed);
+    assert!(!pair.autopilot.true_state().armed);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! All logs of the shared data: read as pymavlink reads them, and survived in whatever state they arrive.
 //!
 //! Damage is seeded by the log's place in the folder and the round. `FLOCKMATE_FUZZ_ROUNDS=20 cargo test -p flockmate-tests
-//! --test logs` goes on for twenty rounds instead of one.
+//! --test logs` continues for twenty rounds instead of one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -120,7 +120,7 @@ struct Victims {
 impl Victims {
     fn new() -> Self {
         let autopilot = |personality| {
-            let config = sim_autopilot::Config { personality, ..sim_autopilot::Config::default() };
+            let config = sim_autopilot::Config { autopilot: personality, ..sim_autopilot::Config::default() };
             Autopilot::new(&config).unwrap()
         };
         Self {
@@ -146,7 +146,7 @@ impl Victims {
         }
         for at in 0..2 {
             self.autopilots[at].step(0.004, 0.0);
-            let truth = self.autopilots[at].truth();
+            let truth = self.autopilots[at].true_state();
             assert!(truth.position.iter().chain(truth.velocity.iter()).all(|x| x.is_finite()), "{truth:?}");
             let mut out = [0; 2048];
             loop {

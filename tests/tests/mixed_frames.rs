@@ -9,10 +9,10 @@ use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::swarm::ground_station::GroundStation;
-use host_sim::swarm::member::{Member, is_finished};
+use host_sim::swarm::member::{SimulatedVehicle, is_finished};
 use host_sim::swarm::radio::{Radio, RadioConfig};
 use host_sim::swarm::step::STEP_US;
-use host_sim::swarm::vehicles::members;
+use host_sim::swarm::vehicles::vehicles_on_pads;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::Point;
 use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
@@ -103,12 +103,12 @@ fn fly(seed: u64) -> Errors {
     let scenario = scenario::parse(&text, "mixed frames").unwrap_or_else(|e| panic!("mission {seed}: {e}"));
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
     let plan = mission.plan().expect("they fly side by side");
-    let mut members = members(&mission).expect("good vehicles");
+    let mut members = vehicles_on_pads(&mission).expect("good vehicles");
     // One station more than vehicles: it listens.
     let listener = members.len();
     let mut radio = Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);
     let (mut framer, mut ground_station, mut log) = (Framer::new(), GroundStation::new(255), Vec::new());
-    let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
+    let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.true_state().position).collect();
     places.push(Point::zeros());
     let mut tracks: Vec<Vec<Point>> = vec![Vec::new(); members.len()];
     let mut nearest_m = vec![f32::INFINITY; members.len()];
@@ -122,7 +122,7 @@ fn fly(seed: u64) -> Errors {
                 let own = mission.own_plan(&plan, i).expect("few gates");
                 member.answer_plan(now_us, Ok(&own));
             }
-            let truth = member.autopilot.truth().position;
+            let truth = member.autopilot.true_state().position;
             places[i] = truth;
             tracks[i].push(truth);
             let telemetry = member.companion.telemetry();
@@ -156,7 +156,7 @@ fn fly(seed: u64) -> Errors {
     }
     errors.goal_m = nearest_m.into_iter().fold(0.0, f32::max);
     let log: Vec<_> = log.iter().map(|e| format!("{:.1} s {:?}: {}", e.t_s, e.vehicle, e.text)).collect();
-    let ends: Vec<_> = members.iter().map(Member::end).collect();
+    let ends: Vec<_> = members.iter().map(SimulatedVehicle::describe_end).collect();
     assert!(ends.iter().all(|end| end == "Done"), "mission {seed}: {ends:?}\n{text}\n{}", log.join("\n"));
     assert!(heard > 100, "mission {seed}: {heard} positions heard");
     assert!(errors.known_m < RIGHT_M && errors.broadcast_m < RIGHT_M, "mission {seed}: {errors:?}\n{text}");

@@ -120,7 +120,7 @@ fn the_simulated_arducopter_answers_as_the_recorded_one_did() {
     let Some(path) = shared_data("mavlink/arducopter-4.6-guided.tlog") else { return };
     let origin = Geodetic { lat_deg: -35.363_262, lon_deg: 149.165_237, alt_m: 584.09 };
     let config = Config {
-        personality: AutopilotKind::Ardupilot,
+        autopilot: AutopilotKind::Ardupilot,
         world_origin: origin,
         ekf_origin: origin,
         estimator_ready_s: 41.6,
@@ -204,7 +204,7 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
                 lon_deg: f64::from(global.lon) * 1e-7,
                 alt_m: f64::from(global.alt) * 1e-3,
             };
-            let age_s = (now - at).secs_f32();
+            let age_s = (now - at).as_secs_f32();
             let apart = telemetry.position + telemetry.velocity * age_s - geodetic_to_enu(&origin, &place);
             // The two are sent up to a stream's period apart.
             assert!(age_s > 0.2 || apart.xy().norm() < 0.1, "{apart} at {} s, {age_s} s old", entry.t_s);

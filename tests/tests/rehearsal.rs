@@ -205,7 +205,7 @@ fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
     flight.until("Climb → Follow", || ());
     flight.until("Pilot has control: mission stopped", || pilot.command(1, 176, PX4_HOLD));
-    // Offboard alone does not go on; the operator's word does.
+    // Offboard alone does not continue; the operator's word does.
     flight.until("Resumed after the pilot", || {
         pilot.command(1, 176, PX4_OFFBOARD);
         operator.command(191, 193, [1.0, 0.0, 0.0]);

@@ -8,7 +8,7 @@
 //!
 //! - No conflict: where two vehicles that fly the plan can be at the same time, they are no nearer than the safety distance.
 //!   A gate counts as open as soon as some report may open it.
-//! - No deadlock: some vehicle can go on until all have landed. A gate counts as open only if every report opens it.
+//! - No deadlock: some vehicle can continue until all have landed. A gate counts as open only if every report opens it.
 //!
 //! Planted errors must be found. Which plans they spoil is known without the search: gates only open, so two vehicles can be at
 //! two places at once if they come there when each goes as far as it may and no further than its place, with all others out of the
@@ -129,7 +129,7 @@ impl Model {
         Self { courses, obeys, near }
     }
 
-    /// Whether vehicle `i` may go on from its stretch; `wrong_m` is what reports are wrong by.
+    /// Whether vehicle `i` may continue from its stretch; `wrong_m` is what reports are wrong by.
     fn goes_on(&self, state: &State, i: usize, most: bool) -> bool {
         let course = &self.courses[i];
         if state[i] >= course.last() {
@@ -256,7 +256,7 @@ impl Short {
         let mut rng = Random::new(seed);
         let swarm = Swarm::small(count, &mut rng);
         let plan = if swarm.tasks.len() == count { swarm.plan().ok()? } else { return None };
-        if plan.flights.iter().any(|f| !f.task.flies() || end_m(f) + f.climb_m > LONGEST_M) {
+        if plan.flights.iter().any(|f| !f.task.leaves_pad() || end_m(f) + f.climb_m > LONGEST_M) {
             return None;
         }
         let owns = swarm.owns(&plan).expect("an Ok plan has all parts");

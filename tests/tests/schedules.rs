@@ -70,7 +70,7 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
         let reported: Vec<f32> = (0..count)
             .map(|i| match along[i] {
                 m if m <= -flights[i].climb_m => m,
-                m if flights[i].task.flies() && m >= end_m(&flights[i]) => m + 1.0,
+                m if flights[i].task.leaves_pad() && m >= end_m(&flights[i]) => m + 1.0,
                 m => (m + rng.uniform(-1.0, 1.0).signum() * PROGRESS_ERROR_M).min(end_m(&flights[i])),
             })
             .collect();
@@ -162,7 +162,7 @@ fn one(seed: u64) -> Sum {
         }
     };
     sum.planned = 1;
-    sum.flights = plan.flights.iter().filter(|f| f.task.flies()).count() as u64;
+    sum.flights = plan.flights.iter().filter(|f| f.task.leaves_pad()).count() as u64;
     let landed_s = |f: &Flight<WAYPOINTS>| {
         let last = f.path.waypoints().last().map_or(0.0, |w| w.leave_s);
         f.depart_s + last + f.descent_m / swarm.schedule.vertical_mps

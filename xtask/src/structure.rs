@@ -14,7 +14,7 @@ use anyhow::{Result, ensure};
 
 use self::sources::Tree;
 
-/// The crates that are looked at, by folder.
+/// The crates that are checked, by folder.
 const CRATES: [&str; 7] =
     ["planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 

@@ -55,7 +55,7 @@ pub fn estimator_ready(flags: u16) -> bool {
 const MAX_VARIANCE_RATIO: f32 = 0.8;
 
 /// Whether a variance ratio is sound; NaN is not.
-pub(crate) fn ratio_is_sound(ratio: f32) -> bool {
+pub(crate) fn is_variance_ratio_good(ratio: f32) -> bool {
     ratio < MAX_VARIANCE_RATIO
 }
 

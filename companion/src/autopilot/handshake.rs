@@ -25,7 +25,7 @@ const IN_PROGRESS: u8 = 5;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Handshake {
     /// When arming was last requested.
-    asked_at: Option<Instant>,
+    requested_at: Option<Instant>,
     /// Requests without an answer.
     unanswered: u8,
     /// The last request was denied.
@@ -33,65 +33,67 @@ pub(crate) struct Handshake {
     /// When arming was accepted: from then on it is not requested again.
     accepted_at: Option<Instant>,
     /// HEARTBEAT was missing since arming was last requested: it may have been armed, and disarmed by its pilot, unseen.
-    gap: bool,
+    heartbeat_gap: bool,
     /// Disarming was refused.
     disarm_refused: bool,
     /// Offboard or Guided was entered for this mission, and no other mode but landing was seen since.
-    ours: bool,
-    /// The landing detector said air since arming was requested.
+    in_own_mode: bool,
+    /// The landing detector reported flight since arming was requested.
     flown: bool,
     /// Refusals reported in this state: command and result.
     reported: [Option<(u16, u8)>; MAX_REFUSALS],
 }
 
 impl Handshake {
-    /// Forgets what belongs to the state left.
+    /// Clears what belongs to the state that was left.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
         self.reported = [None; MAX_REFUSALS];
         self.disarm_refused = false;
         if to == State::Arming {
-            *self = Self { ours: true, ..Self::default() };
+            *self = Self { in_own_mode: true, ..Self::default() };
         }
         if from == State::PilotReturned {
-            self.ours = true;
+            self.in_own_mode = true;
         }
     }
 
-    /// Looks at the mode and at the landing detector.
-    pub(crate) fn watch(&mut self, state: State, t: &Telemetry) {
+    /// Updates the handshake from the mode and the landing detector.
+    pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
         let kind = t.kind.unwrap_or_default();
         let on_ground = t.on_ground != Some(false);
-        self.ours &= t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
+        self.in_own_mode &= t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
         if !on_ground && t.armed {
             self.flown = true;
         }
         if matches!(state, State::Aborted | State::Done) && on_ground && !t.armed {
-            self.ours = false;
+            self.in_own_mode = false;
         }
     }
 
     /// Whether the armed bit is overdue after an accepted request.
-    pub(crate) fn is_armed_unseen(&self, now: Instant) -> bool {
+    pub(crate) fn is_armed_bit_overdue(&self, now: Instant) -> bool {
         self.accepted_at.is_some_and(|at| now - at >= ARMED_TIMEOUT)
     }
 
     /// Whether arming was requested as often as allowed without any answer.
-    pub(crate) fn is_unanswered(&self, now: Instant) -> bool {
-        let waited = self.asked_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
+    pub(crate) fn is_arming_unanswered(&self, now: Instant) -> bool {
+        let waited = self.requested_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
         let silent = !self.denied && self.accepted_at.is_none();
-        waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.gap)
+        waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.heartbeat_gap)
     }
 
     /// Whether arming is to be requested now; notes that it is.
-    pub(crate) fn asks_to_arm(&mut self, now: Instant, armed: bool) -> bool {
-        let due = match self.asked_at {
+    pub(crate) fn should_request_arming(&mut self, now: Instant, armed: bool) -> bool {
+        let due = match self.requested_at {
             None => true,
             Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
-            Some(at) => now - at >= ARMED_TIMEOUT && self.unanswered < MAX_ARMING_TRIES && !self.gap,
+            Some(at) => {
+                now - at >= ARMED_TIMEOUT && self.unanswered < MAX_ARMING_TRIES && !self.heartbeat_gap
+            }
         };
         let asks = due && !armed && self.accepted_at.is_none();
         if asks {
-            (self.asked_at, self.denied, self.gap) = (Some(now), false, false);
+            (self.requested_at, self.denied, self.heartbeat_gap) = (Some(now), false, false);
             self.unanswered += 1;
         }
         asks
@@ -103,23 +105,28 @@ impl Handshake {
     }
 
     /// Whether the autopilot is in a mode of this mission's.
-    pub(crate) fn is_ours(&self) -> bool {
-        self.ours
+    pub(crate) fn is_in_own_mode(&self) -> bool {
+        self.in_own_mode
     }
 
-    /// Whether the landing detector said air since arming was requested.
+    /// Whether the landing detector reported flight since arming was requested.
     pub(crate) fn has_flown(&self) -> bool {
         self.flown
     }
 
     /// HEARTBEAT is missing.
-    pub(crate) fn note_gap(&mut self) {
-        self.gap = true;
+    pub(crate) fn note_heartbeat_gap(&mut self) {
+        self.heartbeat_gap = true;
     }
 
     /// Takes the autopilot's answer to a request: what became of arming. Returns a refusal that is to be reported: text, command
     /// and result.
-    pub(crate) fn take(&mut self, state: State, ack: &Ack, now: Instant) -> Option<(&'static str, [u32; 2])> {
+    pub(crate) fn handle_ack(
+        &mut self,
+        state: State,
+        ack: &Ack,
+        now: Instant,
+    ) -> Option<(&'static str, [u32; 2])> {
         let refused = !matches!(ack.result, ACCEPTED | IN_PROGRESS);
         match (state, ack.command) {
             (State::Arming, ARM_DISARM) if ack.result == ACCEPTED => {

@@ -7,7 +7,7 @@ use super::{ardupilot, px4};
 
 /// An autopilot the companion can fly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kind {
+pub enum AutopilotKind {
     /// PX4, flown in Offboard.
     #[default]
     Px4,
@@ -15,7 +15,7 @@ pub enum Kind {
     ArduPilot,
 }
 
-impl Kind {
+impl AutopilotKind {
     /// The kind by `MAV_AUTOPILOT`; `None` for one the companion cannot fly, and for a component
     /// that is no flight controller (8).
     pub fn from_heartbeat(autopilot: u8) -> Option<Self> {
@@ -59,7 +59,7 @@ impl Kind {
     }
 
     /// Mask of a setpoint to move.
-    pub fn move_mask(self) -> u16 {
+    pub fn move_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_POSITION_VELOCITY_ACCELERATION,
             Self::ArduPilot => ardupilot::MASK_POSITION_VELOCITY,
@@ -74,8 +74,8 @@ impl Kind {
         }
     }
 
-    /// Mask of a setpoint to stop wherever that is.
-    pub fn stop_mask(self) -> u16 {
+    /// Type mask of a setpoint that stops at the current place.
+    pub fn stop_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_VELOCITY,
             Self::ArduPilot => ardupilot::MASK_VELOCITY,
@@ -92,7 +92,7 @@ impl Kind {
 
     /// The limits of one whose parameters have their defaults.
     pub(crate) fn default_limits(self) -> AutopilotLimits {
-        AutopilotLimits::of(self.limits())
+        AutopilotLimits::from_defaults(self.limits())
     }
 
     /// Streams to ask for on connecting: message id and interval in microseconds, −1 off.

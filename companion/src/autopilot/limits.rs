@@ -60,7 +60,7 @@ pub struct AutopilotLimits {
 
 impl AutopilotLimits {
     /// The defaults of parameters.
-    pub(crate) fn of(parameters: &[LimitParameter]) -> Self {
+    pub(crate) fn from_defaults(parameters: &[LimitParameter]) -> Self {
         let mut limits = Self { values: [f32::INFINITY; LIMIT_KINDS] };
         for parameter in parameters {
             limits.values[parameter.limit as usize] = parameter.default * parameter.unit;

@@ -3,7 +3,7 @@
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
 
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::autopilot::handshake::Handshake;
 use crate::autopilot::limits::AutopilotLimits;
 use crate::autopilot::telemetry::{Ack, Telemetry};
@@ -50,7 +50,7 @@ const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
 /// The situation that requests follow from.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Situation {
+pub(crate) struct RequestContext {
     pub(crate) now: Instant,
     pub(crate) state: State,
     /// Since the state was entered.
@@ -70,16 +70,16 @@ pub(crate) struct Requests {
     /// The limits that the autopilot's parameters set.
     limits: AutopilotLimits,
     /// Which of them were read, by bits, and how often they may still be requested.
-    read: u16,
+    limits_read: u16,
     tries: u8,
     /// Next of the streams to be requested.
-    stream: usize,
+    next_stream: usize,
 }
 
 impl Default for Requests {
     fn default() -> Self {
-        let limits = Kind::default().default_limits();
-        Self { handshake: Handshake::default(), limits, read: 0, tries: 0, stream: usize::MAX }
+        let limits = AutopilotKind::default().default_limits();
+        Self { handshake: Handshake::default(), limits, limits_read: 0, tries: 0, next_stream: usize::MAX }
     }
 }
 
@@ -94,48 +94,55 @@ impl Requests {
         &self.limits
     }
 
-    /// Forgets what belongs to the state left.
+    /// Clears what belongs to the state that was left.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
         self.handshake.state_changed(from, to);
     }
 
-    /// Looks at the mode and at the landing detector.
-    pub(crate) fn watch(&mut self, state: State, telemetry: &Telemetry) {
-        self.handshake.watch(state, telemetry);
+    /// Updates the handshake from the mode and the landing detector.
+    pub(crate) fn update_mode_and_landed(&mut self, state: State, telemetry: &Telemetry) {
+        self.handshake.update_mode_and_landed(state, telemetry);
     }
 
     /// Starts requesting the streams from the first, and on the ground the limits. Returns whether those are others now.
-    pub(crate) fn begin(
+    pub(crate) fn start_on_connect(
         &mut self,
         telemetry: &Telemetry,
-        s: &Situation,
+        s: &RequestContext,
         timers: &mut Timers,
         links: &mut Links,
     ) -> bool {
-        self.stream = 0;
+        self.next_stream = 0;
         // In flight the limits stay as they are.
         let reads = !s.state.streams_setpoints() && !telemetry.armed;
         if reads {
             self.limits = telemetry.kind().default_limits();
-            (self.read, self.tries) = (0, MAX_LIMIT_REQUESTS);
+            (self.limits_read, self.tries) = (0, MAX_LIMIT_REQUESTS);
             timers.set(Timer::Limit, s.now);
         }
         timers.set(Timer::Streams, s.now + STREAMS_RETRY_EVERY);
-        if telemetry.kind() == Kind::ArduPilot {
+        if telemetry.kind() == AutopilotKind::ArduPilot {
             links.push(Link::Autopilot, Outgoing::Parameter("GUID_TIMEOUT", s.guided_timeout_s));
         }
         reads
     }
 
     /// Requests the next limit that was not read.
-    fn repeat_limits(&mut self, kind: Kind, now: Instant, timers: &mut Timers, links: &mut Links) {
+    fn request_next_limit(
+        &mut self,
+        kind: AutopilotKind,
+        now: Instant,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
         if self.tries == 0 || !timers.is_due(Timer::Limit, now) {
             return;
         }
         let all = kind.limits();
         let from = usize::from(self.tries);
         // Parameters are requested in turn, so that one that does not exist holds back none.
-        let missing = (from..from + all.len()).map(|i| i % all.len()).find(|i| self.read & 1 << i == 0);
+        let missing =
+            (from..from + all.len()).map(|i| i % all.len()).find(|i| self.limits_read & 1 << i == 0);
         let Some(limit) = missing.and_then(|i| all.get(i)) else {
             self.tries = 0;
             return;
@@ -155,7 +162,7 @@ impl Requests {
         let mut changed = false;
         for (i, limit) in telemetry.kind().limits().iter().enumerate() {
             if limit.name.as_bytes() == name && p[24] == PARAM_TYPE_REAL32 && !telemetry.armed {
-                self.read |= 1 << i;
+                self.limits_read |= 1 << i;
                 changed |= self.limits.set(limit, value);
             }
         }
@@ -163,10 +170,10 @@ impl Requests {
     }
 
     /// Requests whatever is due. Returns whether the limits are others now.
-    pub(crate) fn poll(
+    pub(crate) fn request_due(
         &mut self,
         telemetry: &Telemetry,
-        s: &Situation,
+        s: &RequestContext,
         timers: &mut Timers,
         links: &mut Links,
     ) -> bool {
@@ -174,19 +181,20 @@ impl Requests {
         let heard = telemetry.heartbeat_at.is_some();
         let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
         if heard {
-            self.repeat_limits(kind, now, timers, links);
+            self.request_next_limit(kind, now, timers, links);
         }
         let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
-        let tunes = lost && timers.is_due(Timer::Streams, now) && self.begin(telemetry, s, timers, links);
-        let doubts = telemetry.doubts_origin();
+        let tunes =
+            lost && timers.is_due(Timer::Streams, now) && self.start_on_connect(telemetry, s, timers, links);
+        let doubts = telemetry.is_origin_doubtful();
         if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now) {
             timers.set(Timer::Origin, now + if doubts { ORIGIN_RETRY_EVERY } else { REQUEST_RETRY_EVERY });
             links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
         }
         for _ in 0..STREAM_REQUESTS_PER_STEP {
-            if let Some(&(id, interval_us)) = kind.streams().get(self.stream) {
+            if let Some(&(id, interval_us)) = kind.streams().get(self.next_stream) {
                 links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
-                self.stream += 1;
+                self.next_stream += 1;
             }
         }
         if heard && !silent && timers.is_due(Timer::Streams, now) {
@@ -194,21 +202,27 @@ impl Requests {
         }
         if s.state == State::Arming {
             if silent {
-                self.handshake.note_gap();
+                self.handshake.note_heartbeat_gap();
             }
-            if self.handshake.asks_to_arm(now, telemetry.armed) {
+            if self.handshake.should_request_arming(now, telemetry.armed) {
                 links.push(Link::Autopilot, Outgoing::Arm(true));
             }
         } else {
-            self.repeat_state(telemetry, s, timers, links);
+            self.request_for_state(telemetry, s, timers, links);
         }
         tunes
     }
 
     /// Requests what the state waits for.
-    fn repeat_state(&self, telemetry: &Telemetry, s: &Situation, timers: &mut Timers, links: &mut Links) {
+    fn request_for_state(
+        &self,
+        telemetry: &Telemetry,
+        s: &RequestContext,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
         let looks = s.state == State::Land && !s.may_land;
-        if looks || !timers.take(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
+        if looks || !timers.take_due(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
             return;
         }
         let (kind, mode) = (telemetry.kind(), telemetry.custom_mode);
@@ -249,7 +263,7 @@ impl Requests {
         links: &mut Links,
     ) {
         let streams = telemetry.kind().streams();
-        if self.stream < streams.len() {
+        if self.next_stream < streams.len() {
             return;
         }
         for &(id, interval_us) in streams.iter().filter(|(_, interval_us)| *interval_us > 0.0) {
@@ -265,20 +279,20 @@ impl Requests {
         if ack.to != (0, 0) && ack.to != (own, crate::COMPANION_COMPONENT) {
             return;
         }
-        if let Some((text, numbers)) = self.handshake.take(state, ack, now) {
-            links.say_count(true, text, numbers);
+        if let Some((text, numbers)) = self.handshake.handle_ack(state, ack, now) {
+            links.send_text_with_numbers(true, text, numbers);
         }
     }
 }
 
-impl Situation {
+impl RequestContext {
     /// Whether a landing may be requested: once the safety filter has looked down and the column is clear, or whatever is below.
-    pub(crate) fn may_land(in_state: Duration, column_clear: bool, must_land: bool) -> bool {
+    pub(crate) fn may_request_landing(in_state: Duration, column_clear: bool, must_land: bool) -> bool {
         must_land || (in_state >= LAND_REQUEST_AFTER && column_clear)
     }
 }
 
 /// Whether the battery's charge was reported lately, or does not count (`low_percent` not above zero).
-pub(crate) fn battery_reported(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
+pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
     low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= MAX_BATTERY_AGE
 }

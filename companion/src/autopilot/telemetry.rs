@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::autopilot::ardupilot;
 use crate::link::frame::Frame;
 use crate::margins;
@@ -86,7 +86,7 @@ pub(crate) struct Ack {
 
 /// The effect of a frame on the telemetry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
+pub enum TelemetryChange {
     /// No change, or a frame for another component.
     None,
     /// Some value is newer.
@@ -104,7 +104,7 @@ pub enum Change {
 pub struct Telemetry {
     sequence: SequenceFilter,
     /// Which autopilot it is, from its first HEARTBEAT on; others are then ignored.
-    pub kind: Option<Kind>,
+    pub kind: Option<AutopilotKind>,
     /// When HEARTBEAT was last heard.
     pub heartbeat_at: Option<Instant>,
     /// Flight mode, the autopilot's own number.
@@ -113,20 +113,20 @@ pub struct Telemetry {
     pub armed: bool,
     /// `MAV_STATE`.
     pub system_status: u8,
-    /// Whether the landing detector says ground; `None` before the first report.
+    /// Whether the landing detector reports ground; `None` before the first report.
     pub on_ground: Option<bool>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
     /// Height above home in metres, as ArduCopter's NAV_TAKEOFF counts it.
     pub above_home_m: f32,
     /// Whether there is no mission whose origin the EKF's is compared with.
-    anywhere: bool,
+    accept_any_origin: bool,
     /// EKF origin, once heard.
     pub ekf_origin: Option<Geodetic>,
     /// The origin that was last used while armed.
-    flown_origin: Option<Geodetic>,
+    last_armed_origin: Option<Geodetic>,
     /// Since when only other origins are heard.
-    doubted_at: Option<Instant>,
+    origin_doubtful_since: Option<Instant>,
     /// The EKF origin moved while armed.
     pub(crate) origin_moved: bool,
     /// Error that the estimator last reported, metres, and when; infinite for an estimate that is
@@ -140,28 +140,28 @@ pub struct Telemetry {
     pub velocity: Point,
     /// The last answer to a command, until it is taken.
     pub(crate) ack: Option<Ack>,
-    /// When each stream of [`Kind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
+    /// When each stream of [`AutopilotKind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
     streams: [Instant; MAX_STREAMS],
     boot_ms: u32,
     /// Time of the last position used, by the autopilot's clock, milliseconds.
-    read_boot_ms: u32,
+    position_boot_ms: u32,
     /// When a position was last read, used or not.
-    read_at: Option<Instant>,
+    position_read_at: Option<Instant>,
     settled_at: Instant,
     /// After a silence positions count from then on.
-    counts_from: Instant,
+    positions_valid_from: Instant,
     estimator_ready: bool,
 }
 
 impl Telemetry {
-    /// Telemetry before any frame. With `anywhere` (a board without a mission) an EKF origin is
+    /// Telemetry before any frame. With `accept_any_origin` (a board without a mission) an EKF origin is
     /// accepted anywhere.
     pub fn new(anywhere: bool) -> Self {
-        Self { battery_percent: -1, anywhere, ..Self::default() }
+        Self { battery_percent: -1, accept_any_origin: anywhere, ..Self::default() }
     }
 
     /// Which autopilot flies the vehicle; PX4 while none was heard.
-    pub(crate) fn kind(&self) -> Kind {
+    pub(crate) fn kind(&self) -> AutopilotKind {
         self.kind.unwrap_or_default()
     }
 
@@ -177,12 +177,12 @@ impl Telemetry {
 
     /// Time since the last HEARTBEAT; the greatest value if none came.
     pub fn heartbeat_age(&self, now: Instant) -> Duration {
-        age(self.heartbeat_at, now)
+        time_since(self.heartbeat_at, now)
     }
 
     /// Time since the last usable position; the greatest value if none is known.
     pub fn position_age(&self, now: Instant) -> Duration {
-        age(self.position_at, now)
+        time_since(self.position_at, now)
     }
 
     /// Bound of the estimate's error, metres, by what the autopilot reports and by what the
@@ -197,8 +197,8 @@ impl Telemetry {
     }
 
     /// Whether another EKF origin is in doubt, so that the autopilot is to be asked.
-    pub(crate) fn doubts_origin(&self) -> bool {
-        self.doubted_at.is_some()
+    pub(crate) fn is_origin_doubtful(&self) -> bool {
+        self.origin_doubtful_since.is_some()
     }
 
     /// Whether the position jumped lately.
@@ -206,12 +206,17 @@ impl Telemetry {
         now < self.settled_at
     }
 
-    /// Takes a frame of the autopilot link in.
-    pub fn handle(&mut self, now: Instant, mission_origin: &Geodetic, frame: &Frame) -> Change {
+    /// Updates the telemetry from a frame of the autopilot link.
+    pub fn handle_frame(
+        &mut self,
+        now: Instant,
+        mission_origin: &Geodetic,
+        frame: &Frame,
+    ) -> TelemetryChange {
         // An origin is confirmed while armed, so a forwarded one needs no place in the sequence, and takes none from the true ones.
         let confirmed = self.armed && frame.message_id == GPS_GLOBAL_ORIGIN_DATA::ID;
         if !confirmed && !self.sequence.accept(frame.sequence, now) {
-            return Change::None;
+            return TelemetryChange::None;
         }
         self.note_stream(frame.message_id, now);
         match frame.message_id {
@@ -220,29 +225,29 @@ impl Telemetry {
                 let p = frame.padded();
                 let command = u16::from_le_bytes([p[0], p[1]]);
                 self.ack = Some(Ack { command, result: p[2], to: (p[8], p[9]) });
-                Change::Updated
+                TelemetryChange::Updated
             }
             // Decoded field by field: a vehicle type newer than the crate must not make the
             // autopilot silent.
             HEARTBEAT => {
                 let p = frame.padded();
-                let Some(kind) = Kind::from_heartbeat(p[5]) else { return Change::None };
+                let Some(kind) = AutopilotKind::from_heartbeat(p[5]) else { return TelemetryChange::None };
                 if *self.kind.get_or_insert(kind) != kind {
-                    return Change::None;
+                    return TelemetryChange::None;
                 }
                 self.custom_mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
                 self.armed = p[6] & FLAG_ARMED != 0;
-                self.watch_origin();
+                self.update_origin_trust();
                 self.system_status = p[7];
                 self.heartbeat_at = Some(now);
-                Change::Updated
+                TelemetryChange::Updated
             }
             EXTENDED_SYS_STATE => {
                 let landed = frame.padded()[1];
                 if landed != 0 {
                     self.on_ground = Some(landed == LANDED_STATE_ON_GROUND);
                 }
-                Change::Updated
+                TelemetryChange::Updated
             }
             SYS_STATUS_DATA::ID => match frame.decode::<SYS_STATUS_DATA>() {
                 Some(status) => {
@@ -250,13 +255,13 @@ impl Telemetry {
                     if status.battery_remaining >= 0 {
                         self.battery_percent = status.battery_remaining;
                     }
-                    Change::Updated
+                    TelemetryChange::Updated
                 }
-                None => Change::None,
+                None => TelemetryChange::None,
             },
             GPS_GLOBAL_ORIGIN_DATA::ID => match frame.decode::<GPS_GLOBAL_ORIGIN_DATA>() {
                 Some(origin) => self.handle_origin(now, mission_origin, &origin),
-                None => Change::None,
+                None => TelemetryChange::None,
             },
             EKF_STATUS_REPORT_DATA::ID => {
                 // Decoded field by field: flags newer than the crate's must not hide the others.
@@ -265,14 +270,14 @@ impl Telemetry {
                 let ratio = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
                 // Velocity, horizontal and vertical position, compass. It reports no metres: 0 leaves what is vouched for.
                 let sound = self.estimator_ready
-                    && [0, 4, 8, 12].into_iter().all(|at| ardupilot::ratio_is_sound(ratio(at)));
+                    && [0, 4, 8, 12].into_iter().all(|at| ardupilot::is_variance_ratio_good(ratio(at)));
                 self.accuracy = Some((if sound { 0.0 } else { f32::INFINITY }, now));
-                if !self.estimator_ready && self.kind == Some(Kind::ArduPilot) {
+                if !self.estimator_ready && self.kind == Some(AutopilotKind::ArduPilot) {
                     self.position_at = None;
                 }
-                Change::Updated
+                TelemetryChange::Updated
             }
-            ESTIMATOR_STATUS_DATA::ID if self.kind == Some(Kind::Px4) => {
+            ESTIMATOR_STATUS_DATA::ID if self.kind == Some(AutopilotKind::Px4) => {
                 // Decoded field by field: flags newer than the crate's must not hide the accuracy.
                 let p = frame.padded();
                 let metres = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
@@ -281,27 +286,27 @@ impl Telemetry {
                 let known = across_m >= 0.0 && height_m >= 0.0;
                 let worst_m = if known { libm::fmaxf(across_m, height_m) } else { f32::INFINITY };
                 self.accuracy = Some((worst_m, now));
-                Change::Updated
+                TelemetryChange::Updated
             }
             GLOBAL_POSITION_INT_DATA::ID => match frame.decode::<GLOBAL_POSITION_INT_DATA>() {
                 Some(global) => {
                     self.above_home_m = global.relative_alt as f32 * 1e-3;
-                    Change::None
+                    TelemetryChange::None
                 }
-                None => Change::None,
+                None => TelemetryChange::None,
             },
             LOCAL_POSITION_NED_DATA::ID => match frame.decode::<LOCAL_POSITION_NED_DATA>() {
                 Some(local) => self.handle_position(now, mission_origin, &local),
-                None => Change::None,
+                None => TelemetryChange::None,
             },
-            _ => Change::None,
+            _ => TelemetryChange::None,
         }
     }
 
     /// Time since a stream was last heard; the greatest value if it never was.
     pub(crate) fn stream_age(&self, message_id: u32, now: Instant) -> Duration {
         let heard = self.stream(message_id).and_then(|at| self.streams.get(at)).copied();
-        age(heard.filter(|at| *at > Instant::ZERO), now)
+        time_since(heard.filter(|at| *at > Instant::ZERO), now)
     }
 
     /// Index of the message among the streams that are on.
@@ -323,30 +328,30 @@ impl Telemetry {
         now: Instant,
         mission_origin: &Geodetic,
         data: &GPS_GLOBAL_ORIGIN_DATA,
-    ) -> Change {
+    ) -> TelemetryChange {
         let origin = Geodetic {
             lat_deg: f64::from(data.latitude) * 1e-7,
             lon_deg: f64::from(data.longitude) * 1e-7,
             alt_m: f64::from(data.altitude) * 1e-3,
         };
         if !origin.is_valid() {
-            return Change::None;
+            return TelemetryChange::None;
         }
         if self.armed
-            && let Some(flown) = self.flown_origin
+            && let Some(flown) = self.last_armed_origin
         {
             if flown != origin {
-                let since = *self.doubted_at.get_or_insert(now);
+                let since = *self.origin_doubtful_since.get_or_insert(now);
                 self.origin_moved |= now - since >= ORIGIN_DOUBT_TIME;
-                return Change::OriginDoubted;
+                return TelemetryChange::OriginDoubted;
             }
-            self.doubted_at = None;
+            self.origin_doubtful_since = None;
         }
         let away_m = frames::geodetic_to_enu(mission_origin, &origin).norm();
-        if away_m > MAX_ORIGIN_DISTANCE_M && !self.anywhere {
-            (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
+        if away_m > MAX_ORIGIN_DISTANCE_M && !self.accept_any_origin {
+            (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
             self.settled_at = now + POSITION_SETTLE_TIME;
-            return Change::OriginFar((away_m * 1e-3) as u32);
+            return TelemetryChange::OriginFar((away_m * 1e-3) as u32);
         }
         if self.ekf_origin.is_some_and(|known| known != origin) {
             // A position on its way may still be about the old one.
@@ -356,22 +361,22 @@ impl Telemetry {
             self.ekf_origin = Some(origin);
             // The next position is about the new origin and no jump.
             self.position_at = None;
-            self.read_at = None;
+            self.position_read_at = None;
         }
-        self.watch_origin();
-        Change::Updated
+        self.update_origin_trust();
+        TelemetryChange::Updated
     }
 
-    /// Armed, the origin stays; disarmed, one in doubt is asked for.
-    fn watch_origin(&mut self) {
+    /// While armed the origin stays. While disarmed a doubtful origin is requested again.
+    fn update_origin_trust(&mut self) {
         if self.armed {
-            self.flown_origin = self.flown_origin.or(self.ekf_origin);
+            self.last_armed_origin = self.last_armed_origin.or(self.ekf_origin);
             return;
         }
         if self.origin_moved {
-            (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
+            (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
         }
-        (self.flown_origin, self.doubted_at, self.origin_moved) = (None, None, false);
+        (self.last_armed_origin, self.origin_doubtful_since, self.origin_moved) = (None, None, false);
     }
 
     fn handle_position(
@@ -379,53 +384,53 @@ impl Telemetry {
         now: Instant,
         mission_origin: &Geodetic,
         d: &LOCAL_POSITION_NED_DATA,
-    ) -> Change {
+    ) -> TelemetryChange {
         let fields = [d.x, d.y, d.z, d.vx, d.vy, d.vz];
         let older = self.boot_ms.wrapping_sub(d.time_boot_ms);
         let rebooted = older > 10_000 && older < u32::MAX / 2;
-        let stale = older < u32::MAX / 2 && !rebooted && self.read_at.is_some();
+        let stale = older < u32::MAX / 2 && !rebooted && self.position_read_at.is_some();
         if fields.iter().any(|f| !f.is_finite()) || stale {
-            return Change::None;
+            return TelemetryChange::None;
         }
         self.boot_ms = d.time_boot_ms;
-        let Some(kind) = self.kind.filter(|kind| *kind == Kind::Px4 || self.estimator_ready) else {
-            return Change::None;
+        let Some(kind) = self.kind.filter(|kind| *kind == AutopilotKind::Px4 || self.estimator_ready) else {
+            return TelemetryChange::None;
         };
         let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
-            return if rebooted { self.lose_position(now) } else { Change::None };
+            return if rebooted { self.lose_position(now) } else { TelemetryChange::None };
         };
         let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
-        if let Some(at) = self.read_at {
+        if let Some(at) = self.position_read_at {
             // Time by the autopilot's clock since the last position that was used: positions that
             // waited on the way come all at once.
-            let passed_s = d.time_boot_ms.wrapping_sub(self.read_boot_ms) as f32 * 1e-3;
+            let passed_s = d.time_boot_ms.wrapping_sub(self.position_boot_ms) as f32 * 1e-3;
             let dt_s = passed_s.min(MAX_GAP_S);
             if now - at > POSITION_SETTLE_TIME {
-                self.counts_from = now + POSITION_SETTLE_TIME;
+                self.positions_valid_from = now + POSITION_SETTLE_TIME;
             }
             let led_to = self.position + self.velocity * dt_s;
             if (position - led_to).norm() > POSITION_JUMP_M + POSITION_JUMP_MPS * dt_s {
                 return self.lose_position(now);
             }
         }
-        (self.read_at, self.read_boot_ms) = (Some(now), d.time_boot_ms);
+        (self.position_read_at, self.position_boot_ms) = (Some(now), d.time_boot_ms);
         self.position = position;
         // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
-        if !self.is_settling(now) && now >= self.counts_from {
+        if !self.is_settling(now) && now >= self.positions_valid_from {
             self.position_at = Some(now);
         }
-        Change::Updated
+        TelemetryChange::Updated
     }
 
-    fn lose_position(&mut self, now: Instant) -> Change {
+    fn lose_position(&mut self, now: Instant) -> TelemetryChange {
         self.ekf_origin = None;
         self.position_at = None;
-        self.read_at = None;
+        self.position_read_at = None;
         self.settled_at = now + POSITION_SETTLE_TIME;
-        Change::OriginLost
+        TelemetryChange::OriginLost
     }
 
     /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while the origin is unknown.
@@ -436,7 +441,7 @@ impl Telemetry {
     }
 }
 
-fn age(at: Option<Instant>, now: Instant) -> Duration {
+fn time_since(at: Option<Instant>, now: Instant) -> Duration {
     at.map_or(Duration::from_micros(u64::MAX), |at| now - at)
 }
 

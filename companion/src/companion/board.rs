@@ -4,7 +4,7 @@ use super::Companion;
 use crate::events::Event;
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 use crate::mission::State;
-use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
+use crate::storage::store::{ErasePermission, FlashFault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
 /// Time after the start at which a board that has heard no autopilot has none that could be armed.
@@ -13,50 +13,50 @@ const NO_AUTOPILOT_AFTER: Duration = Duration::from_secs(10);
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Gives it a flash to keep its files and parameters in, and uses those; without one there are no files, and parameters are
     /// forgotten.
-    pub fn mount(&mut self, store: Store) {
-        self.services.mount(store);
+    pub fn attach_store(&mut self, store: Store) {
+        self.services.attach_store(store);
         let Self { services, mission, config, .. } = self;
         mission.photographed_mut().restore(services.photographed(), config.mission_crc);
-        self.tune();
+        self.apply_parameters();
     }
 
     /// Puts the parameters to use.
-    pub(crate) fn tune(&mut self) {
-        self.services.tune(&mut self.config);
-        self.guidance.tune(&self.config, self.requests.limits());
+    pub(crate) fn apply_parameters(&mut self) {
+        self.services.apply_parameters(&mut self.config);
+        self.guidance.set_limits(&self.config, self.requests.limits());
     }
 
-    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] takes the result. Drained like the
+    /// What the shell has to do with the flash next; once each, then [`Self::handle_flash`] takes the result. Drained like the
     /// other `poll_*`, but it may take long: nothing else waits for it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
-        let erasing = self.erasing();
+        let erasing = self.erase_permission();
         self.services.poll_flash(self.now, erasing, &mut self.links)
     }
 
-    /// Takes in how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
-    pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], Fault>) {
+    /// Handles how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
+    pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], FlashFault>) {
         self.now = now;
         self.services.handle_flash(outcome);
     }
 
     /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
-    pub(crate) fn erasing(&self) -> Erasing {
+    pub(crate) fn erase_permission(&self) -> ErasePermission {
         let idle = matches!(
             self.mission.state(),
             State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
         );
         let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > NO_AUTOPILOT_AFTER;
         match self.mission.state() {
-            _ if self.telemetry.armed => Erasing::Forbidden,
-            _ if idle && known => Erasing::Allowed,
-            _ if idle => Erasing::NotYet,
-            State::Planning => Erasing::NotYet,
-            _ => Erasing::Forbidden,
+            _ if self.telemetry.armed => ErasePermission::Forbidden,
+            _ if idle && known => ErasePermission::Allowed,
+            _ if idle => ErasePermission::NotYet,
+            State::Planning => ErasePermission::NotYet,
+            _ => ErasePermission::Forbidden,
         }
     }
 
     /// PREFLIGHT_REBOOT_SHUTDOWN: this companion restarts, unless the vehicle is armed.
-    pub(crate) fn restart(&mut self, command: &Command) -> u8 {
+    pub(crate) fn handle_restart_command(&mut self, command: &Command) -> u8 {
         let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
         if !asked {
             return DENIED;

@@ -8,47 +8,47 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::{Companion, REPORT_EVERY};
 use crate::autopilot::requests::ORIGIN_RETRY_EVERY;
-use crate::autopilot::telemetry::Change;
+use crate::autopilot::telemetry::TelemetryChange;
 use crate::events::Link;
-use crate::link::answer_limits::{Kind as AnswerKind, Sender};
+use crate::link::answer_limits::{AnswerKind, SenderKind};
 use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
 use crate::link::done::DoneReport;
 use crate::link::frame::Frame;
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
-use crate::link::roster::Roster;
-use crate::link::{Fresh, rate_limit};
-use crate::services::Heard;
+use crate::link::roster::RosterReport;
+use crate::link::{OnDemandMessage, rate_limit};
+use crate::services::ReceivedFrame;
 use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Returns whether the mission table should be looked at.
+    /// Returns whether the mission table has to be evaluated.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
         let own = self.config.system_id;
-        let sender = Sender::of(link, frame.system, own, &self.config.ground_stations);
-        if let Some(command) = commands::read(frame, self.config.system_id) {
-            if sender != Sender::GroundStation && command.acts() {
-                self.deny(link, sender, &command);
+        let sender = SenderKind::from_system_id(link, frame.system, own, &self.config.ground_stations);
+        if let Some(command) = commands::read_command(frame, self.config.system_id) {
+            if sender != SenderKind::GroundStation && command.needs_authority() {
+                self.reject_command(link, sender, &command);
                 return false;
             }
             let now = self.now;
-            let (result, relevant) = match self.links.answered(frame, now) {
+            let (result, relevant) = match self.links.previous_answer(frame, now) {
                 Some(result) => (result, false),
                 None => {
                     let result = self.handle_command(link, sender, &command);
-                    self.links.remember(frame, result, now);
+                    self.links.remember_answer(frame, result, now);
                     (result, true)
                 }
             };
             if let Some(result) = result {
                 let ack = Outgoing::Ack { command: command.command, result, to: command.from };
-                self.links.answer(self.now, link, sender, AnswerKind::Ack, ack);
+                self.links.queue_answer(self.now, link, sender, AnswerKind::Ack, ack);
             }
             return relevant;
         }
-        let heard = Heard { link, sender, frame, now: self.now, own };
-        if self.services.serve(&heard, &mut self.links) {
+        let heard = ReceivedFrame { link, sender, frame, now: self.now, own };
+        if self.services.handle_frame(&heard, &mut self.links) {
             return false;
         }
         match link {
@@ -59,36 +59,36 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 if frame.message_id == PARAM_VALUE_DATA::ID {
                     let changed = self.requests.handle_limit(&self.telemetry, frame);
                     if changed && !self.mission.state().streams_setpoints() {
-                        self.guidance.tune(&self.config, self.requests.limits());
+                        self.guidance.set_limits(&self.config, self.requests.limits());
                     }
                     return false;
                 }
-                let change = self.telemetry.handle(self.now, &self.config.origin, frame);
+                let change = self.telemetry.handle_frame(self.now, &self.config.origin, frame);
                 if let Some(ack) = self.telemetry.ack.take() {
                     self.requests.handle_ack(&ack, own, self.mission.state(), self.now, &mut self.links);
                     self.mission.handle_ack(&ack, &mut self.links);
                 }
-                self.requests.watch(self.mission.state(), &self.telemetry);
-                if change == Change::OriginDoubted {
-                    self.timers.hasten(Timer::Origin, self.now + ORIGIN_RETRY_EVERY);
+                self.requests.update_mode_and_landed(self.mission.state(), &self.telemetry);
+                if change == TelemetryChange::OriginDoubted {
+                    self.timers.set_no_later(Timer::Origin, self.now + ORIGIN_RETRY_EVERY);
                     return self.telemetry.origin_moved;
                 }
-                if let Change::OriginFar(km) = change {
-                    if self.timers.take(Timer::OriginReport, self.now, REPORT_EVERY) {
-                        self.links.say_count(true, "EKF origin # km away: not used", [km, 0]);
+                if let TelemetryChange::OriginFar(km) = change {
+                    if self.timers.take_due(Timer::OriginReport, self.now, REPORT_EVERY) {
+                        self.links.send_text_with_numbers(true, "EKF origin # km away: not used", [km, 0]);
                     }
                     return true;
                 }
-                if change == Change::OriginLost {
+                if change == TelemetryChange::OriginLost {
                     self.timers.set(Timer::Origin, self.now);
                     // The autopilot may have been restarted and have lost the streams that were
                     // requested. Positions that jump again and again are no reason to flood the
                     // link.
                     if self.timers.is_due(Timer::Streams, self.now) {
-                        self.connect();
+                        self.request_streams();
                     }
                 }
-                change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
+                change == TelemetryChange::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
             }
             Link::Swarm => {
                 self.handle_neighbour(frame);
@@ -116,31 +116,37 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 return;
             }
-            if let Some(roster) = Roster::decode(frame.padded(), id) {
+            if let Some(roster) = RosterReport::decode(frame.padded(), id) {
                 if roster.mission_crc == self.config.mission_crc {
-                    let waits = self.waits_on_ground();
+                    let waits = self.is_not_started();
                     self.neighbours.handle_roster(id, &roster, waits);
                 }
                 return;
             }
             if let Some(report) = DoneReport::decode(frame.padded(), id) {
-                self.handle_done(&report);
+                self.handle_done_report(&report);
                 return;
             }
             let Some(intent) = Intent::decode(frame.padded(), id) else { return };
             if intent.mission_crc != self.config.mission_crc {
                 if self.config.roster.iter().any(|entry| entry.system_id == id) {
                     let text = "Vehicle # has another mission file";
-                    self.links.say_of(self.now, Sender::Other, true, text, [u32::from(id), 0, 0]);
+                    self.links.send_sender_text(
+                        self.now,
+                        SenderKind::Other,
+                        true,
+                        text,
+                        [u32::from(id), 0, 0],
+                    );
                 }
                 return;
             }
             let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
-            let delay_s = echo.and_then(|echo| self.links.delay_s(&echo, self.now));
-            if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.lateness(id)) {
-                late.take(delay_s);
+            let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
+            if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
+                late.update(delay_s);
             }
-            if self.neighbours.accept(id, frame.sequence, self.now) {
+            if self.neighbours.accept_intent(id, frame.sequence, self.now) {
                 let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
                 self.neighbours.handle_intent(
                     self.now,
@@ -155,60 +161,70 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Answers a command of a sender whose commands do not count.
-    pub(super) fn deny(&mut self, link: Link, sender: Sender, command: &Command) {
+    /// Rejects a command from a sender without authority.
+    pub(super) fn reject_command(&mut self, link: Link, sender: SenderKind, command: &Command) {
         if command.to_us {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
-            self.links.answer(self.now, link, sender, AnswerKind::Ack, ack);
+            self.links.queue_answer(self.now, link, sender, AnswerKind::Ack, ack);
         }
         let numbers = [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
-        self.links.say_of(self.now, sender, true, "Command # denied, not a ground station: #/#", numbers);
+        self.links.send_sender_text(
+            self.now,
+            sender,
+            true,
+            "Command # denied, not a ground station: #/#",
+            numbers,
+        );
     }
 
     /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
-    pub(super) fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) -> Option<u8> {
-        let (before, known) = (*self.mission.pending(), self.detours.obstacles());
-        let inputs = self.inputs();
+    pub(super) fn handle_command(&mut self, link: Link, sender: SenderKind, command: &Command) -> Option<u8> {
+        let (before, known) = (*self.mission.pending(), self.detours.obstacle_count());
+        let inputs = self.guard_inputs();
         let result = match self.mission.handle_command(&inputs, command) {
             Some(result) => result,
-            None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
-            None if command.command == commands::EXCLUDE => {
-                self.detours.exclude(command, &self.config.origin, self.config.required_clearance_m)
+            None if command.command == commands::REQUEST => {
+                self.handle_message_request(link, sender, command.param1)
             }
+            None if command.command == commands::EXCLUDE => self.detours.handle_obstacle_command(
+                command,
+                &self.config.origin,
+                self.config.required_clearance_m,
+            ),
             None if command.command == commands::RESTART
                 && (command.to_component || command.param2 == 1.0) =>
             {
-                self.restart(command)
+                self.handle_restart_command(command)
             }
             // A command to all components is for another one.
             None if !command.to_component => return None,
             None => UNSUPPORTED,
         };
         let restarts = command.command == commands::RESTART && result == ACCEPTED;
-        if restarts || *self.mission.pending() != before || self.detours.obstacles() != known {
+        if restarts || *self.mission.pending() != before || self.detours.obstacle_count() != known {
             self.links.log_command(self.now, sender, command);
         }
         command.to_us.then_some(result)
     }
 
-    pub(super) fn request(&mut self, link: Link, sender: Sender, message: f32) -> u8 {
-        if !self.links.may_answer(self.now, link, sender, AnswerKind::Message) {
+    pub(super) fn handle_message_request(&mut self, link: Link, sender: SenderKind, message: f32) -> u8 {
+        if !self.links.take_answer_token(self.now, link, sender, AnswerKind::Message) {
             return TEMPORARILY_REJECTED;
         }
-        if link == Link::Swarm && !self.links.radio_allows(self.now, self.telemetry.armed) {
+        if link == Link::Swarm && !self.links.may_send_by_radio(self.now, self.telemetry.armed) {
             return TEMPORARILY_REJECTED;
         }
         if message == HEARTBEAT_DATA::ID as f32 {
-            self.links.set_due(link, Fresh::Heartbeat, true);
+            self.links.set_due(link, OnDemandMessage::Heartbeat, true);
         } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
-            self.links.set_due(link, Fresh::Version, true);
+            self.links.set_due(link, OnDemandMessage::Version, true);
         } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
-            self.links.set_due(link, Fresh::Position, self.telemetry.position_at.is_some());
+            self.links.set_due(link, OnDemandMessage::Position, self.telemetry.position_at.is_some());
         } else {
             return DENIED;
         }
         if link == Link::Swarm {
-            self.links.spend(rate_limit::POSITION_BYTES);
+            self.links.count_radio_bytes(rate_limit::POSITION_BYTES);
         }
         ACCEPTED
     }

@@ -3,10 +3,10 @@
 use planner_core::Point;
 
 use super::{Companion, HEARTBEAT_EVERY};
-use crate::autopilot::requests::battery_reported;
+use crate::autopilot::requests::is_battery_known;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
-use crate::mission::{Inputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
+use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::Duration;
 
@@ -27,8 +27,8 @@ const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.
-    pub(crate) fn inputs(&self) -> Inputs {
-        let (t, now, view) = (&self.telemetry, self.now, self.view());
+    pub(crate) fn guard_inputs(&self) -> GuardInputs {
+        let (t, now, view) = (&self.telemetry, self.now, self.detour_view());
         let scene = &view.scene;
         let (kind, handshake) = (self.kind(), self.requests.handshake());
         let offboard = t.custom_mode == kind.setpoint_mode();
@@ -43,64 +43,64 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => !offboard,
         };
         let climb_m = self.mission.climb_m();
-        let away = t.position - (self.mission.start() - Point::new(0.0, 0.0, climb_m));
+        let away = t.position - (self.mission.path_start() - Point::new(0.0, 0.0, climb_m));
         let height_tolerance_m = self.config.start_tolerance_m.min(MAX_START_HEIGHT_ERROR_M);
-        let beneath = self.mission.beneath();
+        let beneath = self.mission.uninterrupted_state();
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.on_ground == Some(true);
         let fence = self.config.geofence;
-        let standing = self.guidance.stands() && t.velocity.norm() < MAX_HOVER_MPS;
+        let standing = self.guidance.is_standing() && t.velocity.norm() < MAX_HOVER_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
         let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
-            (self.detours.home.can_turn(&view), self.detours.home.sought_for(now));
-        let unfollowed = self.guidance.unfollowed_for(now);
+            (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
+        let unfollowed_for = self.guidance.unfollowed_for(now);
         // What something holds gets nowhere else.
-        let can_leave = unfollowed < UNFOLLOWED_MOST;
-        Inputs {
-            in_state: self.mission.in_state(now),
+        let can_leave = unfollowed_for < UNFOLLOWED_MOST;
+        GuardInputs {
+            in_state: self.mission.time_in_state(now),
             heartbeat_age: t.heartbeat_age(now),
             position_age: t.position_age(now),
             jumped: t.is_settling(now),
-            stalled: match self.mission.state() {
-                State::Follow => now - self.guidance.progress_at(),
+            stalled_for: match self.mission.state() {
+                State::Follow => now - self.guidance.last_progress_at(),
                 // The vehicle may have stood for a gate long before. Where it can fly home it does
                 // not land for that.
                 State::Blocked if over_field && sought_home.is_none() => self.detours.blocked_for(now),
-                State::Blocked => (now - self.guidance.progress_at()).max(self.detours.blocked_for(now)),
+                State::Blocked => (now - self.guidance.last_progress_at()).max(self.detours.blocked_for(now)),
                 _ => Duration::default(),
             },
-            unfollowed,
+            unfollowed_for,
             blocked_for: self.detours.blocked_for(now),
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
             neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
-                fleet.unheard_for(now).beyond(UNHEARD_STOP_AFTER)
+                fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER)
             } else {
-                match self.guidance.returning || self.detours.lands() || self.flies_on() {
+                match self.guidance.returning || self.detours.lands_at_end() || self.is_flying_unheard() {
                     true => Duration::default(),
-                    false => self.neighbours.silence(now, self.mission.entered_at()),
+                    false => self.neighbours.silence_duration(now, self.mission.entered_at()),
                 }
             },
-            way_free: self.flies_on(),
-            out_of_range: self.neighbours.all_beyond(),
+            way_free: self.is_flying_unheard(),
+            out_of_range: self.neighbours.are_all_out_of_range(),
             neighbour_heard: self.is_linked(),
             excluded: self.is_excluded(),
             more_is_done: self.mission.photographed().is_outdated(),
             plans_differ: self.hears_another_plan(),
-            holds_to_divide: self.holds_to_divide(),
+            holds_to_divide: self.is_holding_for_division(),
             division_ready: self.mission.has_division(),
-            undivided: self.is_undivided() && !self.detours.beside.is_on(),
+            undivided: self.is_undivided() && !self.detours.field_detour.is_off_plan_path(),
             plan_ready: self.mission.plan().is_some(),
-            plan_failed: self.mission.failure().is_some(),
-            roadmap_bad: self.mission.failure() == Some(PlanFailure::NoRoadmap),
-            has_goal: self.mission.plan().is_some_and(|plan| plan.task.flies()),
+            plan_failed: self.mission.plan_failure().is_some(),
+            roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::NoRoadmap),
+            has_goal: self.mission.plan().is_some_and(|plan| plan.task.leaves_pad()),
             plans_as_others: self.plans_as_others(),
             at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
             imprecise: self.mission.state() == State::Ready && self.guidance.pace < 1.0,
-            vague: self.mission.vague_for(now),
+            imprecise_for: self.mission.estimate_imprecise_for(now),
             origin_moved: t.origin_moved,
             start: self.mission.pending().start,
             pause: self.mission.pending().pause,
@@ -111,25 +111,28 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.detours.home.is_on(),
             area: self.config.division.is_some(),
             over_field,
-            may_fly_beside: standing && self.is_undivided() && self.detours.may_fly_beside(&view),
-            around_flown: follow && self.detours.beside.flies() && self.guidance.is_at_end(scene) && standing,
-            own_plan_ready: self.detours.beside.is_back(),
-            own_plan_lost: self.detours.beside.is_lost(),
+            may_fly_beside: standing && self.is_undivided() && self.detours.may_detour_over_field(&view),
+            around_flown: follow
+                && self.detours.field_detour.is_flying()
+                && self.guidance.is_at_end(scene)
+                && standing,
+            own_plan_ready: self.detours.field_detour.is_back(),
+            own_plan_lost: self.detours.field_detour.is_lost(),
             homeward: self.detours.home.is_on(),
-            sought_home,
-            stands_to_return: standing && self.detours.home.may_ask(now),
+            seeking_home_for: sought_home,
+            stands_to_return: standing && self.detours.home.may_request(now),
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
-            armed_unseen: handshake.is_armed_unseen(now),
-            arming_unanswered: handshake.is_unanswered(now),
+            armed_unseen: handshake.is_armed_bit_overdue(now),
+            arming_unanswered: handshake.is_arming_unanswered(now),
             disarm_refused: handshake.is_disarm_refused(),
-            ours: handshake.is_ours(),
+            own_mode: handshake.is_in_own_mode(),
             landing: t.custom_mode == kind.land_mode(),
             offboard,
             mode_foreign,
             critical: t.is_critical(),
             on_ground,
-            flown: handshake.has_flown(),
+            has_flown: handshake.has_flown(),
             vertical: t.position_age(now) < MAX_POSITION_AGE && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
@@ -138,55 +141,55 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.mission.departure_due(now)
                 && !self.hears_another_plan()
                 && !self.mission.pending().pause
-                && battery_reported(t, self.config.battery_low_percent, now)
+                && is_battery_known(t, self.config.battery_low_percent, now)
                 && !self.detours.is_blocked()
-                && self.neighbours.is_clear_since(self.mission.entered_at())
-                && (self.is_linked() || self.neighbours.all_rest()),
-            climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
+                && self.neighbours.is_path_clear_since(self.mission.entered_at())
+                && (self.is_linked() || self.neighbours.are_all_at_rest()),
+            climb_done: self.mission.state() == State::Climb && self.guidance.is_climb_done(scene),
             // The ground may be higher than where its pad is said to be.
             path_done: follow
-                && (self.guidance.path_done(scene, now) || (self.guidance.descends() && on_ground)),
-            at_goal: self.guidance.at_goal(scene) && !self.detours.home.is_on(),
+                && (self.guidance.is_path_done(scene, now) || (self.guidance.is_descending() && on_ground)),
+            at_goal: self.guidance.is_at_goal(scene) && !self.detours.home.is_on(),
             near_path: match (beneath, self.mission.state()) {
                 // These interrupted states do not depend on a place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
-                (_, State::PilotReturned) => self.guidance.near_path(scene, REJOIN_WINDOW_M),
-                (_, State::PositionLost) => self.guidance.near_path(scene, LOST_WINDOW_M),
+                (_, State::PilotReturned) => self.guidance.is_near_path(scene, REJOIN_WINDOW_M),
+                (_, State::PositionLost) => self.guidance.is_near_path(scene, LOST_WINDOW_M),
                 _ => false,
             },
             battery_low: t.charge_below(self.config.battery_low_percent),
             battery_critical: t.charge_below(self.config.battery_low_percent / 2),
-            column_blocked: self.guidance.filter.column_blocked_for(now),
-            column_barred: self.guidance.filter.column_barred_for(now),
-            column_clear: self.guidance.filter.column_clear_for(now),
+            column_blocked_for: self.guidance.filter.column_blocked_for(now),
+            column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
+            column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave
                 && self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
-                && (self.config.division.is_none() || self.detours.home.seeks())
-                && !self.neighbours.is_deaf(now),
+                && (self.config.division.is_none() || self.detours.home.is_seeking())
+                && !self.neighbours.hears_nobody(now),
             pad_blocked_for: match follow && (self.guidance.returning || self.detours.home.is_on()) {
-                true if self.guidance.descends() => self.guidance.filter.hindered_for(now),
-                true => self.guidance.filter.barred_for(now),
+                true if self.guidance.is_descending() => self.guidance.filter.hindered_for(now),
+                true => self.guidance.filter.blocked_for_good_for(now),
                 false => Duration::default(),
             },
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
-            lands_aside: self.detours.lands(),
+            lands_aside: self.detours.lands_at_end(),
             aside_reached: follow
-                && self.detours.is_flying()
-                && self.detours.lands()
+                && self.detours.is_on_detour()
+                && self.detours.lands_at_end()
                 && self.guidance.is_at_end(scene)
                 && standing,
-            yielded: self.guidance.filter.yielded_for(now),
-            hindered: self.guidance.filter.hindered_for(now),
+            yielded_for: self.guidance.filter.yielded_for(now),
+            hindered_for: self.guidance.filter.hindered_for(now),
             room_below,
-            outside: self.guidance.stands_at_fence()
+            outside: self.guidance.is_standing_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
             blocked: self.detours.is_blocked(),
             our_turn: self.detours.is_our_turn(&view),
             detour_ready: self.detours.is_ready(),
-            no_way_around: self.detours.gives_up(),
-            underneath: self.detours.underneath(&view),
+            no_way_around: self.detours.has_given_up(),
+            time_below_landing: self.detours.time_below_landing(&view),
             standing,
         }
     }
@@ -199,30 +202,32 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it may fly on its plan though nobody hears it.
-    fn follows_plan(&self) -> bool {
+    /// Whether it may continue its plan although no other vehicle hears it.
+    fn may_fly_unheard(&self) -> bool {
         let follows =
             matches!(self.mission.state(), State::TakeOff | State::Climb | State::Follow | State::Alone);
-        let left = self.detours.is_blocked() || self.detours.has_left() || self.detours.is_flying();
+        let left = self.detours.is_blocked() || self.detours.has_left_plan() || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
         ranged && follows && !left && !self.guidance.returning && self.mission.plan().is_some()
     }
 
-    /// Whether it does: its next gate is open, or none is left.
-    fn flies_on(&self) -> bool {
+    /// Whether it flies on its plan unheard: its next gate is open, or none is left.
+    fn is_flying_unheard(&self) -> bool {
         let length_m = self.mission.plan().map_or(0.0, |plan| plan.path.length_m());
-        let clear_m = self.guidance.clear_m(&self.view().scene);
-        self.follows_plan()
-            && self.neighbours.all_beyond()
+        let clear_m = self.guidance.gates_open_up_to_m(&self.detour_view().scene);
+        self.may_fly_unheard()
+            && self.neighbours.are_all_out_of_range()
             && (clear_m > self.guidance.along_m() + MIN_GATE_AHEAD_M || clear_m >= length_m)
     }
 
     /// Distance that this vehicle flies on its plan while it is unheard, metres along its path, and
     /// the seconds after which all gates up to there are open for sure; −1e6 where it flies no such
     /// distance.
-    pub(super) fn clears_m(&self) -> (f32, u8) {
-        match self.follows_plan() {
-            true => self.guidance.clears_m(&self.view().scene, &self.neighbours, self.now),
+    pub(super) fn unheard_reach_m(&self) -> (f32, u8) {
+        match self.may_fly_unheard() {
+            true => {
+                self.guidance.gates_open_up_to_soon_m(&self.detour_view().scene, &self.neighbours, self.now)
+            }
             false => (-1e6, 0),
         }
     }

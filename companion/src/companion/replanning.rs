@@ -1,106 +1,106 @@
 //! Ways around: what is requested of the shell, and what becomes of its answer.
 
-use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::flight::VehiclePlan;
 
 use super::Companion;
 use crate::config::PlanFailure;
-use crate::events::{Event, Wanted};
-use crate::guidance::Scene;
+use crate::events::{Event, PlanKind};
+use crate::guidance::GuidanceInputs;
 use crate::mission::State;
-use crate::swarm::detour::Aim;
-use crate::swarm::detour::asking::Outlook;
-use crate::swarm::view::View;
+use crate::swarm::detour::DetourPurpose;
+use crate::swarm::detour::asking::RetryOutlook;
+use crate::swarm::view::DetourView;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The view that decisions about detours follow from.
-    pub(crate) fn view(&self) -> View<'_, V, W, G> {
-        View {
+    pub(crate) fn detour_view(&self) -> DetourView<'_, V, W, G> {
+        DetourView {
             now: self.now,
             config: &self.config,
             mission: &self.mission,
             guidance: &self.guidance,
             telemetry: &self.telemetry,
             neighbours: &self.neighbours,
-            scene: self.scene(),
+            scene: self.guidance_inputs(),
         }
     }
 
     /// Remembers, on entering a state, where it was before its position jumped.
-    pub(super) fn mark_place(&mut self, to: State) {
+    pub(super) fn save_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
-        let scene = Scene::new(mission.plan(), telemetry, own, detours.is_flying());
-        let view = View { now: *now, config, mission, guidance, telemetry, neighbours, scene };
-        detours.mark_place(to, &view);
+        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.is_on_detour());
+        let view = DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        detours.save_place_before_jump(to, &view);
     }
 
-    /// Looks for what blocks the path, and whether the others stand.
-    pub(super) fn look_around(&mut self) {
+    /// Scans for obstacles on the path, and checks whether the others stand.
+    pub(super) fn scan_for_obstacles(&mut self) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
-        let scene = Scene::new(mission.plan(), telemetry, own, detours.is_flying());
-        let view = View { now: *now, config, mission, guidance, telemetry, neighbours, scene };
-        if let Some(clear_at) = detours.look_around(&view) {
-            self.neighbours.found_clear(clear_at);
+        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.is_on_detour());
+        let view = DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        if let Some(clear_at) = detours.scan_path(&view) {
+            self.neighbours.mark_path_clear(clear_at);
         }
     }
 
-    /// Asks the shell for a way around, or just aside.
-    pub(super) fn request_detour(&mut self, aim: Aim) {
-        self.detours.request(aim);
-        self.guidance.forget_trap();
+    /// Requests a detour, or a path aside, from the shell.
+    pub(super) fn request_detour(&mut self, aim: DetourPurpose) {
+        self.detours.note_request(aim);
+        self.guidance.reset_trap_timer();
         self.mission.forget_failure();
-        // Full only if the shell does not drain; then the way around is late.
-        let _ = self.events.push_back(Event::PlanRequested(Wanted::Detour));
+        // Full only if the shell does not drain; then the detour is late.
+        let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
     }
 
-    /// Asks the shell for a way around what blocks its path over a field, and back to that.
-    pub(super) fn request_beyond(&mut self) {
-        let back_m = self.detours.returns_m(&self.view());
-        if self.detours.beside.seek(back_m) {
-            self.request_detour(Aim::Beyond);
+    /// Requests a detour around the obstacle on its path over a field, and back to the path.
+    pub(super) fn request_detour_back_to_path(&mut self) {
+        let back_m = self.detours.rejoin_m(&self.detour_view());
+        if self.detours.field_detour.start_seeking(back_m) {
+            self.request_detour(DetourPurpose::Beyond);
         } else {
-            self.detours.beside.miss(self.now);
-            self.mission.fail(PlanFailure::Unreachable);
+            self.detours.field_detour.note_failure(self.now);
+            self.mission.set_failure(PlanFailure::Unreachable);
         }
     }
 
-    /// The detour that [`Wanted::Detour`] requests of the shell; `None` if none is requested, or
+    /// The detour that [`PlanKind::Detour`] requests of the shell; `None` if none is requested, or
     /// none can be planned. `tell` is given all keep-out zones.
-    pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
+    pub fn detour_request(&self, tell: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
-        if replans { self.detours.requested(&self.view(), tell) } else { None }
+        if replans { self.detours.detour_request(&self.detour_view(), tell) } else { None }
     }
 
-    /// Takes the way around.
-    pub(super) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
+    /// Begins the requested detour.
+    pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
         // A promise made meanwhile is along the vehicle's own path.
-        let beside = self.detours.beside;
-        let bound = beside.back_m().is_some() && !beside.flies() && !self.is_undivided();
-        if bound || !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
-            self.miss_detour(PlanFailure::Invalid);
+        let beside = self.detours.field_detour;
+        let bound = beside.rejoin_m().is_some() && !beside.is_flying() && !self.is_undivided();
+        if bound || !here.is_some_and(|here| self.mission.starts_at(detour, &here)) {
+            self.handle_detour_failure(PlanFailure::Invalid);
             return;
         }
-        let progress_m = self.guidance.progress_m(self.mission.state(), &self.scene());
+        let progress_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));
-        self.mission.leave_plan(detour, progress_m, ground_m);
-        self.detours.take(progress_m, self.now, self.guidance.progress_at());
-        self.neighbours.avoid(self.now);
+        self.mission.switch_to_detour(detour, progress_m, ground_m);
+        self.detours.begin_detour(progress_m, self.now, self.guidance.last_progress_at());
+        self.neighbours.mark_avoided(self.now);
     }
 
     /// The requested detour does not exist.
-    pub(super) fn miss_detour(&mut self, failure: PlanFailure) {
-        self.mission.fail(failure);
+    pub(super) fn handle_detour_failure(&mut self, failure: PlanFailure) {
+        self.mission.set_failure(failure);
         let outlook = if self.neighbours.any_comes_down_unheard(self.now) {
-            Outlook::Settles
-        } else if failure != PlanFailure::Late && self.neighbours.all_down(self.now) {
-            Outlook::Closed
+            RetryOutlook::Settles
+        } else if failure != PlanFailure::Late && self.neighbours.are_all_down(self.now) {
+            RetryOutlook::Closed
         } else {
-            Outlook::Open
+            RetryOutlook::Open
         };
-        self.detours.miss(self.guidance.along_m(), outlook, self.now);
+        self.detours.note_failure(self.guidance.along_m(), outlook, self.now);
     }
 }

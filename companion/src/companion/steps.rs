@@ -3,67 +3,69 @@
 use super::{Companion, IDLE_STEP_EVERY, MAX_ROWS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
 use crate::autopilot::requests::DISARM_EVERY;
 use crate::config::PlanFailure;
-use crate::events::{Event, Link, Wanted};
-use crate::guidance::Scene;
-use crate::link::Fresh;
+use crate::events::{Event, Link, PlanKind};
+use crate::guidance::GuidanceInputs;
+use crate::link::OnDemandMessage;
 use crate::margins;
-use crate::mission::task::{Along, Place};
-use crate::mission::{self, Action, Row, State};
-use crate::storage::store::Erasing;
-use crate::swarm::detour::Aim;
+use crate::mission::task::{PathProgress, PathRelation};
+use crate::mission::{self, Action, State, TransitionRow};
+use crate::storage::store::ErasePermission;
+use crate::swarm::detour::DetourPurpose;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// One step of the control loop: reference, mission table, and requests to the autopilot.
     pub(super) fn step(&mut self) {
         let now = self.now;
-        if self.services.is_untuned() && self.erasing() == Erasing::Allowed {
-            self.tune();
+        if self.services.has_unapplied_parameters() && self.erase_permission() == ErasePermission::Allowed {
+            self.apply_parameters();
         }
-        self.watch_estimate();
+        self.check_estimate_error();
         self.neighbours.set_place(self.telemetry.position, self.config.radio_range_m);
         let dt_s = self.timers.step_s(now).clamp(0.0, 0.2);
-        let scene = Scene::new(
+        let scene = GuidanceInputs::new(
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
-            self.detours.is_flying(),
+            self.detours.is_on_detour(),
         );
         if !self.guidance.step(self.mission.state(), &scene, &mut self.neighbours, now, dt_s)
-            && self.timers.take(Timer::HeldReport, now, REPORT_EVERY)
+            && self.timers.take_due(Timer::HeldReport, now, REPORT_EVERY)
         {
-            self.links.say(true, "Setpoint out of limits: holding");
+            self.links.send_text(true, "Setpoint out of limits: holding");
         }
-        if core::mem::take(&mut self.guidance.turned) {
-            self.links.set_due(Link::Swarm, Fresh::Intent, true);
+        if core::mem::take(&mut self.guidance.hold_changed) {
+            self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
         }
         self.step_division();
         self.report_unstarted_vehicle();
-        self.look_around();
-        self.run_table();
+        self.scan_for_obstacles();
+        self.run_mission_table();
         self.step_task();
-        let situation = self.situation();
-        if self.requests.poll(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
-            self.guidance.tune(&self.config, self.requests.limits());
+        let situation = self.request_context();
+        if self.requests.request_due(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
+            self.guidance.set_limits(&self.config, self.requests.limits());
         }
         let flows = self.mission.state().streams_setpoints();
-        self.links.set_due(Link::Autopilot, Fresh::Setpoint, flows);
+        self.links.set_due(Link::Autopilot, OnDemandMessage::Setpoint, flows);
         let every = if flows { SETPOINT_EVERY } else { IDLE_STEP_EVERY };
-        self.timers.repeat(Timer::Step, now, every);
+        self.timers.schedule_next(Timer::Step, now, every);
     }
 
-    /// Lets the task command what it wants at this place.
+    /// Sends the task's commands that are due at this place.
     fn step_task(&mut self) {
         let state = self.mission.state();
-        let off_plan = self.guidance.returning || self.guidance.aside || self.detours.is_flying();
-        self.step_photographed(off_plan);
-        let along = Along {
-            progress_m: self.guidance.progress_m(state, &self.scene()),
+        let off_plan = self.guidance.returning || self.guidance.ends_aside || self.detours.is_on_detour();
+        self.update_photographed(off_plan);
+        let along = PathProgress {
+            progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
             // A vehicle that brakes along its path takes the pictures that it passes.
             place: match state.holds_place() {
-                true if self.detours.beside.flies() && !self.guidance.returning => Place::Beside,
-                true if !off_plan => Place::OnPath,
-                _ => Place::Elsewhere,
+                true if self.detours.field_detour.is_flying() && !self.guidance.returning => {
+                    PathRelation::Beside
+                }
+                true if !off_plan => PathRelation::OnPath,
+                _ => PathRelation::Elsewhere,
             },
         };
         self.mission.step_task(along, self.now, &mut self.links);
@@ -74,21 +76,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let flies = matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
         let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
-        if self.mission.names(id, self.now) {
-            self.links.say_count(true, "Waiting for vehicle #: it has not started", [u32::from(id), 0]);
+        if self.mission.should_report_wait(id, self.now) {
+            self.links.send_text_with_numbers(
+                true,
+                "Waiting for vehicle #: it has not started",
+                [u32::from(id), 0],
+            );
             // Full only if the shell does not drain.
             let _ = self.events.push_back(Event::WaitsForStart { id });
         }
     }
 
     /// Compares the estimate's bound with what the margin leaves, and sets the pace.
-    pub(super) fn watch_estimate(&mut self) {
+    pub(super) fn check_estimate_error(&mut self) {
         let (now, config) = (self.now, &self.config);
         let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
         // The best that a receiver can do was weighed when the margin was chosen.
         let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_M {
             true => 1.0,
-            false => margins::pace(bound_m, config.required_clearance_m, config.radius_m),
+            false => margins::speed_share_for_bound(bound_m, config.required_clearance_m, config.radius_m),
         };
         let before = core::mem::replace(&mut self.guidance.pace, pace);
         self.mission.note_estimate(pace > 0.0, now);
@@ -98,7 +104,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         // Whole centimetres, rounded up; more than a hundred metres is not known.
         let cm = libm::ceilf(libm::fminf(bound_m, 100.0) * 100.0) as u32;
-        let room_m = margins::room_m(config.required_clearance_m, config.radius_m, margins::TRACKING_M);
+        let room_m =
+            margins::estimate_margin_m(config.required_clearance_m, config.radius_m, margins::TRACKING_M);
         let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
         let (warning, text) = match kind(pace) {
             2 => (false, "Estimate within # cm again"),
@@ -106,27 +113,27 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ if bound_m > 100.0 => (true, "Estimate of unknown accuracy: stopping"),
             _ => (true, "Estimate within # cm, margin # cm: stopping"),
         };
-        self.links.say_count(warning, text, [cm, room_cm]);
+        self.links.send_text_with_numbers(warning, text, [cm, room_cm]);
     }
 
-    pub(super) fn run_table(&mut self) {
+    pub(super) fn run_mission_table(&mut self) {
         for _ in 0..MAX_ROWS_PER_STEP {
-            let inputs = self.inputs();
-            let Some(row) = mission::update(self.mission.state(), &inputs) else { return };
-            self.take(row);
+            let inputs = self.guard_inputs();
+            let Some(row) = mission::first_applicable_row(self.mission.state(), &inputs) else { return };
+            self.apply_row(row);
         }
     }
 
-    pub(super) fn take(&mut self, row: &'static Row) {
+    pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
-        let (from, to) = self.mission.enter(row, self.telemetry.custom_mode, now);
+        let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, now);
         self.requests.state_changed(from, to);
-        self.act(from, to, row);
+        self.run_action(from, to, row);
         if !row.text.is_empty() {
-            self.links.say(row.warning, row.text);
+            self.links.send_text(row.warning, row.text);
         }
-        if let Some(text) = self.mission.interruption(from, to) {
-            self.links.say(false, text);
+        if let Some(text) = self.mission.interruption_text(from, to) {
+            self.links.send_text(false, text);
         }
         // Full only if the shell does not drain: then the newest is lost.
         let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
@@ -137,23 +144,23 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    pub(super) fn act(&mut self, from: State, to: State, row: &Row) {
+    pub(super) fn run_action(&mut self, from: State, to: State, row: &TransitionRow) {
         let now = self.now;
-        self.mark_place(to);
+        self.save_place_before_jump(to);
         let position = self.telemetry.position;
         match row.action {
             Action::None | Action::ForgetStart => {}
-            Action::Connect => self.connect(),
+            Action::Connect => self.request_streams(),
             Action::RequestPlan => {
                 self.mission.forget_plan();
                 self.detours.forget_plan();
                 self.neighbours.forget_plan();
                 self.guidance.reset();
-                self.mission.photographed_mut().begin(self.config.resumes);
+                self.mission.photographed_mut().begin_plan(self.config.resumes);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
-                    fleet.begin(now);
+                    fleet.begin_flight(now);
                 }
-                let _ = self.events.push_back(Event::PlanRequested(Wanted::Mission));
+                let _ = self.events.push_back(Event::PlanRequested(PlanKind::Mission));
             }
             Action::HoldHere if to == State::Streaming => {
                 self.mission.leave_pad();
@@ -162,85 +169,89 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
             Action::HoldHere => self.guidance.hold_at(position),
             Action::HoldOver => self.timers.set(Timer::Request, now),
-            Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.timers.set(Timer::Request, now),
-            Action::AskLand => self.ask_land(from),
-            Action::AskDisarm if to == State::Disarm => self.timers.set(Timer::Request, now + DISARM_EVERY),
-            Action::AskDisarm | Action::CancelStart => self.timers.set(Timer::Request, now),
-            Action::BeginClimb => self.guidance.begin_climb(&position),
-            Action::RunPath => self.guidance.run(now),
-            Action::RequestDetour => self.request_detour(Aim::Goal),
-            Action::RequestHome => self.request_detour(Aim::Home),
-            Action::RequestBeyond => self.request_beyond(),
-            Action::TurnHome => {
-                self.guidance.brake();
-                self.detours.beside.end();
-                self.detours.home.turn(now);
+            Action::RequestOffboard | Action::RequestArming | Action::RequestTakeOff => {
+                self.timers.set(Timer::Request, now)
             }
-            Action::RequestAside => {
-                self.guidance.brake();
+            Action::RequestLandMode => self.request_landing(from),
+            Action::RequestDisarming if to == State::Disarm => {
+                self.timers.set(Timer::Request, now + DISARM_EVERY)
+            }
+            Action::RequestDisarming | Action::CancelStart => self.timers.set(Timer::Request, now),
+            Action::BeginClimb => self.guidance.begin_climb(&position),
+            Action::FollowPath => self.guidance.start_following(now),
+            Action::RequestDetour => self.request_detour(DetourPurpose::Goal),
+            Action::RequestPathHome => self.request_detour(DetourPurpose::Home),
+            Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
+            Action::TurnHome => {
+                self.guidance.begin_braking();
+                self.detours.field_detour.abort();
+                self.detours.home.begin(now);
+            }
+            Action::RequestDetourAside => {
+                self.guidance.begin_braking();
                 // On its way back it was to land already.
                 let lands = self.guidance.returning;
-                self.request_detour(if lands { Aim::Landing } else { Aim::Aside });
+                self.request_detour(if lands { DetourPurpose::Landing } else { DetourPurpose::Aside });
             }
-            Action::RequestLanding => self.request_detour(Aim::Landing),
-            Action::MissDetour => self.miss_detour(PlanFailure::Late),
+            Action::RequestLanding => self.request_detour(DetourPurpose::Landing),
+            Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),
             Action::FlyDetour => {
                 self.guidance.begin_path(now);
-                self.guidance.aside = self.detours.is_aside();
+                self.guidance.ends_aside = self.detours.is_detour_aside();
             }
             Action::FlyDivision => {
                 self.mission.fly_division();
-                self.detours.beside.end();
-                self.guidance.run(now);
+                self.detours.field_detour.abort();
+                self.guidance.start_following(now);
             }
-            Action::BrakeOnPath => self.guidance.brake(),
-            Action::Rejoin => self.go_on(from, to),
+            Action::BrakeOnPath => self.guidance.begin_braking(),
+            Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
-                self.detours.home.forget();
-                self.detours.beside.end();
-                let along_m = self.guidance.progress_m(from, &self.scene());
+                self.detours.home.cancel();
+                self.detours.field_detour.abort();
+                let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
                 let guidance = &mut self.guidance;
-                self.mission.turn_back(along_m, |path| guidance.turn_back(path, now));
+                self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));
             }
         }
     }
 
-    pub(super) fn ask_land(&mut self, from: State) {
+    pub(super) fn request_landing(&mut self, from: State) {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
-        // Whom nobody hears is kept off where it may lie: it comes down as straight as it can be led. A landing that waited goes on
-        // as it began.
-        if from == Alone || (from == LandingHeld && self.guidance.leads()) {
-            return self.guidance.lead_down(self.now);
+        // Whom no other vehicle hears is kept clear where it may lie: it comes down as straight as it can be led. A
+        // landing that waited continues as it began.
+        if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
+            return self.guidance.begin_guided_landing(self.now);
         }
-        self.guidance.leave_landing();
+        self.guidance.end_guided_landing();
         match from {
             Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land | Disarm => {
-                self.guidance.brake();
+                self.guidance.begin_braking();
             }
             // Off the path, or not known to be on it: the reference may be beyond a wall.
             _ => self.guidance.hold_at(position),
         }
     }
 
-    /// Goes on in the state that was interrupted.
-    pub(super) fn go_on(&mut self, from: State, to: State) {
+    /// Resumes the state that was interrupted.
+    pub(super) fn resume_interrupted_state(&mut self, from: State, to: State) {
         let (now, position) = (self.now, self.telemetry.position);
         match to {
             State::TakeOff => self.timers.set(Timer::Request, now),
-            State::Land => self.ask_land(from),
+            State::Land => self.request_landing(from),
             _ => {
-                let climbs = matches!(self.mission.beneath(), State::TakeOff | State::Climb);
+                let climbs = matches!(self.mission.uninterrupted_state(), State::TakeOff | State::Climb);
                 if let Some(plan) = self.mission.plan() {
-                    self.guidance.go_on(plan, climbs, &position, now);
+                    self.guidance.resume_flight(plan, climbs, &position, now);
                 }
                 if to == State::Blocked {
                     // Until the next scan has checked the path.
                     self.detours.assume_blocked();
                 }
                 if !matches!(to, State::Climb | State::Follow) {
-                    self.guidance.brake();
+                    self.guidance.begin_braking();
                 }
             }
         }

@@ -19,7 +19,7 @@ use super::*;
 use crate::autopilot::px4;
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
-use planner_core::flight::{Look, Photographs, Range, Task, Trigger};
+use planner_core::flight::{HeadingMode, PicturePlan, Task, Trigger, WaypointRange};
 
 /// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
 pub(super) fn assert_no_gap(bench: &Bench) {
@@ -70,8 +70,8 @@ fn looks_where_its_task_says() {
     for look in [None, Some(0.7f32), Some(-2.5)] {
         let mut bench = Bench::new(config());
         if let Some(heading) = look {
-            let mut photographs = Photographs::new(2.0, Look::Fixed(heading), Trigger::None);
-            photographs.mark(1, 2, Range { first: 0, end: 2 }).unwrap();
+            let mut photographs = PicturePlan::new(2.0, HeadingMode::Fixed(heading), Trigger::None);
+            photographs.add_stretch(1, 2, WaypointRange { first: 0, end: 2 }).unwrap();
             bench.answer_plan = Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
         }
         bench.until(State::Ready, 6.0);

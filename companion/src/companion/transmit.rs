@@ -13,7 +13,7 @@ use crate::guidance::Setpoint;
 use crate::link::frame;
 use crate::link::intent::{self, Intent};
 use crate::link::roster;
-use crate::link::{Fresh, done};
+use crate::link::{OnDemandMessage, done};
 use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
@@ -32,119 +32,126 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let system = self.config.system_id;
         if link == Link::Autopilot
-            && self.links.take_due(link, Fresh::Setpoint)
-            && let Some(data) = self.setpoint()
+            && self.links.take_due(link, OnDemandMessage::Setpoint)
+            && let Some(data) = self.setpoint_message()
         {
-            return frame::encode(self.links.header(link, system), &data, out);
+            return frame::encode(self.links.next_header(link, system), &data, out);
         }
-        if self.links.take_due(link, Fresh::Heartbeat) {
-            return frame::encode(self.links.header(link, system), &self.heartbeat(), out);
+        if self.links.take_due(link, OnDemandMessage::Heartbeat) {
+            return frame::encode(self.links.next_header(link, system), &self.heartbeat_message(), out);
         }
-        if link == Link::Swarm && self.links.take_due(link, Fresh::Position) {
-            let data = self.global_position();
-            return frame::encode(self.links.header(link, system), &data, out);
+        if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Position) {
+            let data = self.global_position_message();
+            return frame::encode(self.links.next_header(link, system), &data, out);
         }
-        if link == Link::Swarm && self.links.take_due(link, Fresh::Intent) {
+        if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Intent) {
             let mut payload = [0; 133];
-            let len = self.intent().encode(&mut payload);
+            let len = self.own_intent().encode(&mut payload);
             let header = self.links.intent_header(system, self.now);
             if self.guidance.hold.is_on() {
-                self.guidance.hold.note(self.now);
+                self.guidance.hold.note_reported(self.now);
             }
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
         if link == Link::Swarm
-            && self.links.take_due(link, Fresh::Roster)
+            && self.links.take_due(link, OnDemandMessage::Roster)
             && let Some(mut roster) = self.neighbours.roster()
         {
             (roster.system_id, roster.mission_crc) = (system, self.config.mission_crc);
             let mut payload = [0; roster::MAX_LEN];
             let len = roster.encode(&mut payload);
-            let header = self.links.header(link, system);
+            let header = self.links.next_header(link, system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
-        if link == Link::Swarm && self.links.take_due(link, Fresh::Done) {
+        if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Done) {
             let mut payload = [0; done::MAX_LEN];
             let len = self.done_report().encode(&mut payload);
-            let header = self.links.header(link, system);
+            let header = self.links.next_header(link, system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
-        if self.links.take_due(link, Fresh::DoneCount) {
-            let data = self.done_count();
-            return frame::encode(self.links.header(link, system), &data, out);
+        if self.links.take_due(link, OnDemandMessage::DoneCount) {
+            let data = self.done_count_message();
+            return frame::encode(self.links.next_header(link, system), &data, out);
         }
-        if link == Link::Swarm && !self.links.radio_allows(self.now, self.telemetry.armed) {
+        if link == Link::Swarm && !self.links.may_send_by_radio(self.now, self.telemetry.armed) {
             return 0;
         }
-        let relayed = if link == Link::Swarm { self.pass_on(out) } else { 0 };
-        let length = if relayed > 0 { relayed } else { self.answer(link, out) };
+        let relayed = if link == Link::Swarm { self.relay_neighbours(out) } else { 0 };
+        let length = if relayed > 0 { relayed } else { self.transmit_answer(link, out) };
         if link == Link::Swarm {
-            self.links.spend(length);
+            self.links.count_radio_bytes(length);
         }
         length
     }
 
     /// Relays vehicles that neighbours do not hear, while the rate limit has enough for answers
     /// too.
-    fn pass_on(&mut self, out: &mut [u8]) -> usize {
-        if !self.links.radio_half_full() || !self.links.take_due(Link::Swarm, Fresh::Relay) {
+    fn relay_neighbours(&mut self, out: &mut [u8]) -> usize {
+        if !self.links.is_radio_bucket_half_full()
+            || !self.links.take_due(Link::Swarm, OnDemandMessage::Relay)
+        {
             return 0;
         }
         let plan_crc = self.mission.plan().map_or(0, |plan| plan.plan_crc);
         let crc = self.config.mission_crc;
-        let relay = self.neighbours.relay(self.now, crc, plan_crc);
+        let relay = self.neighbours.next_relay(self.now, crc, plan_crc);
         if relay.is_empty() {
             return 0;
         }
         let mut payload = [0; relay::MAX_LEN];
         let len = relay.encode(self.config.system_id, &mut payload);
-        let header = self.links.header(Link::Swarm, self.config.system_id);
+        let header = self.links.next_header(Link::Swarm, self.config.system_id);
         frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
     /// Writes an answer that was requested, or a message that waits to be sent.
-    fn answer(&mut self, link: Link, out: &mut [u8]) -> usize {
+    fn transmit_answer(&mut self, link: Link, out: &mut [u8]) -> usize {
         let system = self.config.system_id;
-        if self.links.take_due(link, Fresh::Version) {
-            return frame::encode(self.links.header(link, system), &services::version(system), out);
+        if self.links.take_due(link, OnDemandMessage::Version) {
+            return frame::encode(
+                self.links.next_header(link, system),
+                &services::autopilot_version(system),
+                out,
+            );
         }
-        let length = self.links.transmit(link, system, out);
+        let length = self.links.write_queued(link, system, out);
         if length > 0 {
             return length;
         }
         let Some(payload) = self.services.poll_ftp(link) else { return 0 };
-        let header = self.links.header(link, system);
+        let header = self.links.next_header(link, system);
         let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
         frame::encode_raw(header, id, extra, &payload, out)
     }
 
     /// Sends a person a text by STATUSTEXT on both links, at most 50 bytes.
-    pub fn say(&mut self, warning: bool, text: &'static str) {
-        self.links.say(warning, text);
+    pub fn send_text(&mut self, warning: bool, text: &'static str) {
+        self.links.send_text(warning, text);
     }
 
-    /// As `say`, with numbers: each `#` of the text stands for one.
-    pub fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
-        self.links.say_count(warning, text, numbers);
+    /// As `send_text`, with numbers: each `#` of the text stands for one.
+    pub fn send_text_with_numbers(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+        self.links.send_text_with_numbers(warning, text, numbers);
     }
 
-    fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
+    fn setpoint_message(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let kind = self.kind();
-        let stop = |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, None, kind.stop_mask());
+        let stop =
+            |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, None, kind.stop_type_mask());
         let (position, velocity, acceleration, heading, mask) =
-            match self.guidance.setpoint(self.mission.state(), &self.scene()) {
+            match self.guidance.setpoint(self.mission.state(), &self.guidance_inputs()) {
                 Setpoint::None => return None,
                 Setpoint::Stop(velocity) => stop(&velocity),
                 Setpoint::Move(position, velocity, acceleration, heading) => {
                     self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
                         let velocity = frames::swap_enu_ned(&velocity);
-                        (ned, velocity, frames::swap_enu_ned(&acceleration), heading, kind.move_mask())
+                        (ned, velocity, frames::swap_enu_ned(&acceleration), heading, kind.move_type_mask())
                     })
                 }
             };
         Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
-            time_boot_ms: self.now.boot_ms(),
+            time_boot_ms: self.now.as_boot_ms(),
             x: position.x,
             y: position.y,
             z: position.z,
@@ -167,7 +174,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         })
     }
 
-    fn heartbeat(&self) -> HEARTBEAT_DATA {
+    fn heartbeat_message(&self) -> HEARTBEAT_DATA {
         let system_status = match self.mission.state() {
             State::WaitAutopilot | State::WaitPosition => MavState::MAV_STATE_BOOT,
             State::Planning | State::Ready | State::Done | State::Aborted => MavState::MAV_STATE_STANDBY,
@@ -184,13 +191,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
+    fn global_position_message(&self) -> GLOBAL_POSITION_INT_DATA {
         let reported = self.detours.reported_place(&self.telemetry, self.now);
         let place = frames::enu_to_geodetic(&self.config.origin, &reported.position);
         let cm = frames::swap_enu_ned(&reported.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
             // When the position was known, so that a copy is known as one.
-            time_boot_ms: reported.at.boot_ms(),
+            time_boot_ms: reported.at.as_boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
             alt: libm::round(place.alt_m * 1e3) as i32,
@@ -202,7 +209,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn intent(&self) -> Intent {
+    fn own_intent(&self) -> Intent {
         use State::*;
         let grounded = match self.mission.state() {
             Done | Disarm => true,
@@ -226,54 +233,54 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Paused
             )
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
-                && self.guidance.at_goal(&self.scene());
+                && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
-        let out = self.detours.is_out(&self.view());
+        let out = self.detours.is_out_of_plan(&self.detour_view());
         let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
             | flag(intent::LANDED, self.mission.state() == Done)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT_OF_PLAN, out)
-            | flag(intent::WAITING, self.detours.waits(&self.view()))
+            | flag(intent::WAITING, self.detours.is_waiting(&self.detour_view()))
             | flag(intent::BLOCKED, self.detours.is_blocked())
             | flag(
                 intent::ON_DETOUR,
-                self.detours.is_flying() || self.detours.has_left() || self.guidance.evading,
+                self.detours.is_on_detour() || self.detours.has_left_plan() || self.guidance.evading,
             );
         let plan = self.mission.plan();
-        let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());
-        let (mut points, column) = self.way_ahead();
+        let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
+        let (mut points, column) = self.points_ahead();
         let near = points.len();
-        self.add_unheard(&mut points);
+        self.add_unheard_points(&mut points);
         let beyond = (points.len() - near) as u8;
-        let (clear_m, clear_in_s) = self.clears_m();
+        let (clear_m, clear_in_s) = self.unheard_reach_m();
         Intent {
             system_id: self.config.system_id,
             flags,
             mission_crc: self.config.mission_crc,
             plan_crc: plan.map_or(0, |plan| plan.plan_crc),
-            progress_m: if self.detours.is_flying() { self.detours.left_at_m() } else { along_m },
-            heard: self.neighbours.heard_bits(self.now),
-            clear_m,
-            clear_in_s,
-            floor_m: plan.map_or(self.mission.start().z, |plan| self.guidance.ground_m(plan)),
-            column,
-            echo: self.neighbours.echo(self.links.intents_sent(), self.now),
+            progress_m: if self.detours.is_on_detour() { self.detours.left_at_m() } else { along_m },
+            heard_bits: self.neighbours.heard_bits(self.now),
+            gates_open_up_to_m: clear_m,
+            gates_open_in_s: clear_in_s,
+            ground_m: plan.map_or(self.mission.path_start().z, |plan| self.guidance.ground_m(plan)),
+            may_come_down: column,
+            echo: self.neighbours.next_echo(self.links.intents_sent(), self.now),
             points,
-            beyond,
+            first_unheard_point: beyond,
         }
     }
 
-    /// Adds, over an area, the points that it flies along beyond those if nobody hears it any more: as far as its lease takes
-    /// it, or to the end where it has left and needs none.
-    fn add_unheard(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
+    /// Adds, over an area, the points that it flies along beyond those if no other vehicle hears it any more: as far as
+    /// its lease takes it, or to the end where it has left and needs none.
+    fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         let flies = self.mission.state().flies_on_lease();
-        let descends = self.guidance.along_m() >= 0.0 && self.guidance.descends();
+        let descends = self.guidance.along_m() >= 0.0 && self.guidance.is_descending();
         let Some(plan) = self.mission.plan().filter(|_| flies && !descends) else { return };
         // Full after eight: further is not reported.
         let mut add = |point: Point| _ = points.push(point);
         let (path, on_path) = (&plan.path, self.guidance.along_m() >= 0.0);
         let from_m = if on_path { self.guidance.setpoint_m } else { 0.0 };
-        let Some(most_m) = self.unheard_m() else { return };
+        let Some(most_m) = self.unheard_limit_m() else { return };
         if self.guidance.returning {
             let back = path.waypoints().iter().rev().filter(|w| w.along_m < from_m);
             return back.for_each(|w| add(w.position));
@@ -286,7 +293,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Place along its path beyond which it does not fly unheard over an area, metres; none elsewhere.
-    fn unheard_m(&self) -> Option<f32> {
+    fn unheard_limit_m(&self) -> Option<f32> {
         let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
         let lease_m = UNHEARD_S * self.config.cruise_mps;
         let from_m = self.guidance.setpoint_m.max(0.0);
@@ -295,11 +302,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.
-    fn way_ahead(&self) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
+    fn points_ahead(&self) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
         use State::*;
         let mut points = heapless::Vec::new();
         let here = self.telemetry.position;
-        let setpoint = match self.guidance.setpoint(self.mission.state(), &self.scene()) {
+        let setpoint = match self.guidance.setpoint(self.mission.state(), &self.guidance_inputs()) {
             Setpoint::Move(place, ..) => place,
             _ => here,
         };
@@ -325,7 +332,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 column = false;
                 add(setpoint);
             }
-            Follow if self.guidance.descends() => {
+            Follow if self.guidance.is_descending() => {
                 add(setpoint);
                 last.into_iter()
                     .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
@@ -333,7 +340,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping => {
                 column = false;
                 add(setpoint);
-                let (from_m, most_m) = (self.guidance.setpoint_m, self.unheard_m().unwrap_or(f32::INFINITY));
+                let (from_m, most_m) =
+                    (self.guidance.setpoint_m, self.unheard_limit_m().unwrap_or(f32::INFINITY));
                 let to_m = self.guidance.stops_at_m.min(most_m);
                 let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
                 ahead.for_each(|w| add(w.position));

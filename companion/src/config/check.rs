@@ -2,8 +2,8 @@
 
 use planner_core::Point;
 
-use super::{Checked, Config, ConfigError, RosterEntry, holds};
-use crate::autopilot::Kind;
+use super::{CheckedConfig, Config, ConfigError, RosterEntry, box_contains};
+use crate::autopilot::AutopilotKind;
 use crate::guidance::limits::Settings;
 
 impl<const V: usize> Config<V> {
@@ -11,15 +11,15 @@ impl<const V: usize> Config<V> {
     ///
     /// # Errors
     /// As [`Self::check`].
-    pub fn checked(self) -> Result<Checked<V>, ConfigError> {
+    pub fn checked(self) -> Result<CheckedConfig<V>, ConfigError> {
         self.check()?;
-        let (_, own) = self.own().ok_or(ConfigError::NotInRoster)?;
-        Ok(Checked { start: own.start, config: self })
+        let (_, own) = self.own_roster_entry().ok_or(ConfigError::NotInRoster)?;
+        Ok(CheckedConfig { start: own.start, config: self })
     }
 
     /// Whether it can be flown.
     pub fn check(&self) -> Result<(), ConfigError> {
-        if self.system_id == 0 || self.own().is_none() {
+        if self.system_id == 0 || self.own_roster_entry().is_none() {
             return Err(ConfigError::NotInRoster);
         }
         if self.roster.iter().any(|e| e.system_id == 0)
@@ -53,11 +53,12 @@ impl<const V: usize> Config<V> {
         if !self.geofence.is_none_or(sound) {
             return Err(ConfigError::Geofence);
         }
-        let inside = |entry: &&RosterEntry| self.geofence.is_none_or(|fence| holds(&fence, &entry.start));
+        let inside =
+            |entry: &&RosterEntry| self.geofence.is_none_or(|fence| box_contains(&fence, &entry.start));
         if let Some(outside) = self.roster.iter().find(|entry| !inside(entry)) {
             return Err(ConfigError::StartOutside(outside.system_id));
         }
-        for kind in [Kind::Px4, Kind::ArduPilot] {
+        for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
             let settings = Settings::new(self, &kind.default_limits());
             settings.check().map_err(|error| ConfigError::Setting(error.0))?;
         }

@@ -19,7 +19,7 @@ const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
 
 impl Guidance {
     /// Stops the setpoint where it is: the state that follows does not go.
-    pub fn brake(&mut self) {
+    pub fn begin_braking(&mut self) {
         self.evade_search.reset();
     }
 
@@ -37,22 +37,22 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.linked_within(now, LINKED_WITHIN) {
-            self.linked_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.secs_f32();
+            self.heard_by_others_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let alone = state == State::Alone;
-        // On its way down it goes on, and on its way aside.
+        // On its way down it continues, and on its way aside.
         let waits = matches!(
             state,
             State::Follow | State::Blocked | State::Replanning | State::Dividing | State::Alone
         ) && matches!(self.phase, Phase::Path | Phase::Join)
-            && !(self.aside && state == State::Follow);
+            && !(self.ends_aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
         let waits_there = waits && advice.stop_within_m < WAIT_WITHIN_M;
         if waits_there {
-            self.evade_search.go_on(path, wait_m, neighbours.len(), |i, tell| {
+            self.evade_search.continue_search(path, wait_m, neighbours.len(), |i, tell| {
                 if alone {
-                    neighbours.above(i, safety_m + UNHEARD_LANDING_DRIFT_M, tell);
+                    neighbours.column_above(i, safety_m + UNHEARD_LANDING_DRIFT_M, tell);
                 } else {
                     neighbours.landing_column(i, now, beside_m, tell);
                 }
@@ -65,20 +65,20 @@ impl Guidance {
             EvadeTarget::Back(to_m) => (Some(to_m.min(wait_m)), false),
             EvadeTarget::Nowhere => (None, !alone),
         };
-        let linked_m = self.linked_m;
+        let linked_m = self.heard_by_others_m;
         let to_m = to_m.filter(|to_m| !alone || *to_m >= linked_m);
         self.evading = to_m.is_some();
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }
-        self.waits_m = advice.stop_within_m;
+        self.wait_distance_m = advice.stop_within_m;
         self.back_to_m = to_m.filter(|to_m| *to_m < along_m);
-        self.nowhere = nowhere;
+        self.no_better_place = nowhere;
     }
 
     /// After the raw points of a step; `blocked` if one of them could not go back.
     pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {
-        if self.nowhere || (self.back_to_m.is_some() && blocked) {
+        if self.no_better_place || (self.back_to_m.is_some() && blocked) {
             self.trapped_since.get_or_insert(now);
         } else {
             self.trapped_since = None;

@@ -10,11 +10,11 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
-use planner_core::detour::KeepOff;
+use planner_core::detour::KeepOutZone;
 use planner_core::flight::Path;
 use planner_core::track::Tracker;
 
-use crate::swarm::sweep::Sweep;
+use crate::swarm::sweep::IncrementalScan;
 
 /// Drift of the vehicle that descends and sway of the one below, together, metres.
 pub const EVADE_MARGIN_M: f32 = 0.6;
@@ -29,7 +29,7 @@ const MAX_SEARCH_COST: u16 = 96;
 const PLACE_COST: u16 = 4;
 /// Fastest on a straight leg, m/s.
 const MAX_LEG_MPS: f32 = 1.5;
-/// Fastest through the ends of a leg, m/s: at this speed the vehicle strays from a right angle by
+/// Fastest through the ends of a leg, m/s: at this speed the vehicle deviates from a right angle by
 /// 0.47 m.
 const MAX_CORNER_MPS: f32 = 0.6;
 /// Acceleration of a vehicle that evades, m/s².
@@ -37,7 +37,7 @@ const EVADE_MPS2: f32 = 1.0;
 /// Braking of a vehicle that flies on, m/s².
 const BRAKING_MPS2: f32 = 1.5;
 
-/// Place to wait at.
+/// Target of an evasion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum EvadeTarget {
     /// The place where the vehicle waits in any case.
@@ -49,44 +49,49 @@ pub enum EvadeTarget {
     Nowhere,
 }
 
-/// Looks for the nearest place to wait that no column holds.
+/// Search for the nearest waiting place that is outside all landing columns.
 #[derive(Clone, Debug, Default)]
-pub struct Search {
-    sweep: Sweep,
+pub struct EvadeSearch {
+    sweep: IncrementalScan,
     /// Place along the path where the evading began, metres, and the number of places from there
     /// back that are held.
     from_m: Option<f32>,
-    held: u16,
+    columns_found: u16,
     /// Result of the last search.
     pub found: EvadeTarget,
 }
 
-impl Search {
+impl EvadeSearch {
     /// Searches on, back from `wait_m` along the path; `tell` gives the columns of a neighbour, of so many.
-    pub fn go_on<const W: usize>(
+    pub fn continue_search<const W: usize>(
         &mut self,
         path: &Path<W>,
         wait_m: f32,
         neighbours: usize,
-        tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
+        tell: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
     ) {
         // A vehicle that steps back while it searches waits ever further back; one that waits further ahead asks again.
         let from_m = self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
-            self.held = 0;
+            self.columns_found = 0;
             self.sweep.restart();
             wait_m
         });
         self.from_m = Some(from_m);
         let mut budget = MAX_SEARCH_COST;
         let found = loop {
-            let along_m = from_m - f32::from(self.held) * PLACE_STEP_M;
-            let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
-            let Some(place) = place.filter(|_| self.held <= MAX_PLACES) else { break EvadeTarget::Nowhere };
+            let along_m = from_m - f32::from(self.columns_found) * PLACE_STEP_M;
+            let place = path.point_at(along_m).filter(|_| self.columns_found == 0 || along_m >= 0.0);
+            let Some(place) = place.filter(|_| self.columns_found <= MAX_PLACES) else {
+                break EvadeTarget::Nowhere;
+            };
             budget = budget.saturating_sub(PLACE_COST);
-            match self.sweep.go_on(neighbours, &mut budget, 1, &tell, |column| column.holds(&place)) {
+            match self
+                .sweep
+                .continue_scan(neighbours, &mut budget, 1, &tell, |column| column.contains(&place))
+            {
                 None => return,
-                Some(true) => self.held += 1,
-                Some(false) if self.held == 0 => break EvadeTarget::Here,
+                Some(true) => self.columns_found += 1,
+                Some(false) if self.columns_found == 0 => break EvadeTarget::Here,
                 Some(false) => break EvadeTarget::Back(along_m),
             }
         };
@@ -100,7 +105,7 @@ impl Search {
 }
 
 /// One step of `dt_s` back towards `to_m`; `None` if another vehicle is behind.
-pub fn step<const W: usize>(
+pub fn step_back<const W: usize>(
     path: &Path<W>,
     tracker: &mut Tracker,
     to_m: f32,
@@ -114,7 +119,7 @@ pub fn step<const W: usize>(
         // The vehicle flies on, and brakes first.
         tracker.speed_mps = (tracker.speed_mps - BRAKING_MPS2 * dt_s).max(0.0);
         tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
-        return at(path, tracker);
+        return point_at(path, tracker);
     }
     let follows = |n: &&Neighbour| {
         let apart = |p: &Point| (n.position - p).norm();
@@ -132,10 +137,10 @@ pub fn step<const W: usize>(
     let speed = ahead.min(MAX_LEG_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
-    at(path, tracker)
+    point_at(path, tracker)
 }
 
-fn at<const W: usize>(path: &Path<W>, tracker: &Tracker) -> Option<Point> {
+fn point_at<const W: usize>(path: &Path<W>, tracker: &Tracker) -> Option<Point> {
     path.point_at(tracker.along_m)
 }
 
@@ -143,7 +148,7 @@ fn at<const W: usize>(path: &Path<W>, tracker: &Tracker) -> Option<Point> {
 mod tests {
     extern crate std;
 
-    use planner_core::detour::Nature;
+    use planner_core::detour::ZoneKind;
 
     use super::*;
 
@@ -164,25 +169,25 @@ mod tests {
             age_s: 0.0,
             progress_m: None,
             grounded: false,
-            out: false,
+            out_of_plan: false,
             detours: false,
         }
     }
 
     /// The column of one that comes down from 8 m.
-    fn column(x: f32, y: f32, radius_m: f32) -> KeepOff {
+    fn column(x: f32, y: f32, radius_m: f32) -> KeepOutZone {
         let (from, to) = (Point::new(x, y, 8.0), Point::new(x, y, 0.0));
-        KeepOff { from, to, radius_m, nature: Nature::Landing }
+        KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending }
     }
 
     /// Result of a search for a place to wait at 9 m, and the steps that it takes.
-    fn search(columns: &[KeepOff]) -> (EvadeTarget, usize) {
+    fn search(columns: &[KeepOutZone]) -> (EvadeTarget, usize) {
         let path = path();
-        let mut search = Search { found: EvadeTarget::Back(99.0), ..Search::default() };
+        let mut search = EvadeSearch { found: EvadeTarget::Back(99.0), ..EvadeSearch::default() };
         for steps in 1.. {
             // A neighbour gives up to 16.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
-            search.go_on(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
+            search.continue_search(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
             if search.found != EvadeTarget::Back(99.0) {
                 return (search.found, steps);
             }
@@ -220,14 +225,14 @@ mod tests {
         follower.progress_m = Some(0.0);
         let mut steps = 0;
         while tracker.along_m > 4.0 && steps < 400 {
-            step(&path, &mut tracker, 4.0, &[follower], 1.5, 0.05).unwrap();
+            step_back(&path, &mut tracker, 4.0, &[follower], 1.5, 0.05).unwrap();
             let corner_m = (tracker.along_m - 6.0).abs();
             assert!(corner_m > 0.05 || tracker.speed_mps.abs() < MAX_CORNER_MPS + 0.15, "{tracker:?}");
             steps += 1;
         }
         assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");
         let mut near = Tracker { along_m: 2.0, ..Tracker::default() };
-        while step(&path, &mut near, 0.0, &[follower], 1.5, 0.05).is_some() {}
+        while step_back(&path, &mut near, 0.0, &[follower], 1.5, 0.05).is_some() {}
         assert!(near.along_m > 1.5, "{near:?}");
     }
 }

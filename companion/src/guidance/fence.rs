@@ -2,7 +2,7 @@
 //!
 //! A point keeps inside without a jerk if it can always still stop: in each axis the distance that a stop takes, by a part of
 //! the vehicle's acceleration and jerk, is no longer than what is left to the wall. A step that would break this is
-//! replaced, in that axis, by the nearest one that does not ([`Fence::keep`]). The part is such that all three axes can brake at
+//! replaced, in that axis, by the nearest one that does not ([`Fence::limit_jerk`]). The part is such that all three axes can brake at
 //! once: 1/√3 of the jerk for each, 1/√2 of the acceleration across; the stop is planned with a little less, which pays for
 //! steps of finite length.
 //!
@@ -11,8 +11,8 @@
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
-use super::limits::Limits;
-use super::motion::{Motion, shortened};
+use super::limits::MotionLimits;
+use super::motion::{Motion, clamp_length};
 
 /// Distance that a setpoint keeps inside the fence, metres: the autopilot's frame rounds the
 /// setpoint by up to 1.4 mm, 30 km from its origin.
@@ -35,9 +35,9 @@ pub(super) struct Fence {
     high: Point,
 }
 
-/// How an axis brakes.
+/// Acceleration and jerk with which an axis brakes.
 #[derive(Clone, Copy)]
-struct Brake {
+struct BrakingLimits {
     accel_mps2: f32,
     jerk_mps3: f32,
 }
@@ -50,7 +50,7 @@ impl Fence {
     }
 
     /// The nearest place inside.
-    pub(super) fn inside(&self, mut place: Point) -> Point {
+    pub(super) fn nearest_inside(&self, mut place: Point) -> Point {
         for axis in 0..3 {
             place[axis] = fmaxf(fminf(place[axis], self.high[axis]), self.low[axis]);
         }
@@ -58,25 +58,25 @@ impl Fence {
     }
 
     /// The velocity from which the motion can still stop inside, as near as may be to its own.
-    pub(super) fn slowed(&self, motion: &Motion, limits: &Limits) -> Point {
+    pub(super) fn limit_velocity(&self, motion: &Motion, limits: &MotionLimits) -> Point {
         let mut velocity = motion.velocity;
         for axis in 0..3 {
             let place = motion.position[axis];
-            let walls = self.walls(axis, place, brake(limits, axis));
-            let is_safe = |speed: f32| walls.hold(place, speed, 0.0);
+            let walls = self.axis_walls(axis, place, axis_brake(limits, axis));
+            let is_safe = |speed: f32| walls.can_stop_between(place, speed, 0.0);
             if !is_safe(velocity[axis]) {
-                velocity[axis] = nearest(velocity[axis], 0.0, is_safe);
+                velocity[axis] = nearest_safe(velocity[axis], 0.0, is_safe);
             }
         }
         velocity
     }
 
     /// The jerk nearest to the one that is wanted, of no more than `most_mps3`, after whose step the motion can still stop.
-    pub(super) fn keep(
+    pub(super) fn limit_jerk(
         &self,
         motion: &Motion,
         wanted: Point,
-        limits: &Limits,
+        limits: &MotionLimits,
         most_mps3: f32,
         dt_s: f32,
     ) -> Point {
@@ -88,7 +88,7 @@ impl Fence {
             for axis in 0..3 {
                 let (place, speed, accel) =
                     (motion.position[axis], motion.velocity[axis], motion.acceleration[axis]);
-                let walls = self.walls(axis, place, brake(limits, axis));
+                let walls = self.axis_walls(axis, place, axis_brake(limits, axis));
                 let next = |jerk: f32| {
                     let place = place + (speed + (accel * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
                     let speed = speed + (accel + jerk * (0.5 * dt_s)) * dt_s;
@@ -96,7 +96,7 @@ impl Fence {
                 };
                 let is_safe = |jerk: f32| {
                     let (place, speed, accel) = next(jerk);
-                    walls.hold(place, speed, accel)
+                    walls.can_stop_between(place, speed, accel)
                 };
                 if brakes[axis] || is_safe(jerk[axis]) {
                     continue;
@@ -104,20 +104,20 @@ impl Fence {
                 (brakes[axis], changed) = (true, true);
                 // Away from the wall that it comes to, up to the acceleration that braking may take.
                 let (ahead, pace, push) = next(jerk[axis]);
-                let away = if walls.high_holds(ahead, pace, push) { 1.0 } else { -1.0 };
+                let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
                 let part = JERK_SHARES[0] * most_mps3;
-                let accel_most = limits.most_mps2[axis / 2] * ACCEL_SHARES[axis / 2][0];
+                let accel_most = limits.max_accel_mps2[axis / 2] * ACCEL_SHARES[axis / 2][0];
                 hardest[axis] = away * fmaxf(fminf(part, (accel_most - away * accel) / dt_s), -part);
                 let wanted = fmaxf(fminf(jerk[axis], part), -part);
-                jerk[axis] = nearest(wanted, hardest[axis], is_safe);
+                jerk[axis] = nearest_safe(wanted, hardest[axis], is_safe);
             }
             if !changed {
                 break;
             }
-            share_what_is_left(&mut jerk, brakes, &motion.acceleration, limits, most_mps3, dt_s);
+            distribute_remaining_jerk(&mut jerk, brakes, &motion.acceleration, limits, most_mps3, dt_s);
         }
         let across = (motion.acceleration + jerk * dt_s).xy().norm_squared();
-        if brakes[0] && brakes[1] && across > limits.most_mps2[0] * limits.most_mps2[0] {
+        if brakes[0] && brakes[1] && across > limits.max_accel_mps2[0] * limits.max_accel_mps2[0] {
             (jerk.x, jerk.y) = (hardest.x, hardest.y);
             let left = sqrtf(fmaxf(most_mps3 * most_mps3 - hardest.xy().norm_squared(), 0.0));
             jerk.z = fmaxf(fminf(jerk.z, left), -left);
@@ -127,7 +127,7 @@ impl Fence {
 
     /// Bounds of an axis of a motion that is at `place`: a motion behind a wall's last centimetres
     /// moves no nearer to the wall.
-    fn walls(&self, axis: usize, place: f32, brake: Brake) -> Walls {
+    fn axis_walls(&self, axis: usize, place: f32, brake: BrakingLimits) -> Walls {
         let (low, high) = (self.low[axis], self.high[axis]);
         let before_m = fminf(TURN_BEFORE_FENCE_M, 0.25 * (high - low));
         Walls { low: fminf(low + before_m, place), high: fmaxf(high - before_m, place), brake }
@@ -138,29 +138,30 @@ impl Fence {
 struct Walls {
     low: f32,
     high: f32,
-    brake: Brake,
+    brake: BrakingLimits,
 }
 
 impl Walls {
-    fn hold(&self, place: f32, speed: f32, accel: f32) -> bool {
-        self.high_holds(place, speed, accel) && place - stop_m(-speed, -accel, self.brake) >= self.low
+    fn can_stop_between(&self, place: f32, speed: f32, accel: f32) -> bool {
+        self.can_stop_below_high(place, speed, accel)
+            && place - stopping_distance_m(-speed, -accel, self.brake) >= self.low
     }
 
-    fn high_holds(&self, place: f32, speed: f32, accel: f32) -> bool {
-        place + stop_m(speed, accel, self.brake) <= self.high
+    fn can_stop_below_high(&self, place: f32, speed: f32, accel: f32) -> bool {
+        place + stopping_distance_m(speed, accel, self.brake) <= self.high
     }
 }
 
 /// Braking that an axis plans its stops with.
-fn brake(limits: &Limits, axis: usize) -> Brake {
-    Brake {
-        accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.most_mps2[axis / 2],
+fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
+    BrakingLimits {
+        accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.max_accel_mps2[axis / 2],
         jerk_mps3: JERK_SHARES[1] * limits.jerk(false),
     }
 }
 
 /// The number nearest to `wanted` that is safe, between it and `safe`.
-fn nearest(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
+fn nearest_safe(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     let (mut good, mut bad) = (safe, wanted);
     for _ in 0..STEP_HALVINGS {
         let middle = 0.5 * (good + bad);
@@ -173,12 +174,12 @@ fn nearest(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     good
 }
 
-/// The axes that need not brake take what the others leave of the jerk and of the acceleration across.
-fn share_what_is_left(
+/// The axes that do not have to brake share the jerk and horizontal acceleration that the braking axes leave.
+fn distribute_remaining_jerk(
     jerk: &mut Point,
     brakes: [bool; 3],
     accel: &Point,
-    limits: &Limits,
+    limits: &MotionLimits,
     most_mps3: f32,
     dt_s: f32,
 ) {
@@ -187,11 +188,11 @@ fn share_what_is_left(
     let mut others = jerk.component_mul(&free);
     let braking = *jerk - others;
     let left = |braking: &Point| sqrtf(fmaxf(most_mps3 * most_mps3 - braking.norm_squared(), 0.0));
-    others = shortened(others, left(&braking));
+    others = clamp_length(others, left(&braking));
     if brakes[0] != brakes[1] {
         let (axis, beside) = if brakes[0] { (0, 1) } else { (1, 0) };
         let taken = accel[axis] + jerk[axis] * dt_s;
-        let across = limits.most_mps2[0];
+        let across = limits.max_accel_mps2[0];
         let room = sqrtf(fmaxf(across * across - taken * taken, 0.0));
         let next = accel[beside] + others[beside] * dt_s;
         let next = fmaxf(fminf(next, room), -room);
@@ -206,8 +207,8 @@ fn share_what_is_left(
 
 /// Stopping distance towards a wall, metres, from this speed and acceleration: the acceleration falls to −a at the greatest jerk,
 /// stays there, and returns to 0 as the speed does.
-fn stop_m(speed: f32, accel: f32, brake: Brake) -> f32 {
-    let Brake { accel_mps2: most, jerk_mps3: jerk } = brake;
+fn stopping_distance_m(speed: f32, accel: f32, brake: BrakingLimits) -> f32 {
+    let BrakingLimits { accel_mps2: most, jerk_mps3: jerk } = brake;
     let accel = fmaxf(accel, -most);
     // Speed that is left if the acceleration is only taken back.
     if speed + accel * fabsf(accel) / (2.0 * jerk) <= 0.0 {
@@ -233,7 +234,7 @@ mod tests {
     /// The formula against small steps of the same profile.
     #[test]
     fn a_stop_is_as_long_as_flown() {
-        let brake = Brake { accel_mps2: 1.4, jerk_mps3: 1.9 };
+        let brake = BrakingLimits { accel_mps2: 1.4, jerk_mps3: 1.9 };
         for i in 0..200 {
             let (speed, accel) = (-1.0 + 0.02 * i as f32, -1.4 + 0.037 * (i * 7 % 100) as f32);
             let (mut v, mut a, mut s, mut furthest) = (speed, accel, 0.0f32, 0.0f32);
@@ -254,7 +255,7 @@ mod tests {
                     break;
                 }
             }
-            let formula = stop_m(speed, accel, brake);
+            let formula = stopping_distance_m(speed, accel, brake);
             assert!(fabsf(formula - furthest) < 0.01, "{speed} {accel}: {formula} {furthest}");
         }
     }

@@ -7,7 +7,7 @@
 //!
 //! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically damped loop. Its rate
 //! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`LOOP_RATE_SHARE`]): the
-//! limits do not make it swing. Where what it strays from the curve would lead out of the geofence, it brakes
+//! limits do not make it swing. Where what it deviates from the curve would lead out of the geofence, it brakes
 //! before, by the same limits ([`super::fence`]).
 //!
 //! ENU metres, seconds. Constant work.
@@ -15,8 +15,8 @@
 use libm::fmaxf;
 
 use super::fence::Fence;
-use super::limits::Limits;
-use super::motion::{Motion, shortened};
+use super::limits::MotionLimits;
+use super::motion::{Motion, clamp_length};
 
 /// Rate of the follower's loop, as a share of jerk over acceleration: a change of velocity dies
 /// away at twice this rate.
@@ -27,7 +27,7 @@ impl Motion {
     pub(super) fn follow(
         &mut self,
         to: &Self,
-        limits: &Limits,
+        limits: &MotionLimits,
         fence: Option<&Fence>,
         jerk_mps3: f32,
         dt_s: f32,
@@ -38,10 +38,10 @@ impl Motion {
         let speed = velocity + (before + to.acceleration) * (0.5 * dt_s);
         let rate = LOOP_RATE_SHARE * jerk_mps3 / fmaxf(limits.accel_mps2, limits.accel_z_mps2);
         let back = to.velocity + (to.position - place) * (0.5 * rate);
-        let wanted = to.acceleration + (shortened(back, limits.fastest_mps()) - speed) * (2.0 * rate);
-        let change = limits.within(&wanted) - before;
-        let jerk = shortened(change / dt_s, jerk_mps3);
-        let jerk = fence.map_or(jerk, |fence| fence.keep(self, jerk, limits, jerk_mps3, dt_s));
+        let wanted = to.acceleration + (clamp_length(back, limits.max_speed_mps()) - speed) * (2.0 * rate);
+        let change = limits.clamp_accel(&wanted) - before;
+        let jerk = clamp_length(change / dt_s, jerk_mps3);
+        let jerk = fence.map_or(jerk, |fence| fence.limit_jerk(self, jerk, limits, jerk_mps3, dt_s));
         self.acceleration = before + jerk * dt_s;
         self.velocity = velocity + (before + jerk * (0.5 * dt_s)) * dt_s;
         self.position += (velocity + (before * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;

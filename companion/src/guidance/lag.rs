@@ -21,7 +21,7 @@ impl Guidance {
         match moves {
             true => share.min(self.pace),
             // Settled it holds; before the take-off it follows the estimate.
-            false if self.settled => 1.0,
+            false if self.raw_point_at_rest => 1.0,
             false => 0.0,
         }
     }

@@ -2,7 +2,7 @@
 
 use libm::{fmaxf, fminf};
 use planner_core::deconflict::DeconflictConfig;
-use planner_core::safety::{Bounds, Braking};
+use planner_core::safety::{Braking, MotionBounds};
 use planner_core::track::TrackConfig;
 use planner_core::{ConfigError, Point};
 
@@ -27,7 +27,7 @@ pub(crate) const JOIN_MPS: f32 = 1.0;
 
 /// Limits of one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct MotionLimits {
     /// Along the path, m/s.
     pub speed_mps: f32,
     /// Upwards, m/s.
@@ -40,12 +40,12 @@ pub struct Limits {
     pub accel_z_mps2: f32,
     /// Greatest acceleration of a setpoint, across and vertically, m/s²: a corner adds to the
     /// braking before it and the acceleration behind it.
-    pub most_mps2: [f32; 2],
+    pub max_accel_mps2: [f32; 2],
     /// Greatest jerk of a setpoint, m/s³.
     pub jerk_mps3: f32,
 }
 
-impl Limits {
+impl MotionLimits {
     /// The mission's limits, lowered to what the autopilot flies.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
@@ -61,7 +61,7 @@ impl Limits {
             descend_mps: fminf(config.descend_mps, least(&[Limit::Descend])),
             accel_mps2: fminf(accel_mps2, across_mps2),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
-            most_mps2: [across_mps2, vertical_mps2]
+            max_accel_mps2: [across_mps2, vertical_mps2]
                 .map(|most| fminf(MAX_CORNER_ACCEL_SHARE * accel_mps2, most)),
             jerk_mps3,
         }
@@ -80,16 +80,16 @@ impl Limits {
     }
 
     /// The nearest acceleration that may be asked for, m/s².
-    pub(crate) fn within(&self, accel: &Point) -> Point {
+    pub(crate) fn clamp_accel(&self, accel: &Point) -> Point {
         let across = libm::hypotf(accel.x, accel.y);
-        let [most, most_z] = self.most_mps2;
+        let [most, most_z] = self.max_accel_mps2;
         let share = most / fmaxf(across, most);
         let z = fmaxf(fminf(accel.z, most_z), -most_z);
         Point::new(accel.x * share, accel.y * share, z)
     }
 
     /// No setpoint moves faster, m/s.
-    pub(crate) fn fastest_mps(&self) -> f32 {
+    pub(crate) fn max_speed_mps(&self) -> f32 {
         fmaxf(self.speed_mps, fmaxf(self.climb_mps, self.descend_mps))
     }
 }
@@ -108,7 +108,7 @@ pub(crate) struct Settings {
 impl Settings {
     /// Limits of a vehicle with these settings.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let limits = Limits::new(config, autopilot);
+        let limits = MotionLimits::new(config, autopilot);
         let track = TrackConfig {
             cruise_mps: limits.speed_mps,
             climb_mps: autopilot.get(Limit::Climb),
@@ -119,7 +119,7 @@ impl Settings {
             ..TrackConfig::default()
         };
         let leg_track = TrackConfig {
-            cruise_mps: limits.fastest_mps().min(JOIN_MPS.max(limits.climb_mps)),
+            cruise_mps: limits.max_speed_mps().min(JOIN_MPS.max(limits.climb_mps)),
             climb_mps: limits.climb_mps,
             descend_mps: limits.descend_mps,
             ..track
@@ -143,9 +143,9 @@ impl Settings {
 }
 
 /// Bounds expected of vehicles that fly as this one does.
-pub(crate) fn bounds(track: &TrackConfig) -> Bounds {
+pub(crate) fn bounds(track: &TrackConfig) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
-    Bounds { braking, speed_max_mps: track.cruise_mps, silent_s: UNHEARD_STOPPED_S }
+    MotionBounds { braking, speed_max_mps: track.cruise_mps, silent_s: UNHEARD_STOPPED_S }
 }
 
 #[cfg(test)]
@@ -155,7 +155,7 @@ mod tests {
     use planner_core::frames::Geodetic;
 
     use super::*;
-    use crate::autopilot::Kind;
+    use crate::autopilot::AutopilotKind;
 
     fn config() -> Config<1> {
         Config::new(1, Point::zeros(), Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 })
@@ -163,11 +163,11 @@ mod tests {
 
     #[test]
     fn defaults_leave_the_missions_limits_but_brake_vertically_as_arducopter_can() {
-        for kind in [Kind::Px4, Kind::ArduPilot] {
-            let limits = Limits::new(&config(), &kind.default_limits());
+        for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
+            let limits = MotionLimits::new(&config(), &kind.default_limits());
             assert_eq!((limits.speed_mps, limits.climb_mps, limits.descend_mps), (2.0, 1.0, 1.0));
             // ArduCopter ran 1.03 m wide of vertical corners with 1.5.
-            let accel_z_mps2 = if kind == Kind::Px4 { 1.5 } else { 1.0 };
+            let accel_z_mps2 = if kind == AutopilotKind::Px4 { 1.5 } else { 1.0 };
             assert_eq!((limits.accel_mps2, limits.accel_z_mps2, limits.jerk_mps3), (1.5, accel_z_mps2, 4.0));
         }
     }
@@ -179,7 +179,7 @@ mod tests {
             read in proptest::collection::vec((0usize..8, proptest::prelude::any::<u32>(), -5.0f32..600.0), 0..40),
             px4 in proptest::prelude::any::<bool>(),
         ) {
-            let kind = if px4 { Kind::Px4 } else { Kind::ArduPilot };
+            let kind = if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
             let mut autopilot = kind.default_limits();
             for (index, bits, near) in read {
                 let Some(parameter) = kind.limits().get(index) else { continue };
@@ -187,7 +187,7 @@ mod tests {
                 autopilot.set(parameter, f32::from_bits(bits));
                 autopilot.set(parameter, near);
             }
-            let l = Limits::new(&config(), &autopilot);
+            let l = MotionLimits::new(&config(), &autopilot);
             proptest::prop_assert_eq!(Settings::new(&config(), &autopilot).check(), Ok(()));
             for (value, least, most) in [
                 (l.speed_mps, 0.1, 2.0),
@@ -195,8 +195,8 @@ mod tests {
                 (l.descend_mps, 0.1, 1.0),
                 (l.accel_mps2, 0.2, 1.5),
                 (l.accel_z_mps2, 0.2, 1.5),
-                (l.most_mps2[0], 0.2, 2.25),
-                (l.most_mps2[1], 0.2, 2.25),
+                (l.max_accel_mps2[0], 0.2, 2.25),
+                (l.max_accel_mps2[1], 0.2, 2.25),
                 (l.jerk_mps3, 1.0, 4.0),
             ] {
                 proptest::prop_assert!((least..=most).contains(&value), "{l:?}");

@@ -13,7 +13,7 @@ pub(super) struct Motion {
 
 impl Motion {
     /// At rest at a place.
-    pub(super) fn at(position: Point) -> Self {
+    pub(super) fn at_rest(position: Point) -> Self {
         Self { position, velocity: Point::zeros(), acceleration: Point::zeros() }
     }
 
@@ -23,13 +23,13 @@ impl Motion {
 }
 
 /// A vector no longer than `most`.
-pub(super) fn shortened(vector: Point, most: f32) -> Point {
+pub(super) fn clamp_length(vector: Point, most: f32) -> Point {
     vector * (most / fmaxf(vector.norm(), fmaxf(most, 1e-6)))
 }
 
 /// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a board carries the code
 /// that would print them: 25 kB.
-pub(super) fn within(value: f32, low: f32, high: f32) -> f32 {
+pub(super) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }
 }

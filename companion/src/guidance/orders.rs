@@ -1,9 +1,9 @@
-//! What guidance is ordered: to begin the path, to go on, to turn back, to settle where it stands.
+//! What guidance is ordered: to begin the path, to continue, to turn back, to settle where it stands.
 
-use super::nearest::nearest_m;
+use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
-use super::waypoints::Waypoints;
+use super::waypoints::Algorithm2Waypoints;
 use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, STANDING_SETPOINT_MPS};
 use crate::time::Instant;
 use planner_core::Point;
@@ -11,11 +11,11 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::Tracker;
 
 impl Guidance {
-    /// Goes on where the flight was interrupted.
-    pub fn run(&mut self, now: Instant) {
+    /// Continues where the flight was interrupted.
+    pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
         self.evade_search.reset();
-        self.linked_m = f32::INFINITY;
+        self.heard_by_others_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
         self.progress_at = now;
     }
@@ -25,14 +25,14 @@ impl Guidance {
         self.tracker = Tracker::default();
         self.phase = Phase::Path;
         self.leg = None;
-        self.waypoints = Waypoints::default();
-        self.aside = false;
-        self.leads = false;
+        self.waypoints = Algorithm2Waypoints::default();
+        self.ends_aside = false;
+        self.guides_landing = false;
         self.reported_m = f32::NEG_INFINITY;
-        self.opened = 0;
+        self.gates_open = 0;
         // A hindrance on the other path does not count on this one.
         self.filter.reset();
-        self.run(now);
+        self.start_following(now);
     }
 
     /// As `begin_path`, from `along_m` metres along the path on.
@@ -43,46 +43,46 @@ impl Guidance {
     }
 
     /// The vehicle flies no further along its path than this for now, metres; ∞ for the whole path.
-    pub(crate) fn halt_at(&mut self, along_m: f32) {
+    pub(crate) fn set_halt_m(&mut self, along_m: f32) {
         self.halt_m = along_m;
     }
 
     /// Whether the setpoint is at rest on the raw point. Only then may another path begin, even one
     /// that starts a little away from it.
-    pub(crate) fn is_settled(&self) -> bool {
-        self.settled
+    pub(crate) fn is_at_rest_on_raw_point(&self) -> bool {
+        self.raw_point_at_rest
     }
 
     /// Whether the setpoint stands, if only on its way down.
-    pub(crate) fn pauses(&self) -> bool {
+    pub(crate) fn is_setpoint_still(&self) -> bool {
         self.smoother.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
     }
 
     /// Place along the path where the vehicle could stop now, metres.
-    pub(crate) fn stops_by_m(&self) -> f32 {
-        let braking_m = self.smoother.braking_m(false);
+    pub(crate) fn stopping_point_m(&self) -> f32 {
+        let braking_m = self.smoother.stopping_distance_m(false);
         self.tracker.along_m.max(self.setpoint_m + braking_m)
     }
 
     /// Leads a landing straight down from where the setpoint stands, as far as the autopilot is led.
-    pub(crate) fn lead_down(&mut self, now: Instant) {
-        self.brake();
-        (self.leads, self.progress_at) = (true, now);
+    pub(crate) fn begin_guided_landing(&mut self, now: Instant) {
+        self.begin_braking();
+        (self.guides_landing, self.progress_at) = (true, now);
     }
 
     /// Whether it leads a landing.
-    pub(crate) fn leads(&self) -> bool {
-        self.leads
+    pub(crate) fn is_guiding_landing(&self) -> bool {
+        self.guides_landing
     }
 
     /// The autopilot lands by itself.
-    pub(crate) fn leave_landing(&mut self) {
-        self.leads = false;
+    pub(crate) fn end_guided_landing(&mut self) {
+        self.guides_landing = false;
     }
 
-    /// Goes on after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
+    /// Continues after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
     /// its descent, or by the nearest point of the path.
-    pub fn go_on<const W: usize, const G: usize>(
+    pub fn resume_flight<const W: usize, const G: usize>(
         &mut self,
         plan: &VehiclePlan<W, G>,
         climbs: bool,
@@ -98,16 +98,16 @@ impl Guidance {
         let below = path
             .point_at(path.length_m())
             .is_some_and(|end| end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M);
-        if self.settled && self.phase != Phase::Climb && !(self.phase == Phase::Descent && below) {
+        if self.raw_point_at_rest && self.phase != Phase::Climb && !(self.phase == Phase::Descent && below) {
             self.phase = Phase::Path;
-            self.tracker.along_m = nearest_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
+            self.tracker.along_m = nearest_arc_length_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
         }
-        self.run(now);
+        self.start_following(now);
     }
 
     /// Replaces the path by the way back to its first point. The clearance of each leg goes with it. The raw point may still
     /// move on: the new path begins where it can have braked, and it begins on it backwards.
-    pub fn turn_back<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
+    pub fn reverse_path<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + speed * TICK_S;
@@ -133,7 +133,7 @@ impl Guidance {
             Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
             Phase::Descent => {
                 // Back up: what is still sunk while it brakes is flown backwards.
-                if let (Some(leg), false) = (leg, self.settled) {
+                if let (Some(leg), false) = (leg, self.raw_point_at_rest) {
                     let mut up = Path::new();
                     let ends = (leg.waypoints().last(), leg.waypoints().first());
                     for end in [ends.0, ends.1].into_iter().flatten() {
@@ -149,8 +149,8 @@ impl Guidance {
     }
 
     /// Forgets the leg that was flown: the raw point is where the setpoint stands, and the next leg begins there.
-    pub(super) fn settle(&mut self) {
-        self.settled = true;
+    pub(super) fn forget_leg(&mut self) {
+        self.raw_point_at_rest = true;
         self.leg = None;
         self.leg_tracker = Tracker::default();
         self.tracker.speed_mps = 0.0;

@@ -3,8 +3,8 @@
 use planner_core::Point;
 
 use super::setpoint::Setpoint;
-use super::{Guidance, Scene};
-use crate::autopilot::Kind;
+use super::{Guidance, GuidanceInputs};
+use crate::autopilot::AutopilotKind;
 use crate::mission::{State, task};
 
 impl Guidance {
@@ -12,7 +12,7 @@ impl Guidance {
     pub fn setpoint<const W: usize, const G: usize>(
         &self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
     ) -> Setpoint {
         if !state.streams_setpoints() {
             return Setpoint::None;
@@ -20,14 +20,14 @@ impl Guidance {
         let smoother = &self.smoother;
         let still = Point::zeros();
         if scene.telemetry.position_at.is_none() || state == State::PositionLost {
-            return Setpoint::Stop(if smoother.is_live() { smoother.velocity() } else { still });
+            return Setpoint::Stop(if smoother.has_setpoint() { smoother.velocity() } else { still });
         }
-        if !smoother.is_live() {
+        if !smoother.has_setpoint() {
             // The state is newer than the step: the next one begins where the vehicle is.
             return Setpoint::None;
         }
         // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
-        let lead_s = scene.telemetry.kind.map_or(0.0, Kind::velocity_lead_s);
+        let lead_s = scene.telemetry.kind.map_or(0.0, AutopilotKind::velocity_lead_s);
         let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
         let most = smoother.velocity().norm().max(smoother.raw_speed_mps());
         let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));

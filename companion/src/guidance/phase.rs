@@ -7,7 +7,7 @@ pub(super) enum Phase {
     Hold,
     /// Straight up to the height of the path's start.
     Climb,
-    /// Straight to where the path goes on.
+    /// Straight to where the path continues.
     Join,
     /// Along the path.
     Path,

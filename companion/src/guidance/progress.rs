@@ -2,10 +2,10 @@
 
 use planner_core::flight::{Path, VehiclePlan};
 
-use super::motion::within;
+use super::motion::clamp_to;
 use super::{
-    ARRIVED_M, AT_REST_MPS, CLIMBED_M, DESCENDED_M, Guidance, LAND_AFTER, Phase, REPORTED_SHORT_M, Scene,
-    WINDOW_EDGE_M,
+    ARRIVED_M, AT_REST_MPS, CLIMBED_M, DESCENDED_M, Guidance, GuidanceInputs, LAND_AFTER, Phase,
+    REPORTED_SHORT_M, WINDOW_EDGE_M,
 };
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -18,16 +18,19 @@ const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 impl Guidance {
     /// Place along the plan's path up to which every gate is open, or will be within
     /// [`UNHEARD_GATE_WAIT_S`], metres, and the seconds after which that is sure.
-    pub(crate) fn clears_m<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn gates_open_up_to_soon_m<const V: usize, const W: usize, const G: usize>(
         &self,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
         now: Instant,
     ) -> (f32, u8) {
         let mut in_s = 0.0;
         let gates = scene.plan.map_or(&[][..], |plan| &plan.gates);
-        let closed = gates.iter().skip(self.opened).find(|gate| {
-            match neighbours.passes_in_s(gate, now).filter(|passes_s| *passes_s <= UNHEARD_GATE_WAIT_S) {
+        let closed = gates.iter().skip(self.gates_open).find(|gate| {
+            match neighbours
+                .time_until_passed_s(gate, now)
+                .filter(|passes_s| *passes_s <= UNHEARD_GATE_WAIT_S)
+            {
                 Some(passes_s) => in_s = libm::fmaxf(in_s, passes_s),
                 None => return true,
             }
@@ -39,40 +42,47 @@ impl Guidance {
 
     /// Place along the plan's path up to which every gate is open, metres; −∞ where the vehicle
     /// does not follow that path.
-    pub(crate) fn clear_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
+    pub(crate) fn gates_open_up_to_m<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> f32 {
         let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.detours) else {
             return f32::NEG_INFINITY;
         };
-        let gate_m = plan.gates.get(self.opened).map_or(f32::INFINITY, |gate| gate.at_m);
+        let gate_m = plan.gates.get(self.gates_open).map_or(f32::INFINITY, |gate| gate.at_m);
         gate_m.min(plan.path.length_m())
     }
 
     /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the path's length in the
     /// descent. It never falls on one path.
-    pub fn progress_m<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> f32 {
-        self.flown_m(state, scene).max(self.reported_m)
-    }
-
-    pub(super) fn flown_m<const W: usize, const G: usize>(
+    pub fn progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> f32 {
+        self.flown_distance_m(state, scene).max(self.reported_m)
+    }
+
+    pub(super) fn flown_distance_m<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
         let Some(plan) = scene.plan else { return 0.0 };
         let (path, z) = (&plan.path, scene.telemetry.position.z);
         let length_m = path.length_m();
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
-        if matches!(state, State::Disarm | State::Done) && self.reached_end(path) {
+        if matches!(state, State::Disarm | State::Done) && self.has_reached_end(path) {
             // A metre beyond the ground, so that every gate on this flight opens.
             return length_m + plan.descent_m + 1.0;
         }
         match self.phase {
-            Phase::Climb => -within(start_z - z, 0.0, plan.climb_m),
+            Phase::Climb => -clamp_to(start_z - z, 0.0, plan.climb_m),
             Phase::Path | Phase::Descent
-                if self.reached_end(path) && (state == State::Land || self.phase == Phase::Descent) =>
+                if self.has_reached_end(path) && (state == State::Land || self.phase == Phase::Descent) =>
             {
-                length_m + within(end_z - z, 0.0, plan.descent_m)
+                length_m + clamp_to(end_z - z, 0.0, plan.descent_m)
             }
             _ if self.on_path => {
                 let behind = self.track.lead_max_m * 2.0;
@@ -89,16 +99,16 @@ impl Guidance {
     }
 
     /// Whether the shared plan's path was flown to its end.
-    pub fn at_goal<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
-        !self.returning && !self.aside && scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+    pub fn is_at_goal<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> bool {
+        !self.returning && !self.ends_aside && scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
     }
 
     /// Whether the reference has come to the end of the path.
-    pub fn is_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
-        scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+    pub fn is_at_end<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> bool {
+        scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
     }
 
-    pub(super) fn reached_end<const W: usize>(&self, path: &Path<W>) -> bool {
+    pub(super) fn has_reached_end<const W: usize>(&self, path: &Path<W>) -> bool {
         self.on_path && self.tracker.along_m >= path.length_m()
     }
 
@@ -107,53 +117,60 @@ impl Guidance {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
         let end_m = plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
         match self.on_path {
-            true if self.reached_end(&plan.path) => end_m,
+            true if self.has_reached_end(&plan.path) => end_m,
             true => pad_m.min(end_m).min(self.lowest_ground_m),
             false => pad_m,
         }
     }
 
-    pub fn climb_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+    pub fn is_climb_done<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> bool {
         let top = self.leg.as_ref().and_then(|leg| leg.waypoints().last());
         self.phase == Phase::Climb
-            && self.leg_done()
+            && self.is_leg_done()
             && top.is_some_and(|top| {
                 let apart = self.smoother.position() - scene.telemetry.position;
                 // Both setpoint and vehicle at the top: a low climb must not count as done on the pad.
                 (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
-                    && self.stands()
+                    && self.is_standing()
                     && apart.norm() < 2.0 * ARRIVED_M
                     && apart.z.abs() < CLIMBED_M
             })
     }
 
     /// Whether the path and the guided descent are flown.
-    pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>, now: Instant) -> bool {
+    pub fn is_path_done<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+        now: Instant,
+    ) -> bool {
         if self.is_algorithm2() {
-            let stands = self.stands() && scene.telemetry.velocity.norm() < AT_REST_MPS;
-            return stands && self.on_path && self.waypoints.completed() && !self.aside;
+            let stands = self.is_standing() && scene.telemetry.velocity.norm() < AT_REST_MPS;
+            return stands && self.on_path && self.waypoints.is_completed() && !self.ends_aside;
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
         let Some(low) = leg.waypoints().last() else { return false };
         // The ground may be higher than the plan says, or the estimate too high. PX4 reports contact only while the
         // setpoint sinks, so a setpoint that stands at the planned ground would wait for it forever.
         let low_m = self.smoother.position().z - low.position.z;
-        let ended = low_m < DESCENDED_M && self.pauses() && now - self.progress_at >= LAND_AFTER;
+        let ended = low_m < DESCENDED_M && self.is_setpoint_still() && now - self.progress_at >= LAND_AFTER;
         self.phase == Phase::Descent
-            && !self.up
-            && self.leg_done()
+            && !self.climbing_back
+            && self.is_leg_done()
             && (scene.telemetry.position.z - low.position.z < DESCENDED_M
                 || ended
-                || self.guided_m(scene, plan.descent_m) == 0.0)
+                || self.guided_descent_m(scene, plan.descent_m) == 0.0)
     }
 
     /// Whether it stands at the end of the path and nobody keeps it from landing.
-    pub(super) fn stands_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+    pub(super) fn is_free_to_land_at_end<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
         let Some(plan) = scene.plan else { return false };
-        self.reached_end(&plan.path)
+        self.has_reached_end(&plan.path)
             && !self.is_algorithm2()
-            && !self.aside
-            && self.stands()
+            && !self.ends_aside
+            && self.is_standing()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
                 (end - scene.telemetry.position).norm() < ARRIVED_M
                     && (end - self.smoother.position()).norm() < ARRIVED_M
@@ -164,7 +181,11 @@ impl Guidance {
 
     /// Whether the vehicle is within `window_m` of its place along the path, and the straight way to the nearest point of
     /// the path stays inside the leg's clearance.
-    pub fn near_path<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>, window_m: f32) -> bool {
+    pub fn is_near_path<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+        window_m: f32,
+    ) -> bool {
         let Some(plan) = scene.plan else { return false };
         let position = &scene.telemetry.position;
         let along_m = plan.path.project(position, self.tracker.along_m, window_m);

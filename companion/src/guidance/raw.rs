@@ -8,10 +8,10 @@ use planner_core::track::{self, Reference, Tracker};
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{
-    DESCENDED_M, FENCE_MARGIN_M, Guidance, LEADS_FOR, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, Scene,
-    TOUCHDOWN_MPS,
+    DESCENDED_M, FENCE_MARGIN_M, Guidance, GuidanceInputs, LEADS_FOR, LEG_LEAD_M, MIN_LEG_M, Phase,
+    SETTLE_WINDOW_M, TOUCHDOWN_MPS,
 };
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::guidance::evade;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -20,10 +20,10 @@ use crate::time::Instant;
 impl Guidance {
     /// The next raw point.
     #[expect(clippy::too_many_arguments, reason = "what a step knows")]
-    pub(super) fn next_raw<const V: usize, const W: usize, const G: usize>(
+    pub(super) fn next_raw_point<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         plan: &VehiclePlan<W, G>,
         advice: &Advice,
         neighbours: &mut Neighbours<V>,
@@ -31,14 +31,14 @@ impl Guidance {
         blocked: &mut bool,
     ) -> Point {
         let path = &plan.path;
-        let raw = self.smoother.raw();
-        if core::mem::replace(&mut self.settled, false) && self.phase == Phase::Path {
+        let raw = self.smoother.raw_point();
+        if core::mem::replace(&mut self.raw_point_at_rest, false) && self.phase == Phase::Path {
             (self.phase, self.leg) = (Phase::Join, None);
         }
-        if self.phase == Phase::Climb && state != State::Climb && self.leg_done() {
+        if self.phase == Phase::Climb && state != State::Climb && self.is_leg_done() {
             (self.phase, self.leg) = (Phase::Join, None);
         }
-        if self.phase == Phase::Path && state == State::Follow && self.stands_at_end(scene) {
+        if self.phase == Phase::Path && state == State::Follow && self.is_free_to_land_at_end(scene) {
             (self.phase, self.leg) = (Phase::Descent, None);
             self.progress_at = now;
         }
@@ -47,9 +47,10 @@ impl Guidance {
             Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
             Phase::Join => path.point_at(self.tracker.along_m),
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
-                let down_m = if self.up { 0.0 } else { self.guided_m(scene, plan.descent_m) };
-                let led_m = self.ground_m(plan) + self.low_end_m(scene);
-                let to_m = if self.leads { libm::fminf(led_m, raw.z) } else { end.z - down_m };
+                let down_m =
+                    if self.climbing_back { 0.0 } else { self.guided_descent_m(scene, plan.descent_m) };
+                let led_m = self.ground_m(plan) + self.guided_descent_end_m(scene);
+                let to_m = if self.guides_landing { libm::fminf(led_m, raw.z) } else { end.z - down_m };
                 Point::new(raw.x, raw.y, to_m)
             }),
             Phase::Path if self.is_algorithm2() => {
@@ -73,7 +74,7 @@ impl Guidance {
         if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
             self.progress_at = now;
         }
-        if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.leg_done()) {
+        if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.is_leg_done()) {
             // Back up a descent it ends where that began: beside the path yet.
             let beside_m = (target - raw).norm();
             let joined = beside_m < MIN_LEG_M + JOIN_MPS * TICK_S;
@@ -83,7 +84,7 @@ impl Guidance {
     }
 
     /// The next raw point of a stop: it brakes where it flies, as fast flights need more way than the curve holds.
-    pub(super) fn braked_raw<const W: usize>(&mut self, path: &Path<W>) -> Point {
+    pub(super) fn next_braked_raw_point<const W: usize>(&mut self, path: &Path<W>) -> Point {
         let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
         let reference = match (self.phase, &self.leg) {
             (Phase::Path, None) => track::advance(&self.track, path, &mut self.tracker, &stop, TICK_S),
@@ -92,7 +93,7 @@ impl Guidance {
             }
             _ => None,
         };
-        reference.map_or(self.smoother.raw(), |reference| reference.position)
+        reference.map_or(self.smoother.raw_point(), |reference| reference.position)
     }
 
     /// The next raw point on the path, back from below a vehicle that comes down where it has to.
@@ -107,12 +108,14 @@ impl Guidance {
         let mut advice = *advice;
         if let Some(to_m) = self.back_to_m {
             let safety_m = self.deconflict.safety_distance_m;
-            let near = neighbours.at(now);
+            let near = neighbours.states_at(now);
             // The filter has looked that way since the step before.
-            let free = self.filter.looks_back() && !self.filter.is_stopped();
+            let free = self.filter.scans_backwards() && !self.filter.is_stopped();
             if !free {
                 advice.stop_within_m = 0.0;
-            } else if let Some(place) = evade::step(path, &mut self.tracker, to_m, near, safety_m, TICK_S) {
+            } else if let Some(place) =
+                evade::step_back(path, &mut self.tracker, to_m, near, safety_m, TICK_S)
+            {
                 return Some(place);
             } else {
                 *blocked = true;
@@ -123,10 +126,12 @@ impl Guidance {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
-        if path.point_at(self.tracker.along_m + braking_m).is_some_and(|ahead| !self.smoother.allows(&ahead))
+        if path
+            .point_at(self.tracker.along_m + braking_m)
+            .is_some_and(|ahead| !self.smoother.is_place_allowed(&ahead))
         {
             advice.stop_within_m = advice.stop_within_m.min(braking_m);
-            self.fenced = true;
+            self.stopped_at_fence = true;
         }
         let Reference { position, lead_m, .. } =
             track::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
@@ -141,8 +146,8 @@ impl Guidance {
         position: &Point,
         advice: &Advice,
     ) -> Option<Point> {
-        let (raw, before) = (self.smoother.raw(), self.waypoints);
-        let target = self.waypoints.next(path, position);
+        let (raw, before) = (self.smoother.raw_point(), self.waypoints);
+        let target = self.waypoints.next_waypoint(path, position);
         let mut advice = *advice;
         match target {
             None => advice.speed_scale = 0.0,
@@ -166,15 +171,15 @@ impl Guidance {
         let speed = self.leg_tracker.speed_mps.max(0.0);
         let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
         let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + MIN_LEG_M;
-        if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.allows(&ahead)) {
+        if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.is_place_allowed(&ahead)) {
             advice.stop_within_m = braking_m;
-            self.fenced = true;
+            self.stopped_at_fence = true;
         }
         let reference = track::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
         self.lead_m = LEG_LEAD_M;
         self.tracker.speed_mps = self.leg_tracker.speed_mps;
         let length_m = path.length_m();
-        self.tracker.along_m = if self.waypoints.completed() {
+        self.tracker.along_m = if self.waypoints.is_completed() {
             length_m
         } else {
             let seen_m = path.project(&reference.position, self.tracker.along_m, SETTLE_WINDOW_M);
@@ -184,7 +189,7 @@ impl Guidance {
     }
 
     /// Whether the straight way is flown by the raw point.
-    pub(super) fn leg_done(&self) -> bool {
+    pub(super) fn is_leg_done(&self) -> bool {
         self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
     }
 
@@ -192,50 +197,52 @@ impl Guidance {
     /// land it leads straight down, to the ground where the autopilot may be led there, else not
     /// lower than the margin kept to obstacles: once the autopilot lands by itself the wind may
     /// carry the vehicle off.
-    pub(super) fn guided_m<const W: usize, const G: usize>(
+    pub(super) fn guided_descent_m<const W: usize, const G: usize>(
         &self,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         descent_m: f32,
     ) -> f32 {
-        libm::fmaxf(descent_m - self.low_end_m(scene), 0.0)
+        libm::fmaxf(descent_m - self.guided_descent_end_m(scene), 0.0)
     }
 
     /// Height over the ground at which a guided descent ends, metres.
-    fn low_end_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
-        if scene.telemetry.kind == Some(Kind::Px4) { 0.0 } else { self.low_m }
+    fn guided_descent_end_m<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> f32 {
+        if scene.telemetry.kind == Some(AutopilotKind::Px4) { 0.0 } else { self.low_height_m }
     }
 
     /// Whether guidance leads the landing in this step. It begins once the setpoint stands, and ends near the ground, or where
     /// it makes no progress.
-    pub(super) fn leads_down<const W: usize, const G: usize>(
+    pub(super) fn update_guided_landing<const W: usize, const G: usize>(
         &mut self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         now: Instant,
     ) -> bool {
-        if !self.leads || state != State::Land {
+        if !self.guides_landing || state != State::Land {
             return false;
         }
-        if self.phase != Phase::Descent && self.settled {
+        if self.phase != Phase::Descent && self.raw_point_at_rest {
             (self.phase, self.leg) = (Phase::Descent, None);
         }
         let down = |leg: &Path<2>| {
             let low = leg.waypoints().last();
-            self.leg_done()
+            self.is_leg_done()
                 && low.is_some_and(|low| scene.telemetry.position.z - low.position.z < DESCENDED_M)
         };
         let ended = self.phase == Phase::Descent && self.leg.as_ref().is_some_and(down);
-        self.leads = !ended && now - self.progress_at < LEADS_FOR;
-        self.leads && self.phase == Phase::Descent && self.filter.column_clear()
+        self.guides_landing = !ended && now - self.progress_at < LEADS_FOR;
+        self.guides_landing && self.phase == Phase::Descent && self.filter.column_clear()
     }
 
     /// The share of the speed at which this leg is flown: below the margin kept to obstacles the ground may be, and is
     /// touched slowly.
     fn descent_scale<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>, leg: &Path<2>) -> f32 {
-        let (true, Some(top)) = (self.phase == Phase::Descent && !self.up, leg.waypoints().first()) else {
+        let (true, Some(top)) =
+            (self.phase == Phase::Descent && !self.climbing_back, leg.waypoints().first())
+        else {
             return 1.0;
         };
-        let over_m = top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_m);
+        let over_m = top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_height_m);
         let most_mps = libm::sqrtf(
             TOUCHDOWN_MPS * TOUCHDOWN_MPS + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
         );

@@ -5,7 +5,7 @@ use planner_core::flight::VehiclePlan;
 use crate::autopilot::telemetry::Telemetry;
 
 /// Inputs of guidance beside its own state.
-pub struct Scene<'a, const W: usize, const G: usize> {
+pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
     /// The plan, if there is one with a path.
     pub plan: Option<&'a VehiclePlan<W, G>>,
     /// The autopilot.
@@ -18,7 +18,7 @@ pub struct Scene<'a, const W: usize, const G: usize> {
     pub detours: bool,
 }
 
-impl<'a, const W: usize, const G: usize> Scene<'a, W, G> {
+impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
     /// The scene of a vehicle of this rank and id; a plan without a path is none.
     pub fn new(
         plan: Option<&'a VehiclePlan<W, G>>,

@@ -28,7 +28,7 @@ pub enum Setpoint {
 
 /// Horizontal acceleration back to the reference, for an autopilot that adds it to what its own loops ask for. Upwards its
 /// loops are stiff enough.
-pub(super) fn correction(position: &Point, velocity: &Point, telemetry: &Telemetry) -> Point {
+pub(super) fn position_correction(position: &Point, velocity: &Point, telemetry: &Telemetry) -> Point {
     let off = (position - telemetry.position) * HOLD_PER_S2 + (velocity - telemetry.velocity) * DAMP_PER_S;
     let across = libm::hypotf(off.x, off.y);
     // A reported velocity near the largest number overflows: nothing is corrected by it.

@@ -4,7 +4,7 @@
 //! its velocity at once in a corner and its acceleration at once where it begins to brake. The smoother makes a setpoint of it
 //! that the vehicle can fly:
 //!
-//! - Two moving averages over T = `n` · [`TICK_S`] each, then a uniform cubic B-spline through the averages. Position,
+//! - Two moving averages over T = `average_ticks` · [`TICK_S`] each, then a uniform cubic B-spline through the averages. Position,
 //!   velocity and acceleration are derivatives of one curve. The curve stays in the convex hull of the raw points: a
 //!   straight leg stays exact, a stop is not overshot, a corner is rounded by at most Δv·T/6, and points inside the
 //!   geofence (a box) give setpoints inside it.
@@ -22,8 +22,8 @@ use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
 use super::fence::Fence;
-use super::limits::{Limits, MAX_SMOOTHING_S};
-use super::motion::{Motion, shortened, within};
+use super::limits::{MAX_SMOOTHING_S, MotionLimits};
+use super::motion::{Motion, clamp_length, clamp_to};
 
 /// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;
@@ -71,11 +71,11 @@ const FENCE_SLACK_M: f32 = 0.01;
 /// origin.
 const STEP_SLACK_M: f32 = 2e-3;
 
-/// How fast the clock is to run.
+/// Target speed of the smoother's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
+pub struct ClockPace {
     /// 1 runs, 0 stops.
-    pub share: f32,
+    pub speed_share: f32,
     /// Whether the safety filter stops it: braking is as hard as that allows.
     pub urgent: bool,
 }
@@ -83,9 +83,9 @@ pub struct Pace {
 /// Statistics of the setpoints since the start: greatest values, and the number of times that the
 /// smoother had to hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stats {
+pub struct SetpointStats {
     /// Setpoints made.
-    pub made: u32,
+    pub setpoint_count: u32,
     /// Greatest distance between two setpoints over the time between them, m/s.
     pub speed_mps: f32,
     /// Greatest acceleration, m/s².
@@ -95,90 +95,91 @@ pub struct Stats {
     /// Greatest jerk in a stop by the safety filter, m/s³.
     pub urgent_jerk_mps3: f32,
     /// Setpoints that were not finite, outside the geofence or too far: the last one was held instead.
-    pub held: u32,
+    pub hold_count: u32,
 }
 
 /// The last setpoint, and the curve it moves along.
 #[derive(Clone, Debug)]
-pub struct Smoother {
-    limits: Limits,
+pub struct SetpointSmoother {
+    limits: MotionLimits,
     fence: Option<Fence>,
-    n: usize,
+    average_ticks: usize,
     /// Newest raw point.
     raw: Point,
-    /// Raw steps, a ring; `at` is the newest.
+    /// Raw steps, a ring; `newest_step` is the newest.
     steps: [Point; HISTORY_LEN],
-    at: usize,
+    newest_step: usize,
     /// Newest average, and its last three steps, oldest first.
-    mean: Point,
-    slopes: [Point; 3],
+    average: Point,
+    average_steps: [Point; 3],
     /// Part of the tick that has passed.
-    share: f32,
+    tick_fraction: f32,
     /// Speed of the clock, and its change each second.
-    clock: f32,
-    clock_rate: f32,
-    /// Whether there is a setpoint to go on from.
-    live: bool,
+    clock_speed: f32,
+    clock_acceleration: f32,
+    /// Whether there is a setpoint to continue from.
+    has_setpoint: bool,
     /// The place sent last.
-    sent: Option<Point>,
-    /// Whether it goes on after a gap, which the next step makes up for.
+    last_sent: Option<Point>,
+    /// Whether it continues after a gap, which the next step makes up for.
     resumes: bool,
     /// Velocity at which setpoints followed a vehicle that another flies.
-    followed: Point,
+    followed_velocity: Point,
     /// Settings of the step that is being made: its length, whether the safety filter stops,
     /// whether its raw points are sound.
     dt_s: f32,
     stopping: bool,
-    sound: bool,
+    raw_points_valid: bool,
     /// Acceleration of the curve at the last setpoint.
-    asked: Point,
+    curve_acceleration: Point,
     /// The setpoint.
     motion: Motion,
     /// Statistics since the companion's start.
-    pub stats: Stats,
+    pub stats: SetpointStats,
 }
 
-impl Smoother {
-    pub(crate) fn new(limits: Limits, fence: Option<(Point, Point)>) -> Self {
+impl SetpointSmoother {
+    pub(crate) fn new(limits: MotionLimits, fence: Option<(Point, Point)>) -> Self {
         Self {
             limits,
             fence: fence.map(Fence::new),
-            n: average(&limits),
+            average_ticks: ticks_per_average(&limits),
             raw: Point::zeros(),
             steps: [Point::zeros(); HISTORY_LEN],
-            at: 0,
-            mean: Point::zeros(),
-            slopes: [Point::zeros(); 3],
-            share: 0.0,
-            clock: 1.0,
-            clock_rate: 0.0,
-            live: false,
-            sent: None,
+            newest_step: 0,
+            average: Point::zeros(),
+            average_steps: [Point::zeros(); 3],
+            tick_fraction: 0.0,
+            clock_speed: 1.0,
+            clock_acceleration: 0.0,
+            has_setpoint: false,
+            last_sent: None,
             resumes: false,
-            followed: Point::zeros(),
+            followed_velocity: Point::zeros(),
             dt_s: 0.0,
             stopping: false,
-            sound: true,
-            asked: Point::zeros(),
-            motion: Motion::at(Point::zeros()),
-            stats: Stats::default(),
+            raw_points_valid: true,
+            curve_acceleration: Point::zeros(),
+            motion: Motion::at_rest(Point::zeros()),
+            stats: SetpointStats::default(),
         }
     }
 
-    /// Takes other limits; from a standstill only.
-    pub(crate) fn tune(&mut self, limits: Limits, fence: Option<(Point, Point)>) {
-        (self.limits, self.fence, self.n) = (limits, fence.map(Fence::new), average(&limits));
-        self.rest();
+    /// Sets other limits; allowed at standstill only.
+    pub(crate) fn set_limits(&mut self, limits: MotionLimits, fence: Option<(Point, Point)>) {
+        (self.limits, self.fence, self.average_ticks) =
+            (limits, fence.map(Fence::new), ticks_per_average(&limits));
+        self.forget_curve();
     }
 
     /// Whether there is a last setpoint.
-    pub(crate) fn is_live(&self) -> bool {
-        self.live
+    pub(crate) fn has_setpoint(&self) -> bool {
+        self.has_setpoint
     }
 
-    /// Setpoints end: there is no last one to go on from.
+    /// Ends the setpoint stream: the last setpoint is forgotten.
     pub(crate) fn stop(&mut self) {
-        self.live = false;
+        self.has_setpoint = false;
     }
 
     /// Place of the last setpoint.
@@ -197,13 +198,13 @@ impl Smoother {
     }
 
     /// The raw point: ahead of the setpoint by the content of the averages.
-    pub(crate) fn raw(&self) -> Point {
+    pub(crate) fn raw_point(&self) -> Point {
         self.raw
     }
 
     /// Speed that the raw point had last, m/s: that of the setpoint T later, if the clock runs.
     pub(crate) fn raw_speed_mps(&self) -> f32 {
-        self.steps[self.at].norm() / TICK_S * self.clock
+        self.steps[self.newest_step].norm() / TICK_S * self.clock_speed
     }
 
     /// Greatest jerk, m/s³.
@@ -212,23 +213,23 @@ impl Smoother {
     }
 
     /// Whether it is in a stop by the safety filter, or ends one.
-    pub(crate) fn stops_urgently(&self) -> bool {
-        self.live && self.stopping
+    pub(crate) fn is_in_urgent_stop(&self) -> bool {
+        self.has_setpoint && self.stopping
     }
 
     /// Distance of the setpoint from its curve, metres.
     #[cfg(test)]
     pub(crate) fn off_curve_m(&self) -> f32 {
-        (self.curve().0 - self.motion.position).norm()
+        (self.curve_motion().0 - self.motion.position).norm()
     }
 
     /// Whether the setpoint stands.
-    pub(crate) fn stands(&self) -> bool {
+    pub(crate) fn is_standing(&self) -> bool {
         self.velocity().norm_squared() < STANDSTILL_MPS * STANDSTILL_MPS
     }
 
     /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
-    pub(crate) fn braking_m(&self, urgent: bool) -> f32 {
+    pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
         let speed = velocity.norm();
         if speed < STANDSTILL_MPS {
@@ -242,12 +243,12 @@ impl Smoother {
         speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
     }
 
-    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it goes on as it was: the autopilot has
+    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it continues as it was: the autopilot has
     /// done so too.
     pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
-        if !self.live && self.sent == Some(self.position()) && unsent_s < MAX_SETPOINT_GAP_S {
-            (self.live, self.resumes) = (true, true);
-            self.rest();
+        if !self.has_setpoint && self.last_sent == Some(self.position()) && unsent_s < MAX_SETPOINT_GAP_S {
+            (self.has_setpoint, self.resumes) = (true, true);
+            self.forget_curve();
         } else {
             self.begin_at(place, unsent_s);
         }
@@ -255,118 +256,125 @@ impl Smoother {
 
     /// At rest at a place, no further from what was sent last than a vehicle is followed: an estimate that jumps is no motion.
     pub(crate) fn begin_at(&mut self, place: Point, unsent_s: f32) {
-        let place = if place.iter().all(|c| c.is_finite()) { self.inside(place) } else { self.position() };
-        let place =
-            self.sent.map_or(place, |sent| sent + shortened(place - sent, MAX_FOLLOWED_MPS * unsent_s));
-        self.motion = Motion::at(place);
-        (self.live, self.resumes, self.followed) = (true, false, Point::zeros());
-        self.rest();
+        let place = if place.iter().all(|c| c.is_finite()) {
+            self.nearest_inside_fence(place)
+        } else {
+            self.position()
+        };
+        let place = self
+            .last_sent
+            .map_or(place, |sent| sent + clamp_length(place - sent, MAX_FOLLOWED_MPS * unsent_s));
+        self.motion = Motion::at_rest(place);
+        (self.has_setpoint, self.resumes, self.followed_velocity) = (true, false, Point::zeros());
+        self.forget_curve();
     }
 
     /// Goes with a vehicle that another flies, `unsent_s` after a place was sent last.
-    pub(crate) fn go_with(&mut self, place: Point, unsent_s: f32) {
-        let (here, was_live, followed) = (self.position(), self.live, self.followed);
+    pub(crate) fn follow_vehicle(&mut self, place: Point, unsent_s: f32) {
+        let (here, was_live, followed) = (self.position(), self.has_setpoint, self.followed_velocity);
         self.begin_at(place, unsent_s);
         if was_live && unsent_s > 0.0 {
-            self.followed =
+            self.followed_velocity =
                 followed + ((self.position() - here) / unsent_s - followed) * FOLLOWED_VELOCITY_GAIN;
         }
     }
 
-    /// Whether the next step goes on from the last setpoint sent: its time is that since then.
-    pub(crate) fn resumes(&self) -> bool {
+    /// Whether the next step continues from the last setpoint sent: its time is that since then.
+    pub(crate) fn resumes_from_last(&self) -> bool {
         self.resumes
     }
 
     /// The setpoint is sent.
     pub(crate) fn mark_sent(&mut self) {
-        self.sent = Some(self.position());
+        self.last_sent = Some(self.position());
     }
 
     /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back. A velocity that is not
     /// that of its places is not believed, and from what it has it can stop inside the fence.
-    pub(crate) fn move_on(&mut self, velocity: &Point) {
-        let most_mps = fminf(self.limits.fastest_mps(), MAX_SPEED_OVER_FOLLOWED * self.followed.norm());
-        let velocity = shortened(*velocity, most_mps);
+    pub(crate) fn hold_with_velocity(&mut self, velocity: &Point) {
+        let most_mps =
+            fminf(self.limits.max_speed_mps(), MAX_SPEED_OVER_FOLLOWED * self.followed_velocity.norm());
+        let velocity = clamp_length(*velocity, most_mps);
         if velocity.iter().all(|c| c.is_finite()) {
             self.motion.velocity = velocity;
             if let Some(fence) = &self.fence {
-                self.motion.velocity = fence.slowed(&self.motion, &self.limits);
+                self.motion.velocity = fence.limit_velocity(&self.motion, &self.limits);
             }
         }
     }
 
     /// Forgets the curve ahead; from a standstill, or nearly: the follower comes to rest by its own limits.
-    pub(crate) fn rest(&mut self) {
+    pub(crate) fn forget_curve(&mut self) {
         self.steps = [Point::zeros(); HISTORY_LEN];
-        self.slopes = [Point::zeros(); 3];
-        (self.raw, self.mean) = (self.position(), self.position());
-        (self.share, self.clock, self.clock_rate) = (0.0, 1.0, 0.0);
-        self.asked = Point::zeros();
+        self.average_steps = [Point::zeros(); 3];
+        (self.raw, self.average) = (self.position(), self.position());
+        (self.tick_fraction, self.clock_speed, self.clock_acceleration) = (0.0, 1.0, 0.0);
+        self.curve_acceleration = Point::zeros();
     }
 
     /// The nearest place inside the fence.
-    pub(crate) fn inside(&self, place: Point) -> Point {
-        self.fence.as_ref().map_or(place, |fence| fence.inside(place))
+    pub(crate) fn nearest_inside_fence(&self, place: Point) -> Point {
+        self.fence.as_ref().map_or(place, |fence| fence.nearest_inside(place))
     }
 
     /// Whether a place may be sent.
-    pub(crate) fn allows(&self, place: &Point) -> bool {
-        (self.inside(*place) - place).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M
+    pub(crate) fn is_place_allowed(&self, place: &Point) -> bool {
+        (self.nearest_inside_fence(*place) - place).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M
     }
 
-    /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push`] takes them, then [`Self::finish`] makes the
+    /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push_raw_point`] takes them, then [`Self::make_setpoint`] makes the
     /// setpoint.
-    pub(crate) fn begin(&mut self, pace: Pace, dt_s: f32) -> u8 {
-        if !(self.live && dt_s > 0.0) {
+    pub(crate) fn begin_step(&mut self, pace: ClockPace, dt_s: f32) -> u8 {
+        if !(self.has_setpoint && dt_s > 0.0) {
             self.dt_s = 0.0;
             return 0;
         }
         let resumes = core::mem::take(&mut self.resumes);
         self.dt_s = fminf(dt_s, if resumes { MAX_SETPOINT_GAP_S } else { f32::from(MAX_TICKS) * TICK_S });
         // A hard stop that has begun ends as one.
-        let brakes = self.clock_rate < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
+        let brakes = self.clock_acceleration < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
         self.stopping = pace.urgent || (self.stopping && brakes);
-        let pace = Pace { urgent: self.stopping, ..pace };
-        let clock_before = self.clock;
+        let pace = ClockPace { urgent: self.stopping, ..pace };
+        let clock_before = self.clock_speed;
         self.run_clock(pace, self.dt_s);
-        self.share += 0.5 * (clock_before + self.clock) * self.dt_s / TICK_S;
-        let due = (self.share as u8).min(MAX_TICKS);
+        self.tick_fraction += 0.5 * (clock_before + self.clock_speed) * self.dt_s / TICK_S;
+        let due = (self.tick_fraction as u8).min(MAX_TICKS);
         // After a gap the curve is one point.
-        self.share = if resumes { 0.0 } else { fmaxf(self.share - f32::from(due), 0.0) };
+        self.tick_fraction = if resumes { 0.0 } else { fmaxf(self.tick_fraction - f32::from(due), 0.0) };
         due
     }
 
     /// Takes the next raw point. One that is not finite, too far, or outside the fence is not followed.
-    pub(crate) fn push(&mut self, next: Point) {
-        let step = self.inside(next) - self.raw;
-        let furthest = self.limits.fastest_mps() * TICK_S + STEP_SLACK_M;
+    pub(crate) fn push_raw_point(&mut self, next: Point) {
+        let step = self.nearest_inside_fence(next) - self.raw;
+        let furthest = self.limits.max_speed_mps() * TICK_S + STEP_SLACK_M;
         // NaN is not near.
         let near = step.norm_squared() <= furthest * furthest;
-        self.sound &= near && (self.inside(next) - next).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M;
-        self.take(if near { step } else { Point::zeros() });
+        self.raw_points_valid &=
+            near && (self.nearest_inside_fence(next) - next).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M;
+        self.push_raw_step(if near { step } else { Point::zeros() });
     }
 
     /// Makes the setpoint; whether it is the one that was asked for. If not, it holds.
-    pub(crate) fn finish(&mut self) -> bool {
+    pub(crate) fn make_setpoint(&mut self) -> bool {
         let dt_s = self.dt_s;
-        let sound = core::mem::replace(&mut self.sound, true);
+        let sound = core::mem::replace(&mut self.raw_points_valid, true);
         if dt_s <= 0.0 {
             return sound;
         }
-        let (place, slope, bend) = self.curve();
-        let velocity = slope * self.clock;
-        let acceleration = bend * (self.clock * self.clock) + slope * self.clock_rate;
+        let (place, slope, bend) = self.curve_motion();
+        let velocity = slope * self.clock_speed;
+        let acceleration = bend * (self.clock_speed * self.clock_speed) + slope * self.clock_acceleration;
         let to = Motion { position: place, velocity, acceleration };
-        self.stats.made = self.stats.made.saturating_add(1);
+        self.stats.setpoint_count = self.stats.setpoint_count.saturating_add(1);
         if !(sound && to.is_finite()) {
-            self.stats.held = self.stats.held.saturating_add(1);
+            self.stats.hold_count = self.stats.hold_count.saturating_add(1);
         }
         if !to.is_finite() {
-            self.rest();
+            self.forget_curve();
             return false;
         }
-        self.asked = acceleration;
+        self.curve_acceleration = acceleration;
         let before = self.motion;
         let jerk_mps3 = self.limits.jerk(self.stopping);
         self.motion.follow(&to, &self.limits, self.fence.as_ref(), jerk_mps3, dt_s);
@@ -380,10 +388,10 @@ impl Smoother {
         sound
     }
 
-    /// The follower stops before the fence; should sums of steps of odd lengths lead out of it all the same, inside comes before
+    /// The follower stops before the fence. If rounding of uneven steps still leads out of it, the fence comes before
     /// smoothness.
     fn hold_inside(&mut self) {
-        let place = self.inside(self.motion.position);
+        let place = self.nearest_inside_fence(self.motion.position);
         for axis in 0..3 {
             if place[axis] != self.motion.position[axis] {
                 (self.motion.velocity[axis], self.motion.acceleration[axis]) = (0.0, 0.0);
@@ -395,18 +403,19 @@ impl Smoother {
     /// Speed of the clock after `dt_s`: as near to the pace as acceleration and jerk allow. With s the curve's speed, f its
     /// acceleration along it and σ the clock, the setpoint's speed is s·σ, its acceleration f·σ² + s·σ̇, and the clock's
     /// part of its jerk 3·f·σ·σ̇ + s·σ̈.
-    fn run_clock(&mut self, pace: Pace, dt_s: f32) {
+    fn run_clock(&mut self, pace: ClockPace, dt_s: f32) {
         let limits = &self.limits;
-        let (_, slope, bend) = self.curve();
+        let (_, slope, bend) = self.curve_motion();
         let true_speed = slope.norm();
         let speed = fmaxf(true_speed, MIN_CURVE_MPS);
         let along = bend.dot(&slope) / speed;
-        let third = (self.slopes[2] - self.slopes[1] * 2.0 + self.slopes[0]) / (TICK_S * TICK_S * TICK_S);
-        let clock = self.clock;
+        let third = (self.average_steps[2] - self.average_steps[1] * 2.0 + self.average_steps[0])
+            / (TICK_S * TICK_S * TICK_S);
+        let clock = self.clock_speed;
         let accel = limits.accel_along(&(slope / fmaxf(true_speed, 1e-3)));
         // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
-        let lack = (pace.share.clamp(0.0, 1.0) - clock) * speed;
-        let size = fmaxf(fabsf(lack) - fabsf(self.clock_rate) * speed * dt_s, 0.0);
+        let lack = (pace.speed_share.clamp(0.0, 1.0) - clock) * speed;
+        let size = fmaxf(fabsf(lack) - fabsf(self.clock_acceleration) * speed * dt_s, 0.0);
         let end_share = if lack > 0.0 { RISE_JERK_SHARE } else { END_JERK_SHARE };
         let end_jerk = end_share * limits.jerk(pace.urgent);
         let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), STOP_DECAY_PER_S * size);
@@ -415,50 +424,54 @@ impl Smoother {
         // The clock speeds up only by the part of the acceleration that the curve leaves, which may
         // change meanwhile.
         let [least, most] = [fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)];
-        let wanted = within(wanted, least, most) / speed;
+        let wanted = clamp_to(wanted, least, most) / speed;
         // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than the jerk allows; where the
         // curve alone takes all of it, the rate that adds the least.
         let ahead = bend + third * (clock * dt_s);
-        let next = (clock + self.clock_rate * dt_s).clamp(0.0, 1.0);
-        let change = ahead * (next * next) - self.asked;
+        let next = (clock + self.clock_acceleration * dt_s).clamp(0.0, 1.0);
+        let change = ahead * (next * next) - self.curve_acceleration;
         let most = PLANNED_JERK_SHARE * limits.jerk(pace.urgent) * dt_s;
         let slope_sq = fmaxf(slope.norm_squared(), MIN_CURVE_MPS * MIN_CURVE_MPS);
         let middle = -change.dot(&slope) / slope_sq;
         let left = most * most - change.norm_squared() + middle * middle * slope_sq;
         let half = sqrtf(fmaxf(left, 0.0) / slope_sq);
-        let rate = within(wanted, middle - half, middle + half);
+        let rate = clamp_to(wanted, middle - half, middle + half);
         let next = (clock + rate * dt_s).clamp(0.0, 1.0);
         let done = fabsf(lack) < 1e-3 * speed && fabsf(rate) < 0.02;
-        self.clock = if done { pace.share.clamp(0.0, 1.0) } else { next };
-        self.clock_rate = if done { 0.0 } else { (next - clock) / dt_s };
+        self.clock_speed = if done { pace.speed_share.clamp(0.0, 1.0) } else { next };
+        self.clock_acceleration = if done { 0.0 } else { (next - clock) / dt_s };
     }
 
-    /// Takes a raw step in.
-    fn take(&mut self, step: Point) {
+    /// Adds a raw step to the averages.
+    fn push_raw_step(&mut self, step: Point) {
         self.raw += step;
-        self.at = if self.at == 0 { HISTORY_LEN - 1 } else { self.at - 1 };
-        self.steps[self.at] = step;
+        self.newest_step = if self.newest_step == 0 { HISTORY_LEN - 1 } else { self.newest_step - 1 };
+        self.steps[self.newest_step] = step;
         // Both averages at once: a triangle of 2n − 1 weights.
-        let n = self.n;
+        let n = self.average_ticks;
         let scale = 1.0 / (n * n) as f32;
         let (mut slope, mut behind) = (Point::zeros(), Point::zeros());
         let mut tail = 1.0;
         for i in 0..2 * n - 1 {
-            let at = if self.at + i < HISTORY_LEN { self.at + i } else { self.at + i - HISTORY_LEN };
+            let at = if self.newest_step + i < HISTORY_LEN {
+                self.newest_step + i
+            } else {
+                self.newest_step + i - HISTORY_LEN
+            };
             let weight = (if i < n { i + 1 } else { 2 * n - 1 - i }) as f32 * scale;
             slope += self.steps[at] * weight;
             tail -= weight;
             behind += self.steps[at] * tail;
         }
-        self.slopes = [self.slopes[1], self.slopes[2], slope];
-        self.mean = self.raw - behind;
+        self.average_steps = [self.average_steps[1], self.average_steps[2], slope];
+        self.average = self.raw - behind;
     }
 
     /// Place, velocity and acceleration of the curve where the clock is.
-    fn curve(&self) -> (Point, Point, Point) {
-        let [e0, e1, e2] = &self.slopes;
-        let (x, y) = (self.share, 1.0 - self.share);
-        let second = self.mean - e2 - e1;
+    fn curve_motion(&self) -> (Point, Point, Point) {
+        let [e0, e1, e2] = &self.average_steps;
+        let (x, y) = (self.tick_fraction, 1.0 - self.tick_fraction);
+        let second = self.average - e2 - e1;
         let place = second
             + (e1 * (1.0 + 3.0 * x + 3.0 * x * x - 2.0 * x * x * x) + e2 * (x * x * x) - e0 * (y * y * y))
                 / 6.0;
@@ -469,7 +482,7 @@ impl Smoother {
 }
 
 /// Ticks of each average: long enough for the autopilot's jerk.
-fn average(limits: &Limits) -> usize {
+fn ticks_per_average(limits: &MotionLimits) -> usize {
     let n =
         libm::ceilf(2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
     n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)

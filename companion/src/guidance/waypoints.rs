@@ -14,15 +14,19 @@ const WP_RADIUS_M: f32 = 0.4;
 
 /// The paper's `nWaypoint`, and whether the path is completed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Waypoints {
+pub(super) struct Algorithm2Waypoints {
     next: usize,
     completed: bool,
 }
 
-impl Waypoints {
+impl Algorithm2Waypoints {
     /// One turn of the loop for a vehicle at `position`: the waypoint that the vehicle flies to;
     /// `None` once the path is completed.
-    pub(super) fn next<const W: usize>(&mut self, path: &Path<W>, position: &Point) -> Option<Point> {
+    pub(super) fn next_waypoint<const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        position: &Point,
+    ) -> Option<Point> {
         let points = path.waypoints();
         let goal = points.get(self.next)?.position;
         if (goal - position).norm() < WP_RADIUS_M {
@@ -36,7 +40,7 @@ impl Waypoints {
     }
 
     /// Whether the last waypoint was reached.
-    pub(super) fn completed(self) -> bool {
+    pub(super) fn is_completed(self) -> bool {
         self.completed
     }
 }
@@ -51,8 +55,9 @@ mod tests {
         for (x, y) in [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)] {
             path.push(Point::new(x, y, 1.0), 1.0).unwrap();
         }
-        let mut waypoints = Waypoints::default();
-        let mut at = |x: f32, y: f32| waypoints.next(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y));
+        let mut waypoints = Algorithm2Waypoints::default();
+        let mut at =
+            |x: f32, y: f32| waypoints.next_waypoint(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y));
         assert_eq!(at(-1.0, 0.0), Some((0.0, 0.0)));
         assert_eq!(at(-0.41, 0.0), Some((0.0, 0.0)), "outside Wp_radius");
         assert_eq!(at(-0.39, 0.0), Some((5.0, 0.0)));
@@ -60,7 +65,7 @@ mod tests {
         assert_eq!(at(5.0, 0.2), Some((5.0, 5.0)));
         assert_eq!(at(5.0, 4.7), None);
         assert_eq!(at(0.0, 0.0), None, "completed for good");
-        assert!(waypoints.completed());
-        assert_eq!(Waypoints::default().next(&Path::<4>::new(), &Point::zeros()), None);
+        assert!(waypoints.is_completed());
+        assert_eq!(Algorithm2Waypoints::default().next_waypoint(&Path::<4>::new(), &Point::zeros()), None);
     }
 }

@@ -12,7 +12,7 @@ use crate::time::{Duration, Instant};
 
 /// The kind of sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sender {
+pub(crate) enum SenderKind {
     /// Named by the mission file.
     GroundStation,
     /// A component of the own system, on the autopilot's link.
@@ -21,9 +21,9 @@ pub(crate) enum Sender {
     Other,
 }
 
-impl Sender {
+impl SenderKind {
     /// The kind of sender by the system id of a frame, to the vehicle of system `own`.
-    pub(crate) fn of(link: Link, system: u8, own: u8, ground_stations: &[u8]) -> Self {
+    pub(crate) fn from_system_id(link: Link, system: u8, own: u8, ground_stations: &[u8]) -> Self {
         if system != 0 && ground_stations.contains(&system) {
             Self::GroundStation
         } else if link == Link::Autopilot && system == own {
@@ -36,7 +36,7 @@ impl Sender {
 
 /// Kinds of answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum AnswerKind {
     /// COMMAND_ACK.
     Ack,
     /// TIMESYNC.
@@ -55,20 +55,20 @@ const LINK_COUNT: usize = 2;
 
 /// A token bucket: `burst` answers at once, then one each `every_ms`.
 #[derive(Clone, Copy, Debug)]
-struct Rate {
+struct TokenBucketConfig {
     every_ms: u64,
     burst: u64,
 }
 
-const fn rate(every_ms: u64, burst: u64) -> Rate {
-    Rate { every_ms, burst }
+const fn rate(every_ms: u64, burst: u64) -> TokenBucketConfig {
+    TokenBucketConfig { every_ms, burst }
 }
 
-/// Rate limits for each sender, in the order of [`Sender`], and each kind in the order of [`Kind`].
+/// Rate limits for each sender, in the order of [`SenderKind`], and each kind in the order of [`AnswerKind`].
 /// Others can request by radio at most 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the
 /// radio rate limit leaves in the air. A list of all parameters is one burst. PX4 sends TIMESYNC at
 /// 10 Hz, and needs no answer to fly.
-const RATES: [[Rate; KIND_COUNT]; SENDER_COUNT] = [
+const RATES: [[TokenBucketConfig; KIND_COUNT]; SENDER_COUNT] = [
     [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
     [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],
     [rate(1000, 2), rate(1000, 3), rate(2000, 10), rate(2000, 2), rate(10_000, 1)],
@@ -76,14 +76,14 @@ const RATES: [[Rate; KIND_COUNT]; SENDER_COUNT] = [
 
 /// For each link, sender and kind the time at which its bucket is full again.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rates {
+pub(crate) struct AnswerTokenBuckets {
     full_at: [[[Instant; KIND_COUNT]; SENDER_COUNT]; LINK_COUNT],
 }
 
-impl Rates {
-    /// Whether another answer may go out; if so, it is counted.
-    pub fn take(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind) -> bool {
-        let Rate { every_ms, burst } = RATES[sender as usize][kind as usize];
+impl AnswerTokenBuckets {
+    /// Takes a token for an answer. Returns false if the bucket is empty.
+    pub fn take_token(&mut self, now: Instant, link: Link, sender: SenderKind, kind: AnswerKind) -> bool {
+        let TokenBucketConfig { every_ms, burst } = RATES[sender as usize][kind as usize];
         let full_at = &mut self.full_at[link as usize][sender as usize][kind as usize];
         let next = (*full_at).max(now) + Duration::from_millis(every_ms);
         let allowed = next - now <= Duration::from_millis(every_ms * burst);
@@ -101,14 +101,14 @@ mod tests {
     #[test]
     fn a_bucket_gives_its_burst_and_then_its_rate() {
         let at = |ms| Instant::ZERO + Duration::from_millis(ms);
-        let mut rates = Rates::default();
-        let count = |rates: &mut Rates, ms, sender| {
-            (0..100).filter(|_| rates.take(at(ms), Link::Swarm, sender, Kind::Ack)).count()
+        let mut rates = AnswerTokenBuckets::default();
+        let count = |rates: &mut AnswerTokenBuckets, ms, sender| {
+            (0..100).filter(|_| rates.take_token(at(ms), Link::Swarm, sender, AnswerKind::Ack)).count()
         };
-        assert_eq!(count(&mut rates, 0, Sender::Other), 2);
-        assert_eq!(count(&mut rates, 999, Sender::Other), 0);
-        assert_eq!(count(&mut rates, 1000, Sender::Other), 1);
-        assert_eq!(count(&mut rates, 1000, Sender::GroundStation), 10, "its own bucket");
-        assert_eq!(count(&mut rates, 1 << 40, Sender::Other), 2, "no more is saved up");
+        assert_eq!(count(&mut rates, 0, SenderKind::Other), 2);
+        assert_eq!(count(&mut rates, 999, SenderKind::Other), 0);
+        assert_eq!(count(&mut rates, 1000, SenderKind::Other), 1);
+        assert_eq!(count(&mut rates, 1000, SenderKind::GroundStation), 10, "its own bucket");
+        assert_eq!(count(&mut rates, 1 << 40, SenderKind::Other), 2, "no more is saved up");
     }
 }

@@ -4,10 +4,10 @@
 //! Obeyed on either link, from a ground station that the mission names (`answer_limits`), when addressed to our system or to all (0),
 //! and to our component or to all (0). From others a command that acts is DENIED. Answered only
 //! when addressed to our system: a broadcast to the swarm acts on each and is answered by none. A command to all
-//! components that we do not know is somebody else's and stays unanswered.
+//! components that we do not know belongs to another component and stays unanswered.
 
 use crate::link::frame::Frame;
-use crate::mission::{Guard, Inputs, MAX_POSITION_AGE, State, awaits};
+use crate::mission::{Guard, GuardInputs, MAX_POSITION_AGE, State, has_row_for};
 use crate::time::{Duration, Instant};
 
 const COMMAND_INT: u32 = 75;
@@ -45,7 +45,7 @@ const GLOBAL_INT: u8 = 5;
 /// Time within which the same frame is a repetition, not a new command.
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(5);
 
-/// A command that concerns us.
+/// A command addressed to this companion or to all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// `MAV_CMD`.
@@ -67,7 +67,7 @@ pub struct Command {
 
 impl Command {
     /// Whether it is one of those that change something, and so counts only from a ground station of the mission.
-    pub(crate) fn acts(&self) -> bool {
+    pub(crate) fn needs_authority(&self) -> bool {
         let restarts = self.command == RESTART && (self.to_component || self.param2 == 1.0);
         restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
     }
@@ -89,7 +89,7 @@ impl Command {
 }
 
 /// Reads a command addressed to `system` or to all; `None` for other frames and other addressees.
-pub fn read(frame: &Frame, system: u8) -> Option<Command> {
+pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
     let p = frame.padded();
     if frame.message_id != COMMAND_INT && frame.message_id != COMMAND_LONG {
         return None;
@@ -122,7 +122,7 @@ const COMPARED_LEN: usize = 35;
 
 /// A command frame and its answer.
 #[derive(Clone, Copy, Debug)]
-struct Answered {
+struct AnsweredCommand {
     from: (u8, u8),
     sequence: u8,
     message: u32,
@@ -134,16 +134,16 @@ struct Answered {
 /// Remembers the last few command frames, so that a repeated one acts once and is answered alike. The same sequence number
 /// with other parameters is another command.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Repeats {
-    seen: [Option<Answered>; 4],
+pub struct CommandHistory {
+    seen: [Option<AnsweredCommand>; 4],
     next: usize,
 }
 
-impl Repeats {
+impl CommandHistory {
     /// The answer that this very frame got lately, `Some(None)` if none yet; `None` for a frame not
     /// seen.
-    pub fn answered(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
-        let same = |seen: &&Answered| {
+    pub fn previous_answer(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
+        let same = |seen: &&AnsweredCommand| {
             seen.from == (frame.system, frame.component)
                 && (seen.sequence, seen.message) == (frame.sequence, frame.message_id)
                 && seen.payload[..] == frame.padded()[..COMPARED_LEN]
@@ -157,14 +157,14 @@ impl Repeats {
         let mut payload = [0; COMPARED_LEN];
         payload.copy_from_slice(&frame.padded()[..COMPARED_LEN]);
         let (from, sequence, message) = ((frame.system, frame.component), frame.sequence, frame.message_id);
-        self.seen[self.next] = Some(Answered { from, sequence, message, payload, result, at });
+        self.seen[self.next] = Some(AnsweredCommand { from, sequence, message, payload, result, at });
         self.next = (self.next + 1) % self.seen.len();
     }
 }
 
 /// Commands of the operator that are not done yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Pending {
+pub struct PendingCommands {
     /// MISSION_START, until the mission ends.
     pub start: bool,
     /// DO_PAUSE_CONTINUE 0, until it is resumed or the vehicle lands: on the pad it holds the take-off back.
@@ -177,7 +177,7 @@ pub struct Pending {
     pub turn_back: bool,
 }
 
-impl Pending {
+impl PendingCommands {
     /// Forgets what a row used, and all of it when the mission `ends`.
     pub(crate) fn state_changed(&mut self, guard: Guard, to: State, ends: bool) {
         use State::*;
@@ -200,8 +200,13 @@ impl Pending {
     }
 }
 
-/// Takes a mission command in and says the result; `None` for a command that is not one of the mission's.
-pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Command) -> Option<u8> {
+/// Applies a mission command and returns its MAV_RESULT; `None` for any other command.
+pub fn apply_command(
+    pending: &mut PendingCommands,
+    state: State,
+    inputs: &GuardInputs,
+    command: &Command,
+) -> Option<u8> {
     use State::*;
     let (flag, guard, already): (_, _, &[State]) = match command.command {
         // A start in time for the plan is kept; a repeated one changes nothing.
@@ -255,12 +260,12 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
             (&mut pending.pause, Guard::PauseCommanded, &[Paused])
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
-            // A place to go on from has to be known.
+            // A place to continue from has to be known.
             if state == PilotReturned && inputs.position_age >= MAX_POSITION_AGE {
                 return Some(TEMPORARILY_REJECTED);
             }
             let taken = matches!(state, PilotControl | PilotReturned | Failsafe);
-            if pending.pause && !taken && !awaits(state, Guard::ResumeCommanded) {
+            if pending.pause && !taken && !has_row_for(state, Guard::ResumeCommanded) {
                 pending.pause = false;
                 return Some(ACCEPTED);
             }
@@ -269,7 +274,7 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
         }
         PAUSE_CONTINUE => return Some(DENIED),
         LAND if matches!(state, Failsafe | Aborted) => {
-            // Motors off there is nothing to do; else it acts, or somebody else flies.
+            // With motors off there is nothing to do. Otherwise the row acts, or a pilot or failsafe flies the vehicle.
             let acts = inputs.armed && inputs.offboard;
             pending.land = acts;
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });
@@ -278,7 +283,7 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
         RETURN => (&mut pending.turn_back, Guard::ReturnCommanded, &[Done]),
         _ => return None,
     };
-    if awaits(state, guard) {
+    if has_row_for(state, guard) {
         *flag = true;
         return Some(ACCEPTED);
     }

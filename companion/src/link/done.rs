@@ -16,7 +16,7 @@
 //! A receiver refuses another version, and a system id that is not the sender's.
 
 use heapless::Vec;
-use planner_core::flight::Range;
+use planner_core::flight::WaypointRange;
 
 use crate::time::Duration;
 
@@ -49,23 +49,23 @@ pub struct DoneReport {
     /// Whether the sender flies.
     pub flies: bool,
     /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of that.
-    pub plan: bool,
+    pub is_left_out_by_plan: bool,
     /// Waypoints that are photographed, as ranges of their numbers.
-    pub ranges: Vec<Range, MAX_RANGES>,
+    pub ranges: Vec<WaypointRange, MAX_RANGES>,
 }
 
 /// A range as it is sent and kept: what three bytes cannot hold is left out, and photographed again.
-pub(crate) fn range_bytes(range: &Range) -> [u8; RANGE_LEN] {
+pub(crate) fn encode_range(range: &WaypointRange) -> [u8; RANGE_LEN] {
     let [a, b, c, over] = range.first.to_le_bytes();
     let [d, e, f, many] = range.end.saturating_sub(range.first).to_le_bytes();
     if over == 0 && many == 0 { [a, b, c, d, e, f] } else { [0; RANGE_LEN] }
 }
 
 /// The range of these bytes: the inverse of the encoding above.
-pub(crate) fn range_of(bytes: &[u8; RANGE_LEN]) -> Range {
+pub(crate) fn decode_range(bytes: &[u8; RANGE_LEN]) -> WaypointRange {
     let [a, b, c, d, e, f] = *bytes;
     let first = u32::from_le_bytes([a, b, c, 0]);
-    Range { first, end: first + u32::from_le_bytes([d, e, f, 0]) }
+    WaypointRange { first, end: first + u32::from_le_bytes([d, e, f, 0]) }
 }
 
 impl DoneReport {
@@ -80,13 +80,13 @@ impl DoneReport {
             VERSION,
             self.system_id,
             self.round,
-            u8::from(self.flies) | u8::from(self.plan) << 1,
+            u8::from(self.flies) | u8::from(self.is_left_out_by_plan) << 1,
             count,
             0,
         ]);
         body[6..HEAD].copy_from_slice(&self.mission_crc.to_le_bytes());
         for (to, range) in body[HEAD..].chunks_exact_mut(RANGE_LEN).zip(&self.ranges) {
-            to.copy_from_slice(&range_bytes(range));
+            to.copy_from_slice(&encode_range(range));
         }
         TUNNEL_HEAD + len
     }
@@ -109,8 +109,8 @@ impl DoneReport {
             mission_crc: u32::from_le_bytes([body[6], body[7], body[8], body[9]]),
             round: body[2],
             flies: body[3] & 1 != 0,
-            plan: body[3] & 2 != 0,
-            ranges: ranges.iter().map(range_of).collect(),
+            is_left_out_by_plan: body[3] & 2 != 0,
+            ranges: ranges.iter().map(decode_range).collect(),
         })
     }
 }
@@ -133,8 +133,8 @@ mod tests {
             ranges in proptest::collection::vec((0u32..1 << 24, 1u32..1 << 24), 0..=MAX_RANGES),
             (mission_crc, round, flies, plan) in any::<(u32, u8, bool, bool)>(),
         ) {
-            let ranges = ranges.iter().map(|&(first, count)| Range { first, end: first + count }).collect();
-            let report = DoneReport { system_id: 9, mission_crc, round, flies, plan, ranges };
+            let ranges = ranges.iter().map(|&(first, count)| WaypointRange { first, end: first + count }).collect();
+            let report = DoneReport { system_id: 9, mission_crc, round, flies, is_left_out_by_plan: plan, ranges };
             prop_assert_eq!(DoneReport::decode(&padded(&report), 9), Some(report.clone()));
             prop_assert_eq!(DoneReport::decode(&padded(&report), 8), None);
             for (at, value) in [(0, 0), (4, 9), (5, 2), (9, 20)] {
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_range_that_is_too_large_is_left_out() {
-        let range = Range { first: 1 << 24, end: (1 << 24) + 1 };
-        assert_eq!(range_of(&range_bytes(&range)), Range { first: 0, end: 0 });
+        let range = WaypointRange { first: 1 << 24, end: (1 << 24) + 1 };
+        assert_eq!(decode_range(&encode_range(&range)), WaypointRange { first: 0, end: 0 });
     }
 }

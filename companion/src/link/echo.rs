@@ -20,7 +20,7 @@ const FALLING_DELAY_GAIN: f32 = 0.125;
 
 /// The part of an intent that acknowledges another vehicle's last intent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Echo {
+pub struct IntentEcho {
     /// Rank of that vehicle in the roster, below 255.
     pub rank: u8,
     /// Sequence number of its frame.
@@ -29,24 +29,25 @@ pub struct Echo {
     pub held: u8,
 }
 
-impl Echo {
+impl IntentEcho {
     /// The echo of a frame that was heard `held` ago; `None` if that is too long.
     pub(crate) fn new(rank: u16, sequence: u8, held: Duration) -> Option<Self> {
         let rank = u8::try_from(rank).ok().filter(|rank| *rank < u8::MAX)?;
-        let held = u8::try_from(held.micros() / HELD_TICK.micros()).ok().filter(|held| *held < u8::MAX)?;
+        let held =
+            u8::try_from(held.as_micros() / HELD_TICK.as_micros()).ok().filter(|held| *held < u8::MAX)?;
         Some(Self { rank, sequence, held })
     }
 }
 
 /// The own intents sent last: number and time, a ring.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sent {
+pub(crate) struct SentIntents {
     ring: [Option<(u8, Instant)>; MAX_SENT_INTENTS],
     count: usize,
 }
 
-impl Sent {
-    pub(crate) fn note(&mut self, sequence: u8, now: Instant) {
+impl SentIntents {
+    pub(crate) fn note_sent(&mut self, sequence: u8, now: Instant) {
         self.ring[self.count % MAX_SENT_INTENTS] = Some((sequence, now));
         self.count = self.count.wrapping_add(1);
     }
@@ -57,29 +58,29 @@ impl Sent {
     }
 
     /// Time that a message takes one way, seconds, by an echo of an own intent.
-    pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
+    pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
         let (_, sent) = self.ring.iter().flatten().find(|(sequence, _)| *sequence == echo.sequence)?;
-        let round_s = (now - *sent).secs_f32() - f32::from(echo.held) * HELD_TICK.secs_f32();
+        let round_s = (now - *sent).as_secs_f32() - f32::from(echo.held) * HELD_TICK.as_secs_f32();
         Some((0.5 * round_s).clamp(0.0, MAX_DELAY_S))
     }
 }
 
-/// How late a neighbour's messages are.
+/// Estimated one-way delay of a neighbour's messages.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lateness {
+pub(crate) struct MessageDelay {
     /// Seconds.
     pub(crate) delay_s: f32,
     known: bool,
 }
 
-impl Default for Lateness {
+impl Default for MessageDelay {
     fn default() -> Self {
         Self { delay_s: ASSUMED_DELAY_S, known: false }
     }
 }
 
-impl Lateness {
-    pub(crate) fn take(&mut self, delay_s: f32) {
+impl MessageDelay {
+    pub(crate) fn update(&mut self, delay_s: f32) {
         let share = if self.known && delay_s < self.delay_s { FALLING_DELAY_GAIN } else { 1.0 };
         self.delay_s += (delay_s - self.delay_s) * share;
         self.known = true;
@@ -97,29 +98,29 @@ mod tests {
             ways in proptest::collection::vec(0..900_u64, 1..60),
             held in 0..2500_u64,
         ) {
-            let (mut sent, mut late) = (Sent::default(), Lateness::default());
+            let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
             for (i, way) in ways.iter().enumerate() {
                 let now = Instant::from_millis(i as u64 * 200);
-                sent.note(i as u8, now);
-                let echo = Echo::new(3, i as u8, Duration::from_millis(held)).unwrap();
+                sent.note_sent(i as u8, now);
+                let echo = IntentEcho::new(3, i as u8, Duration::from_millis(held)).unwrap();
                 let back = now + Duration::from_millis(2 * way + held);
-                let delay_s = sent.delay_s(&echo, back).unwrap();
+                let delay_s = sent.message_delay_s(&echo, back).unwrap();
                 prop_assert!((delay_s - *way as f32 * 1e-3).abs() < 0.01);
-                late.take(delay_s);
+                late.update(delay_s);
                 prop_assert!(late.delay_s >= delay_s - 1e-6);
             }
         }
 
         #[test]
         fn wrong_echoes_stay_bounded(echoes in proptest::collection::vec((any::<u8>(), 0..255_u8, 0..60_000_u64), 1..50)) {
-            let (mut sent, mut late) = (Sent::default(), Lateness::default());
+            let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
             for i in 0..20 {
-                sent.note(i, Instant::from_millis(u64::from(i) * 200));
+                sent.note_sent(i, Instant::from_millis(u64::from(i) * 200));
             }
             for (sequence, held, at_ms) in echoes {
-                let echo = Echo { rank: 0, sequence, held };
-                if let Some(delay_s) = sent.delay_s(&echo, Instant::from_millis(4000 + at_ms)) {
-                    late.take(delay_s);
+                let echo = IntentEcho { rank: 0, sequence, held };
+                if let Some(delay_s) = sent.message_delay_s(&echo, Instant::from_millis(4000 + at_ms)) {
+                    late.update(delay_s);
                 }
                 prop_assert!((0.0..=MAX_DELAY_S).contains(&late.delay_s));
             }
@@ -128,8 +129,8 @@ mod tests {
 
     #[test]
     fn too_old_is_no_echo() {
-        assert_eq!(Echo::new(1, 2, Duration::from_millis(2550)), None);
-        assert_eq!(Echo::new(255, 2, Duration::from_millis(0)), None);
-        assert!(Echo::new(254, 2, Duration::from_millis(2540)).is_some());
+        assert_eq!(IntentEcho::new(1, 2, Duration::from_millis(2550)), None);
+        assert_eq!(IntentEcho::new(255, 2, Duration::from_millis(0)), None);
+        assert!(IntentEcho::new(254, 2, Duration::from_millis(2540)).is_some());
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible and whose id the
 //! dialect knows. Of candidates that overlap, the first whose checksum is right is the frame; a candidate with a wrong
-//! checksum costs its start byte only, and the search goes on behind that byte. So no garbage, whatever it is, hides a
+//! checksum costs its start byte only, and the search continues behind that byte. So no garbage, whatever it is, hides a
 //! whole frame behind it. What no checksum covers is searched too: a frame of unknown id and a signature, which is not
 //! checked here. Their bytes are not counted as noise.
 //!
@@ -33,7 +33,7 @@ const FLAG_SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
 /// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one step count as received
 /// with the last of them.
-const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.micros() / 8;
+const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.as_micros() / 8;
 /// Most arrival steps within [`PARTIAL_LIFETIME`], and one.
 const MAX_ARRIVALS: usize = 10;
 
@@ -123,11 +123,11 @@ const _: () = assert!(size_of::<Framer>() <= 480);
 /// What the buffer begins with.
 enum ParseStatus {
     /// Too few bytes to decide; this many are needed in all.
-    Needs(usize),
+    NeedsBytes(usize),
     /// Bytes that are not a frame.
-    False,
+    FalseStart,
     /// A checked frame of this many bytes, without its signature.
-    Good(usize),
+    ValidFrame(usize),
     /// Whole, of known id, wrong CRC.
     BadCrc,
     /// The header of an unknown id; this many bytes with the signature, if it is a frame.
@@ -166,15 +166,15 @@ impl Framer {
     /// is empty; call until `None`. With an empty `input` it lets a partial frame expire.
     pub fn next(&mut self, now: Instant, input: &mut &[u8]) -> Option<Frame> {
         loop {
-            let needed = match self.front() {
-                ParseStatus::Good(total) => return Some(self.take(total)),
-                ParseStatus::Needs(_) if self.expires_at().is_some_and(|due| now > due) => {
+            let needed = match self.parse_front() {
+                ParseStatus::ValidFrame(total) => return Some(self.take_frame(total)),
+                ParseStatus::NeedsBytes(_) if self.expires_at().is_some_and(|due| now > due) => {
                     let counted = u32::from(self.uncounted == 0);
                     self.counters.expired = self.counters.expired.wrapping_add(counted);
                     self.drop_start();
                     continue;
                 }
-                ParseStatus::Needs(needed) => needed,
+                ParseStatus::NeedsBytes(needed) => needed,
                 ParseStatus::Unknown(total) => {
                     if self.uncounted == 0 {
                         self.counters.unknown = self.counters.unknown.wrapping_add(1);
@@ -189,7 +189,7 @@ impl Framer {
                     self.drop_start();
                     continue;
                 }
-                ParseStatus::False => {
+                ParseStatus::FalseStart => {
                     self.drop_start();
                     continue;
                 }
@@ -212,39 +212,39 @@ impl Framer {
         }
     }
 
-    fn front(&self) -> ParseStatus {
+    fn parse_front(&self) -> ParseStatus {
         let b = &self.buf[..self.len];
         let (header, crc_at, signature, id) = match b {
-            [] | [V1_START | V2_START] => return ParseStatus::Needs(self.len + 1),
+            [] | [V1_START | V2_START] => return ParseStatus::NeedsBytes(self.len + 1),
             [V1_START, len, ..] => {
                 let id = b.get(5).map(|&id| u32::from(id));
                 (6, 6 + usize::from(*len), 0, id)
             }
-            [V2_START, _] => return ParseStatus::Needs(3),
-            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => return ParseStatus::False,
+            [V2_START, _] => return ParseStatus::NeedsBytes(3),
+            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => return ParseStatus::FalseStart,
             [V2_START, len, incompat, ..] => {
                 let signature = if incompat & FLAG_SIGNED != 0 { SIGNATURE_LEN } else { 0 };
                 let id = b.get(7..10).map(|id| u32::from_le_bytes([id[0], id[1], id[2], 0]));
                 (10, 10 + usize::from(*len), signature, id)
             }
-            _ => return ParseStatus::False,
+            _ => return ParseStatus::FalseStart,
         };
-        let Some(id) = id else { return ParseStatus::Needs(header) };
+        let Some(id) = id else { return ParseStatus::NeedsBytes(header) };
         let total = crc_at + 2;
         let Some(extra) = extra_crc(id) else { return ParseStatus::Unknown(total + signature) };
         if self.len < total {
-            return ParseStatus::Needs(total);
+            return ParseStatus::NeedsBytes(total);
         }
         let crc = u16::from_le_bytes([b[crc_at], b[crc_at + 1]]);
         if calculate_crc(&b[1..crc_at], extra) == crc {
-            ParseStatus::Good(total)
+            ParseStatus::ValidFrame(total)
         } else {
             ParseStatus::BadCrc
         }
     }
 
     /// Copies the good frame at the front out and removes it.
-    fn take(&mut self, total: usize) -> Frame {
+    fn take_frame(&mut self, total: usize) -> Frame {
         let b = &self.buf;
         let len = b[1];
         let (version, at, sequence, system, component, message_id) = if b[0] == V1_START {
@@ -256,7 +256,7 @@ impl Framer {
         let mut payload = [0; 255];
         payload[..usize::from(len)].copy_from_slice(&b[at..at + usize::from(len)]);
         self.counters.frames = self.counters.frames.wrapping_add(1);
-        self.remove(total);
+        self.remove_front(total);
         self.uncounted = if signed { SIGNATURE_LEN } else { 0 };
         self.drop_to_start(0);
         Frame { version, sequence, system, component, message_id, signed, len, payload }
@@ -272,7 +272,7 @@ impl Framer {
         let rest = &self.buf[from..self.len];
         let next = from + rest.iter().position(|&b| is_start(b)).unwrap_or(rest.len());
         self.count_noise(next);
-        self.remove(next);
+        self.remove_front(next);
     }
 
     /// Counts bytes that belong to no frame.
@@ -282,7 +282,7 @@ impl Framer {
         self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(noise as u32);
     }
 
-    fn remove(&mut self, count: usize) {
+    fn remove_front(&mut self, count: usize) {
         self.buf.copy_within(count..self.len, 0);
         self.len -= count;
         self.arrivals.retain_mut(|arrival| {
@@ -294,7 +294,7 @@ impl Framer {
     /// Bytes up to the end of the buffer were received at `now`.
     fn note_arrival(&mut self, now: Instant) {
         let arrival = Arrival { until: self.len, at: now };
-        let step = |at: Instant| at.micros() / ARRIVAL_STEP_US;
+        let step = |at: Instant| at.as_micros() / ARRIVAL_STEP_US;
         if let Some(last) = self.arrivals.last_mut().filter(|last| step(last.at) == step(now)) {
             *last = arrival;
         } else if let Err(arrival) = self.arrivals.push(arrival)

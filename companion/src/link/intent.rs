@@ -7,23 +7,23 @@
 //! | 0 | u8 | version, 5 |
 //! | 1 | u8 | system id |
 //! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
-//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where nobody hears it |
+//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where no other vehicle hears it |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
-//! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears nobody; −1e6 where it may stop at once |
+//! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears no other vehicle; −1e6 where it may stop at once |
 //! | 20 | u32 | vehicles that it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
-//! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
+//! | 28 | u8 | 1: it climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
-//! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while somebody else flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where nobody hears it |
+//! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where no other vehicle hears it |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
 use heapless::Vec;
 use planner_core::Point;
 
-use crate::link::echo::Echo;
+use crate::link::echo::IntentEcho;
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub const PAYLOAD_TYPE: u16 = 0xF10C;
@@ -68,22 +68,22 @@ pub struct Intent {
     pub progress_m: f32,
     /// Place along the own path up to which the sender's gates are open, metres: the sender flies
     /// on to there even when it hears no vehicle.
-    pub clear_m: f32,
+    pub gates_open_up_to_m: f32,
     /// Seconds until the last of those gates is open for sure, at most 127.
-    pub clear_in_s: u8,
+    pub gates_open_in_s: u8,
     /// Whom it heard lately, a bit for each rank.
-    pub heard: u32,
+    pub heard_bits: u32,
     /// Height of the ground below it, as far as it knows, metres.
-    pub floor_m: f32,
-    /// Whether it may come down from where it is: it climbs, descends or lands, or somebody else flies it.
-    pub column: bool,
+    pub ground_m: f32,
+    /// Whether it may come down from its place: it climbs, descends or lands, or a pilot or failsafe flies it.
+    pub may_come_down: bool,
     /// Echo of another vehicle's intent, for that vehicle's measure of the delay.
-    pub echo: Option<Echo>,
+    pub echo: Option<IntentEcho>,
     /// Points that it flies along next: as far as it will go for now, then as far as it flies on unheard; none while somebody
     /// else flies it.
     pub points: Vec<Point, MAX_POINTS>,
     /// Number of the last of those points beyond where it will stop for now.
-    pub beyond: u8,
+    pub first_unheard_point: u8,
 }
 
 impl Intent {
@@ -97,18 +97,18 @@ impl Intent {
             VERSION,
             self.system_id,
             self.flags,
-            self.points.len() as u8 | self.beyond << 4,
+            self.points.len() as u8 | self.first_unheard_point << 4,
         ]);
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
         body[12..16].copy_from_slice(&self.progress_m.to_le_bytes());
-        body[16..20].copy_from_slice(&self.clear_m.to_le_bytes());
-        body[20..24].copy_from_slice(&self.heard.to_le_bytes());
-        body[24..28].copy_from_slice(&self.floor_m.to_le_bytes());
+        body[16..20].copy_from_slice(&self.gates_open_up_to_m.to_le_bytes());
+        body[20..24].copy_from_slice(&self.heard_bits.to_le_bytes());
+        body[24..28].copy_from_slice(&self.ground_m.to_le_bytes());
         let [rank, sequence, held] =
             self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held]);
         body[28..32].copy_from_slice(&[
-            u8::from(self.column) | self.clear_in_s.min(127) << 1,
+            u8::from(self.may_come_down) | self.gates_open_in_s.min(127) << 1,
             rank,
             sequence,
             held,
@@ -146,14 +146,14 @@ impl Intent {
             mission_crc: u32::from_le_bytes(word(4)),
             plan_crc: u32::from_le_bytes(word(8)),
             progress_m: float(12)?,
-            clear_m: float(16)?,
-            heard: u32::from_le_bytes(word(20)),
-            floor_m: float(24)?,
-            column: body[28] & 1 != 0,
-            clear_in_s: body[28] >> 1,
-            echo: body[29].checked_sub(1).map(|rank| Echo { rank, sequence: body[30], held: body[31] }),
+            gates_open_up_to_m: float(16)?,
+            heard_bits: u32::from_le_bytes(word(20)),
+            ground_m: float(24)?,
+            may_come_down: body[28] & 1 != 0,
+            gates_open_in_s: body[28] >> 1,
+            echo: body[29].checked_sub(1).map(|rank| IntentEcho { rank, sequence: body[30], held: body[31] }),
             points,
-            beyond,
+            first_unheard_point: beyond,
         })
     }
 }
@@ -171,14 +171,14 @@ mod tests {
             mission_crc: 0xDEAD_BEEF,
             plan_crc: 7,
             progress_m: -1.25,
-            clear_m: 17.5,
-            heard: 0x8000_0005,
-            floor_m: -0.5,
-            column: count == 3,
-            clear_in_s: 15 * count as u8,
-            echo: (count > 2).then_some(Echo { rank: 254, sequence: 9, held: count as u8 }),
+            gates_open_up_to_m: 17.5,
+            heard_bits: 0x8000_0005,
+            ground_m: -0.5,
+            may_come_down: count == 3,
+            gates_open_in_s: 15 * count as u8,
+            echo: (count > 2).then_some(IntentEcho { rank: 254, sequence: 9, held: count as u8 }),
             points,
-            beyond: count as u8 / 2,
+            first_unheard_point: count as u8 / 2,
         }
     }
 

@@ -15,7 +15,7 @@ use crate::link::frame::{self, Header};
 /// Entries that a link's queue holds.
 pub const QUEUE_DEPTH: usize = 32;
 
-/// A message that waits.
+/// A message that waits in the queue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outgoing {
     /// SET_MESSAGE_INTERVAL: message id, microseconds or −1.
@@ -122,21 +122,21 @@ impl Outbox {
     }
 
     /// Free entries.
-    pub fn room(&self) -> usize {
+    pub fn free_entries(&self) -> usize {
         QUEUE_DEPTH - self.queue.len()
     }
 
     /// The header of the next frame of this link.
-    pub fn header(&mut self, system: u8) -> Header {
+    pub fn next_header(&mut self, system: u8) -> Header {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
         Header { system, component: crate::COMPANION_COMPONENT, sequence }
     }
 
-    /// Writes the first that waits; 0 if none does.
-    pub fn transmit(&mut self, system: u8, out: &mut [u8]) -> usize {
+    /// Writes the first queued message as a frame; 0 if the queue is empty.
+    pub fn write_first(&mut self, system: u8, out: &mut [u8]) -> usize {
         let Some(message) = self.queue.pop_front() else { return 0 };
-        let header = self.header(system);
+        let header = self.next_header(system);
         let command = |command, param1: f32, param2: f32, param3: f32| COMMAND_LONG_DATA {
             command,
             param1,
@@ -231,11 +231,11 @@ impl Outbox {
                 );
             }
             Outgoing::Text { warning, text } => {
-                let severity = severity(warning);
+                let severity = text_severity(warning);
                 return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.into() }, out);
             }
             Outgoing::Count { warning, text, numbers } => {
-                let (severity, text) = (severity(warning), filled(text, numbers));
+                let (severity, text) = (text_severity(warning), format_text(text, numbers));
                 return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.as_str().into() }, out);
             }
         };
@@ -243,12 +243,12 @@ impl Outbox {
     }
 }
 
-fn severity(warning: bool) -> MavSeverity {
+fn text_severity(warning: bool) -> MavSeverity {
     if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO }
 }
 
-/// A text with its numbers in it; what is beyond 50 bytes is left out.
-fn filled(text: &str, numbers: [u32; 3]) -> String<50> {
+/// A text with its numbers filled in, cut to 50 bytes.
+fn format_text(text: &str, numbers: [u32; 3]) -> String<50> {
     let mut out = String::new();
     let mut numbers = numbers.iter();
     for piece in text.split_inclusive('#') {
@@ -272,10 +272,10 @@ mod tests {
     #[test]
     fn numbers_stand_where_the_text_says() {
         assert_eq!(
-            filled("Setpoints: #, at most # ms apart", [1234, 55, 0]),
+            format_text("Setpoints: #, at most # ms apart", [1234, 55, 0]),
             "Setpoints: 1234, at most 55 ms apart"
         );
-        assert_eq!(filled("Nothing", [1, 2, 3]), "Nothing");
-        assert_eq!(filled("# # # #", [u32::MAX, 0, 7]), "4294967295 0 7 ");
+        assert_eq!(format_text("Nothing", [1, 2, 3]), "Nothing");
+        assert_eq!(format_text("# # # #", [u32::MAX, 0, 7]), "4294967295 0 7 ");
     }
 }

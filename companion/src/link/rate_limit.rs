@@ -1,7 +1,7 @@
 //! How many bytes go to the swarm's radio, which all vehicles share: the state that keeps them apart always goes out, what is asked
 //! for beside it only as far as [`ARMED_BYTES_PER_S`] or [`DISARMED_BYTES_PER_S`] let it.
 //!
-//! State is made at a fixed rate ([`state_bps`]). All else (acks, texts, parameters, files, and what a REQUEST_MESSAGE asks for)
+//! State is made at a fixed rate ([`state_bytes_per_s`]). All else (acks, texts, parameters, files, and what a REQUEST_MESSAGE asks for)
 //! spends from an account that fills with time. So in any span of t seconds the radio gets at most t times both, and [`MAX_SAVED_BYTES`]
 //! and a frame more, whatever is asked.
 
@@ -24,14 +24,14 @@ const STATE_BYTES: u32 = POSITION_BYTES as u32 + 145;
 const HEARTBEAT_BYTES: u32 = 21;
 
 /// Most bytes a second of one vehicle's state, sent so many times a second.
-pub const fn state_bps(swarm_hz: u8) -> u32 {
+pub const fn state_bytes_per_s(swarm_hz: u8) -> u32 {
     STATE_BYTES * swarm_hz as u32 + HEARTBEAT_BYTES
 }
 
 /// The account. In millionths of a byte, so that no time is too short to count.
 #[derive(Clone, Debug)]
 pub(crate) struct RateLimit {
-    left: i64,
+    tokens: i64,
     at: Instant,
 }
 
@@ -39,29 +39,29 @@ const MICROBYTES_PER_BYTE: i64 = 1_000_000;
 
 impl Default for RateLimit {
     fn default() -> Self {
-        Self { left: i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE, at: Instant::ZERO }
+        Self { tokens: i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE, at: Instant::ZERO }
     }
 }
 
 impl RateLimit {
     /// Whether another frame may go out by now. It may be longer than what is left; then it is owed.
-    pub fn allows(&mut self, now: Instant, armed: bool) -> bool {
+    pub fn may_send(&mut self, now: Instant, armed: bool) -> bool {
         let rate = i64::from(if armed { ARMED_BYTES_PER_S } else { DISARMED_BYTES_PER_S });
         // An hour fills it in any case.
-        let passed_us = (now - self.at).micros().min(3_600_000_000) as i64;
+        let passed_us = (now - self.at).as_micros().min(3_600_000_000) as i64;
         self.at = now;
-        self.left = (self.left + passed_us * rate).min(i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE);
-        self.left > 0
+        self.tokens = (self.tokens + passed_us * rate).min(i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE);
+        self.tokens > 0
     }
 
     /// Whether half of what may be saved up is left, as of the last question whether a frame may go out.
     pub(crate) fn is_half_full(&self) -> bool {
-        self.left > i64::from(MAX_SAVED_BYTES / 2) * MICROBYTES_PER_BYTE
+        self.tokens > i64::from(MAX_SAVED_BYTES / 2) * MICROBYTES_PER_BYTE
     }
 
-    /// A frame went out.
-    pub fn spend(&mut self, bytes: usize) {
-        self.left -= bytes.min(MAX_FRAME_LEN) as i64 * MICROBYTES_PER_BYTE;
+    /// Counts the bytes of a sent frame.
+    pub fn count_bytes(&mut self, bytes: usize) {
+        self.tokens -= bytes.min(MAX_FRAME_LEN) as i64 * MICROBYTES_PER_BYTE;
     }
 }
 

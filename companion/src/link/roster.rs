@@ -34,7 +34,7 @@ pub const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
 /// Whether a vehicle takes part. What comes later in this list outlasts what comes before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
-pub enum Standing {
+pub enum MemberStatus {
     /// The vehicle flies its share, or will.
     #[default]
     Alive,
@@ -46,22 +46,22 @@ pub enum Standing {
     Finished,
 }
 
-impl Standing {
+impl MemberStatus {
     const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
 }
 
-/// One vehicle, as the sender knows it.
+/// State of one vehicle of the roster as the sender knows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Entry {
+pub struct RosterReportEntry {
     /// Counts its flights: what is known of an earlier one does not count. 0…7, then 0 again.
     pub incarnation: u8,
     /// Whether it takes part.
-    pub standing: Standing,
+    pub status: MemberStatus,
     /// Progress of the vehicle along its path, decimetres.
-    pub done_dm: u16,
+    pub progress_dm: u16,
     /// Place along its path up to which the vehicle flies before it waits for a division,
     /// decimetres; 0 on its pad.
-    pub promise_dm: Option<u16>,
+    pub commitment_dm: Option<u16>,
     /// Whether it stands there.
     pub holds: bool,
     /// Whether it computed the sender's hash of the division under way.
@@ -70,7 +70,7 @@ pub struct Entry {
 
 /// The message.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Roster {
+pub struct RosterReport {
     /// MAVLink system id of the sender.
     pub system_id: u8,
     /// Divisions that count, as the sender knows.
@@ -80,14 +80,14 @@ pub struct Roster {
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
     /// Hash of the last division that counts.
-    pub counted: u32,
+    pub committed_hash: u32,
     /// Hash of the division under way; 0 for none.
     pub hash: u32,
     /// The vehicles by rank.
-    pub entries: Vec<Entry, MAX_ENTRIES>,
+    pub entries: Vec<RosterReportEntry, MAX_ENTRIES>,
 }
 
-impl Roster {
+impl RosterReport {
     /// Writes the whole TUNNEL payload, to everyone; the bytes written.
     pub fn encode(&self, out: &mut [u8; MAX_LEN]) -> usize {
         let len = HEADER_LEN + ENTRY_LEN * self.entries.len();
@@ -97,17 +97,17 @@ impl Roster {
         let count = self.entries.len() as u8;
         body[..6].copy_from_slice(&[VERSION, self.system_id, self.divisions, self.first, count, 0]);
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
-        body[10..14].copy_from_slice(&self.counted.to_le_bytes());
+        body[10..14].copy_from_slice(&self.committed_hash.to_le_bytes());
         body[14..18].copy_from_slice(&self.hash.to_le_bytes());
         for (to, entry) in body[HEADER_LEN..].chunks_exact_mut(ENTRY_LEN).zip(&self.entries) {
             let bit = |set: bool, at: u8| u8::from(set) << at;
-            to[0] = entry.standing as u8
-                | bit(entry.promise_dm.is_some(), 2)
+            to[0] = entry.status as u8
+                | bit(entry.commitment_dm.is_some(), 2)
                 | bit(entry.holds, 3)
                 | bit(entry.agrees, 4)
                 | entry.incarnation << 5;
-            to[1..3].copy_from_slice(&entry.done_dm.to_le_bytes());
-            to[3..5].copy_from_slice(&entry.promise_dm.unwrap_or(0).to_le_bytes());
+            to[1..3].copy_from_slice(&entry.progress_dm.to_le_bytes());
+            to[3..5].copy_from_slice(&entry.commitment_dm.unwrap_or(0).to_le_bytes());
         }
         TUNNEL_HEAD + len
     }
@@ -127,11 +127,11 @@ impl Roster {
         let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
         let entry = |b: &[u8]| {
             let set = |at: u8| b[0] >> at & 1 != 0;
-            Entry {
+            RosterReportEntry {
                 incarnation: b[0] >> 5,
-                standing: Standing::ALL[usize::from(b[0] & 3)],
-                done_dm: u16::from_le_bytes([b[1], b[2]]),
-                promise_dm: set(2).then(|| u16::from_le_bytes([b[3], b[4]])),
+                status: MemberStatus::ALL[usize::from(b[0] & 3)],
+                progress_dm: u16::from_le_bytes([b[1], b[2]]),
+                commitment_dm: set(2).then(|| u16::from_le_bytes([b[3], b[4]])),
                 holds: set(3),
                 agrees: set(4),
             }
@@ -141,7 +141,7 @@ impl Roster {
             divisions: body[2],
             first: body[3],
             mission_crc: word(6),
-            counted: word(10),
+            committed_hash: word(10),
             hash: word(14),
             entries: body[HEADER_LEN..].chunks_exact(ENTRY_LEN).map(entry).collect(),
         })
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn padded(roster: &Roster) -> [u8; 255] {
+    fn padded(roster: &RosterReport) -> [u8; 255] {
         let (mut out, mut padded) = ([0; MAX_LEN], [0; 255]);
         let len = roster.encode(&mut out);
         padded[..len].copy_from_slice(&out[..len]);
@@ -166,17 +166,17 @@ mod tests {
             entries in proptest::collection::vec((0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()), 1..=MAX_ENTRIES),
             head in any::<(u8, u8, u32, u32, u32)>(),
         ) {
-            let entries = entries.iter().map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| Entry {
-                incarnation, standing: Standing::ALL[standing], done_dm, promise_dm, holds, agrees,
+            let entries = entries.iter().map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| RosterReportEntry {
+                incarnation, status: MemberStatus::ALL[standing], progress_dm: done_dm, commitment_dm: promise_dm, holds, agrees,
             }).collect();
             let (divisions, first, mission_crc, counted, hash) = head;
-            let roster = Roster { system_id: 9, divisions, first, mission_crc, counted, hash, entries };
-            prop_assert_eq!(Roster::decode(&padded(&roster), 9), Some(roster.clone()));
-            prop_assert_eq!(Roster::decode(&padded(&roster), 8), None);
+            let roster = RosterReport { system_id: 9, divisions, first, mission_crc, committed_hash: counted, hash, entries };
+            prop_assert_eq!(RosterReport::decode(&padded(&roster), 9), Some(roster.clone()));
+            prop_assert_eq!(RosterReport::decode(&padded(&roster), 8), None);
             for (at, value) in [(0, 0), (4, 17), (5, 2), (9, 0), (9, 23)] {
                 let mut bad = padded(&roster);
                 bad[at] = value;
-                prop_assert_eq!(Roster::decode(&bad, 9), None);
+                prop_assert_eq!(RosterReport::decode(&bad, 9), None);
             }
         }
 
@@ -185,7 +185,7 @@ mod tests {
             let mut padded: [u8; 255] = bytes.try_into().unwrap();
             padded[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
             padded[5] = VERSION;
-            let _ = Roster::decode(&padded, padded[6]);
+            let _ = RosterReport::decode(&padded, padded[6]);
         }
     }
 }

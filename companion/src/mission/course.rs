@@ -2,19 +2,19 @@
 
 use planner_core::Point;
 use planner_core::detour::Goal;
-use planner_core::flight::{Path, Range, Task, VehiclePlan};
+use planner_core::flight::{Path, Task, VehiclePlan, WaypointRange};
 
 use crate::autopilot::telemetry::Ack;
 use crate::config::PlanFailure;
 use crate::link::Links;
-use crate::link::commands::{self, Command, Pending};
-use crate::mission::photographed::Photographed;
-use crate::mission::task::{Along, Tasks};
-use crate::mission::waits::Waits;
-use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
+use crate::link::commands::{self, Command, PendingCommands};
+use crate::mission::photographed::PhotographedWaypoints;
+use crate::mission::task::{PathProgress, Tasks};
+use crate::mission::waits::WaitReport;
+use crate::mission::{Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
 
-/// Greatest distance between the begin of a path and the vehicle, metres.
+/// Greatest distance between the start of a path and the vehicle, metres.
 const PATH_BEGIN_M: f32 = 0.1;
 /// A picture no further than this before the place where the vehicle comes back to its path is
 /// taken there, metres.
@@ -29,58 +29,58 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     started_at: Instant,
     /// When the pilot took the vehicle.
     pilot_since: Instant,
-    interrupted: Interrupted,
-    pending: Pending,
+    interrupted: InterruptedStates,
+    pending: PendingCommands,
     /// The autopilot's mode at the start.
     mode_before: u32,
     /// First point of the path, above the pad.
     start: Point,
     plan: Option<VehiclePlan<W, G>>,
     /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
-    left_with_all: Option<bool>,
-    /// Pictures of its path up to where it last came back from a way around: those taken before that were noted when it left.
-    flown_around: u32,
+    left_with_all_pictures: Option<bool>,
+    /// Pictures of its path up to where it last came back from a detour: those taken before that were noted when it left.
+    pictures_before_rejoin: u32,
     /// Place where the plan ends, the height in which the plan leads there, and the descent,
     /// metres.
     home: (Point, f32, f32),
     failure: Option<PlanFailure>,
     /// Since when the estimate is worse than the margin leaves at a crawl.
-    vague_since: Option<Instant>,
-    waits: Waits,
+    imprecise_since: Option<Instant>,
+    wait_report: WaitReport,
     tasks: Tasks,
-    photographed: Photographed,
+    photographed: PhotographedWaypoints,
     /// Divisions that count for the plan.
     division: usize,
     /// Whether the part that the last one gives has come and is not flown yet.
-    fresh: bool,
+    division_plan_ready: bool,
     /// The division that the shell was requested to compute, and when.
-    asked: Option<(u32, Instant)>,
+    division_requested: Option<(u32, Instant)>,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
-    /// Before the autopilot was heard; the path is to begin at `start`.
+    /// Before the autopilot was heard; the path is to begin at `path_start`.
     pub(crate) fn new(start: Point) -> Self {
         Self {
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             started_at: Instant::ZERO,
             pilot_since: Instant::ZERO,
-            interrupted: Interrupted::default(),
-            pending: Pending::default(),
+            interrupted: InterruptedStates::default(),
+            pending: PendingCommands::default(),
             mode_before: 0,
             start,
             plan: None,
-            left_with_all: None,
-            flown_around: 0,
+            left_with_all_pictures: None,
+            pictures_before_rejoin: 0,
             home: (start, start.z, 0.0),
             failure: None,
-            vague_since: None,
-            waits: Waits::default(),
+            imprecise_since: None,
+            wait_report: WaitReport::default(),
             tasks: Tasks::default(),
-            photographed: Photographed::default(),
+            photographed: PhotographedWaypoints::default(),
             division: 0,
-            fresh: false,
-            asked: None,
+            division_plan_ready: false,
+            division_requested: None,
         }
     }
 
@@ -89,13 +89,13 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.state
     }
 
-    /// Since when.
+    /// Time at which this state was entered.
     pub(crate) fn entered_at(&self) -> Instant {
         self.entered_at
     }
 
     /// Time in this state.
-    pub(crate) fn in_state(&self, now: Instant) -> Duration {
+    pub(crate) fn time_in_state(&self, now: Instant) -> Duration {
         now - self.entered_at
     }
 
@@ -105,17 +105,17 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Time for which the pilot has had the vehicle.
-    pub(crate) fn with_pilot(&self, now: Instant) -> Duration {
+    pub(crate) fn time_with_pilot(&self, now: Instant) -> Duration {
         now - self.pilot_since
     }
 
     /// The state of the flight itself, beneath pause and loss.
-    pub(crate) fn beneath(&self) -> State {
-        self.interrupted.beneath(self.state)
+    pub(crate) fn uninterrupted_state(&self) -> State {
+        self.interrupted.uninterrupted_state(self.state)
     }
 
     /// Commands that are not done yet.
-    pub(crate) fn pending(&self) -> &Pending {
+    pub(crate) fn pending(&self) -> &PendingCommands {
         &self.pending
     }
 
@@ -125,12 +125,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// First point of the path, above the pad.
-    pub(crate) fn start(&self) -> Point {
+    pub(crate) fn path_start(&self) -> Point {
         self.start
     }
 
     /// The place of the vehicle on the ground before it starts.
-    pub(crate) fn pad(&self) -> Point {
+    pub(crate) fn pad_position(&self) -> Point {
         self.start - Point::new(0.0, 0.0, self.climb_m())
     }
 
@@ -144,47 +144,52 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.plan.as_ref().map_or(0.0, |plan| plan.climb_m)
     }
 
-    /// Why the plan requested last did not come.
-    pub(crate) fn failure(&self) -> Option<PlanFailure> {
+    /// Reason why the plan requested last did not come.
+    pub(crate) fn plan_failure(&self) -> Option<PlanFailure> {
         self.failure
     }
 
     /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
     pub(crate) fn departure_due(&self, now: Instant) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
-        (now - self.started_at).secs_f32() >= depart_s
+        (now - self.started_at).as_secs_f32() >= depart_s
     }
 
     /// Time for which the bound of the position estimate has exceeded the part that the margin
     /// leaves for it.
-    pub(crate) fn vague_for(&self, now: Instant) -> Duration {
-        self.vague_since.map_or(Duration::default(), |since| now - since)
+    pub(crate) fn estimate_imprecise_for(&self, now: Instant) -> Duration {
+        self.imprecise_since.map_or(Duration::default(), |since| now - since)
     }
 
-    /// Notes whether it is.
+    /// Notes whether the estimate is precise enough.
     pub(crate) fn note_estimate(&mut self, usable: bool, now: Instant) {
-        self.vague_since = if usable { None } else { self.vague_since.or(Some(now)) };
+        self.imprecise_since = if usable { None } else { self.imprecise_since.or(Some(now)) };
     }
 
     /// The vehicle waits for the vehicle `id`, which has not started, or for none (0). Returns
     /// whether `id` is to be reported.
-    pub(crate) fn names(&mut self, id: u8, now: Instant) -> bool {
-        self.waits.watch(id, now)
+    pub(crate) fn should_report_wait(&mut self, id: u8, now: Instant) -> bool {
+        self.wait_report.update(id, now)
     }
 
     /// Takes a command in and says the result; `None` for one that is not the mission's.
-    pub(crate) fn handle_command(&mut self, inputs: &Inputs, command: &Command) -> Option<u8> {
-        commands::apply(&mut self.pending, self.state, inputs, command)
+    pub(crate) fn handle_command(&mut self, inputs: &GuardInputs, command: &Command) -> Option<u8> {
+        commands::apply_command(&mut self.pending, self.state, inputs, command)
     }
 
     /// Changes the state as a row of the table says. Returns it before and after.
-    pub(crate) fn enter(&mut self, row: &Row, custom_mode: u32, now: Instant) -> (State, State) {
+    pub(crate) fn enter_state(
+        &mut self,
+        row: &TransitionRow,
+        custom_mode: u32,
+        now: Instant,
+    ) -> (State, State) {
         let from = self.state;
         let to = match row.to {
-            To::State(to) => to,
-            To::Interrupted => self.interrupted.target(from),
+            TargetState::State(to) => to,
+            TargetState::Interrupted => self.interrupted.target(from),
         };
-        self.interrupted.note(from, to);
+        self.interrupted.record_interruption(from, to);
         (self.state, self.entered_at) = (to, now);
         if row.guard == Guard::StartCommanded {
             (self.started_at, self.mode_before) = (now, custom_mode);
@@ -199,35 +204,35 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// The text for a change of state that interrupts another.
-    pub(crate) fn interruption(&self, from: State, to: State) -> Option<&'static str> {
-        self.interrupted.text(from, to)
+    pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
+        self.interrupted.interruption_text(from, to)
     }
 
     /// A plan is requested: there is none, and no failure.
     pub(crate) fn forget_plan(&mut self) {
-        (self.plan, self.failure, self.division, self.left_with_all) = (None, None, 0, None);
-        (self.fresh, self.asked) = (false, None);
+        (self.plan, self.failure, self.division, self.left_with_all_pictures) = (None, None, 0, None);
+        (self.division_plan_ready, self.division_requested) = (false, None);
         self.tasks.reset();
     }
 
-    /// A way around is requested: the plan stays until it comes.
+    /// A detour is requested: the plan stays until it comes.
     pub(crate) fn forget_failure(&mut self) {
         self.failure = None;
     }
 
-    /// Takes the plan requested.
-    pub(crate) fn take_plan(&mut self, plan: &VehiclePlan<W, G>) {
-        match self.begins_at(plan, &self.start) {
-            true => self.fly(plan),
+    /// Stores the requested plan.
+    pub(crate) fn set_plan(&mut self, plan: &VehiclePlan<W, G>) {
+        match self.starts_at(plan, &self.start) {
+            true => self.begin_plan(plan),
             false => self.failure = Some(PlanFailure::Invalid),
         }
     }
 
     // Copies of it would take a kilobyte of flash each.
     #[inline(never)]
-    fn fly(&mut self, plan: &VehiclePlan<W, G>) {
+    fn begin_plan(&mut self, plan: &VehiclePlan<W, G>) {
         self.plan = Some(plan.clone());
-        (self.left_with_all, self.flown_around) = (None, 0);
+        (self.left_with_all_pictures, self.pictures_before_rejoin) = (None, 0);
         if let [.., down, over] = plan.path.waypoints() {
             self.home = (over.position, down.position.z, plan.descent_m);
         }
@@ -235,19 +240,19 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Place where the vehicle's plan ends, as a goal that is reached without a roadmap, and the
     /// descent there, metres.
-    pub(crate) fn home(&self) -> (Goal, f32) {
+    pub(crate) fn home_goal(&self) -> (Goal, f32) {
         let (over, layer_m, descent_m) = self.home;
         (Goal::Home { over, layer_m }, descent_m)
     }
 
     /// Whether the part that the last division gives has come and is not flown yet.
     pub(crate) fn has_division(&self) -> bool {
-        self.fresh
+        self.division_plan_ready
     }
 
     /// Begins to fly the division's path.
     pub(crate) fn fly_division(&mut self) {
-        self.fresh = false;
+        self.division_plan_ready = false;
     }
 
     /// Whether the shell is to be asked for this division now; true at most once within `again`.
@@ -257,62 +262,62 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         now: Instant,
         again: Duration,
     ) -> bool {
-        let asked = self.asked.is_some_and(|(of, at)| of == fingerprint && now - at < again);
+        let asked = self.division_requested.is_some_and(|(of, at)| of == fingerprint && now - at < again);
         if !asked {
-            self.asked = Some((fingerprint, now));
+            self.division_requested = Some((fingerprint, now));
         }
         !asked
     }
 
     /// Ends the open request for this division; false where there is none.
     pub(crate) fn take_division_request(&mut self, fingerprint: u32) -> bool {
-        let asked = self.asked.is_some_and(|(of, _)| of == fingerprint);
-        self.asked = self.asked.filter(|_| !asked);
+        let asked = self.division_requested.is_some_and(|(of, _)| of == fingerprint);
+        self.division_requested = self.division_requested.filter(|_| !asked);
         asked
     }
 
     /// Divisions that count for the plan.
-    pub(crate) fn division(&self) -> usize {
+    pub(crate) fn division_count(&self) -> usize {
         self.division
     }
 
     /// Takes the plan after so many divisions; it is to begin at `place`. Returns whether it does. In the air it is flown
     /// from the next row of the table on.
-    pub(crate) fn take_division(
+    pub(crate) fn accept_division(
         &mut self,
         plan: &VehiclePlan<W, G>,
         place: &Point,
         division: usize,
         in_air: bool,
     ) -> bool {
-        let begins = self.begins_at(plan, place);
+        let begins = self.starts_at(plan, place);
         if begins {
-            self.fly(plan);
+            self.begin_plan(plan);
             self.tasks.reset();
-            (self.division, self.fresh) = (division, in_air);
+            (self.division, self.division_plan_ready) = (division, in_air);
         }
         begins
     }
 
     /// Flies on as planned after so many divisions: the last one could not be planned.
-    pub(crate) fn keep_plan(&mut self, division: usize) {
-        (self.division, self.fresh) = (division, false);
+    pub(crate) fn keep_plan_after_division(&mut self, division: usize) {
+        (self.division, self.division_plan_ready) = (division, false);
     }
 
     /// Commands what the task wants at this place of the path.
-    pub(crate) fn step_task(&mut self, along: Along, now: Instant, links: &mut Links) {
+    pub(crate) fn step_task(&mut self, along: PathProgress, now: Instant, links: &mut Links) {
         if let Some(plan) = &self.plan {
             self.tasks.step(&plan.task, &plan.path, along, now, links);
         }
     }
 
     /// The photographed waypoints of the area.
-    pub(crate) fn photographed(&self) -> &Photographed {
+    pub(crate) fn photographed(&self) -> &PhotographedWaypoints {
         &self.photographed
     }
 
     /// The photographed waypoints of the area, to be changed.
-    pub(crate) fn photographed_mut(&mut self) -> &mut Photographed {
+    pub(crate) fn photographed_mut(&mut self) -> &mut PhotographedWaypoints {
         &mut self.photographed
     }
 
@@ -320,9 +325,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     pub(crate) fn note_photographed(&mut self, along_m: f32) {
         let Some(plan) = &self.plan else { return };
         if let Task::Photograph(photographs) = &plan.task {
-            let end = photographs.passed_by(&plan.path, along_m);
-            let pictures = Range { first: self.flown_around, end };
-            self.photographed.note(photographs, &plan.path, pictures);
+            let end = photographs.passed_count(&plan.path, along_m);
+            let pictures = WaypointRange { first: self.pictures_before_rejoin, end };
+            self.photographed.note_pictures(photographs, &plan.path, pictures);
         }
     }
 
@@ -338,33 +343,35 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.tasks.handle_ack(ack, links);
     }
 
-    /// The requested plan did not come.
-    pub(crate) fn fail(&mut self, failure: PlanFailure) {
+    /// Notes why the requested plan did not come.
+    pub(crate) fn set_failure(&mut self, failure: PlanFailure) {
         self.failure = Some(failure);
     }
 
     /// Whether all pictures of its part were taken, `along_m` metres along its path or before it left that. A stretch is not all.
     pub(crate) fn has_all_pictures(&self, along_m: f32) -> bool {
-        self.left_with_all.unwrap_or_else(|| match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
-            Some((Task::Photograph(photographs), path)) => {
-                !photographs.goes_on && photographs.taken_by(path, along_m) == photographs.count(path)
+        self.left_with_all_pictures.unwrap_or_else(|| {
+            match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
+                Some((Task::Photograph(photographs), path)) => {
+                    !photographs.goes_on && photographs.taken_count(path, along_m) == photographs.count(path)
+                }
+                Some(_) => true,
+                None => false,
             }
-            Some(_) => true,
-            None => false,
         })
     }
 
     /// The vehicle leaves its path `along_m` metres along it: from now on places are those of
     /// another path.
     fn leave_path(&mut self, along_m: f32) {
-        if self.left_with_all.is_none() {
+        if self.left_with_all_pictures.is_none() {
             self.note_photographed(along_m);
-            self.left_with_all = Some(self.has_all_pictures(along_m));
+            self.left_with_all_pictures = Some(self.has_all_pictures(along_m));
         }
     }
 
     /// Flies along another path, beside the shared plan, `along_m` metres along that, above the same ground.
-    pub(crate) fn leave_plan(&mut self, way: &VehiclePlan<W, G>, along_m: f32, ground_m: Option<f32>) {
+    pub(crate) fn switch_to_detour(&mut self, way: &VehiclePlan<W, G>, along_m: f32, ground_m: Option<f32>) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
             plan.path = way.path.clone();
@@ -379,18 +386,18 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Flies along its own path again, as it was planned, from `back_m` metres along it; it left that at `left_m`. Returns the
     /// number of pictures between, which do not count as taken: they show another place.
-    pub(crate) fn take_up(&mut self, plan: &VehiclePlan<W, G>, left_m: f32, back_m: f32) -> u32 {
-        self.fly(plan);
+    pub(crate) fn resume_own_path(&mut self, plan: &VehiclePlan<W, G>, left_m: f32, back_m: f32) -> u32 {
+        self.begin_plan(plan);
         let Task::Photograph(photographs) = &plan.task else { return 0 };
-        let taken = |along_m: f32| photographs.taken_by(&plan.path, along_m);
+        let taken = |along_m: f32| photographs.taken_count(&plan.path, along_m);
         // The one at the very place is taken.
-        self.flown_around = taken(back_m - TAKEN_M);
-        self.flown_around.saturating_sub(taken(left_m))
+        self.pictures_before_rejoin = taken(back_m - TAKEN_M);
+        self.pictures_before_rejoin.saturating_sub(taken(left_m))
     }
 
     /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan: neighbours keep clear of it as of a
     /// stranger.
-    pub(crate) fn turn_back(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
+    pub(crate) fn reverse_path(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
             turn(&mut plan.path);
@@ -400,12 +407,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Finite, from `place`, and a path wherever there is a goal.
-    pub(crate) fn begins_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
+    pub(crate) fn starts_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
         let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
         let begins = first.is_some_and(|w| (w.position - place).norm() < PATH_BEGIN_M);
-        finite && (begins || !plan.task.flies())
+        finite && (begins || !plan.task.leaves_pad())
     }
 }

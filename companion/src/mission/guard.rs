@@ -1,11 +1,11 @@
 //! What the rows of the table ask of a snapshot.
 
-use super::inputs::Inputs;
+use super::inputs::GuardInputs;
 use crate::time::Duration;
 
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500); // Age up to which a position is known.
 
-/// Condition of a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
+/// Condition of a row. Every guard is a field, or a comparison of fields, of [`GuardInputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
     /// HEARTBEAT was heard within the last second and a half.
@@ -118,9 +118,9 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
     ReturnInClimb,
-    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the way home is planned.
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the path home is planned.
     ReturnOverField,
-    /// In a coverage mission the path has been blocked for the limit, and the way home can be planned.
+    /// In a coverage mission the path has been blocked for the limit, and the path home can be planned.
     BlockedOverField,
     /// As [`Guard::BlockedOverField`], and the vehicle may fly around what blocks it and back to its path.
     AroundOverField,
@@ -134,7 +134,7 @@ pub enum Guard {
     YieldedOverField,
     /// As [`Guard::BlockedOverField`], but the safety filter has hindered the vehicle for the limit.
     HinderedOverField,
-    /// As [`Guard::Stalled`] where the way home can be planned.
+    /// As [`Guard::Stalled`] where the path home can be planned.
     StalledOverField,
     /// The vehicle is to fly home, and stands.
     StandsToReturn,
@@ -150,9 +150,9 @@ pub enum Guard {
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
-    /// The safety filter has made this vehicle yield for the limit, and it does not seek its way home.
+    /// The safety filter has made this vehicle yield for the limit, and it does not seek its path home.
     Yielded,
-    /// The safety filter has kept this vehicle from going on for the limit, and it does not seek its way home.
+    /// The safety filter has kept this vehicle from continuing for the limit, and it does not seek its path home.
     Hindered,
     /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be sought.
     NoRoomHere,
@@ -184,7 +184,7 @@ pub enum Guard {
     PathClear,
     /// The path is blocked, all others stand, and it is this vehicle's turn.
     OurTurn,
-    /// The way around has come.
+    /// The detour has come.
     DetourReady,
     /// No detour exists.
     DetourFailed,
@@ -214,8 +214,8 @@ pub enum Guard {
 pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
-    /// Whether it holds, and has held for `limit`.
-    pub fn holds(self, i: &Inputs, limit: Duration) -> bool {
+    /// Whether the condition is met and has been met for `limit`.
+    pub fn is_met(self, i: &GuardInputs, limit: Duration) -> bool {
         match self {
             Self::AutopilotHeard => i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::NoHeartbeat => i.heartbeat_age > limit,
@@ -242,7 +242,7 @@ impl Guard {
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
             Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
-            Self::EstimateVague => i.vague > limit,
+            Self::EstimateVague => i.imprecise_for > limit,
             Self::OriginMoved => i.origin_moved,
             Self::GatesOpen => i.gates_open,
             Self::Elapsed => i.in_state >= limit,
@@ -260,13 +260,13 @@ impl Guard {
             Self::ArmedUnseen => i.armed_unseen,
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
-            Self::Unattended => i.airborne && i.offboard && i.ours && i.heartbeat_age < MAX_HEARTBEAT_AGE,
+            Self::Unattended => i.airborne && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
             Self::PathDone => i.path_done,
-            Self::Stalled => i.stalled >= limit,
-            Self::Unfollowed => i.unfollowed >= limit,
+            Self::Stalled => i.stalled_for >= limit,
+            Self::Unfollowed => i.unfollowed_for >= limit,
             Self::PauseCommanded => i.pause,
             Self::ResumeCommanded => i.resume,
             Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,
@@ -279,23 +279,23 @@ impl Guard {
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::ReturnOverField => i.turn_back && i.over_field,
-            Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.turns_home(),
-            Self::YieldedOverField => i.yielded >= limit && i.turns_home(),
-            Self::HinderedOverField => i.hindered >= limit && i.turns_home(),
-            Self::StalledOverField => i.stalled >= limit && i.turns_home(),
+            Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.may_turn_home(),
+            Self::YieldedOverField => i.yielded_for >= limit && i.may_turn_home(),
+            Self::HinderedOverField => i.hindered_for >= limit && i.may_turn_home(),
+            Self::StalledOverField => i.stalled_for >= limit && i.may_turn_home(),
             Self::StandsToReturn => i.stands_to_return,
             Self::WayHomeReady => i.detour_ready && i.homeward,
-            Self::NoWayHome => i.sought_home.is_some_and(|sought| sought >= limit) && i.can_turn_back,
-            Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
-            Self::NoRoomToLand => i.no_room_for(limit) && i.offboard && i.can_turn_back,
-            Self::NoRoomHere => i.no_room_for(limit) && i.offboard && i.can_land_aside,
+            Self::NoWayHome => i.seeking_home_for.is_some_and(|sought| sought >= limit) && i.can_turn_back,
+            Self::LandingBlocked => i.column_blocked_for > Duration::default() && !i.must_land,
+            Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
+            Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.pad_blocked_for >= limit && i.can_land_aside,
             Self::NoPlaceAside => i.plan_failed && i.lands_aside,
             Self::AsideReached => i.aside_reached,
-            Self::LandingClear => i.column_clear >= limit,
-            Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
-            Self::Yielded => i.yielded >= limit && i.sought_home.is_none(),
-            Self::Hindered => i.hindered >= limit && i.sought_home.is_none(),
+            Self::LandingClear => i.column_clear_for >= limit,
+            Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,
+            Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
+            Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
             Self::OutsideGeofence => i.outside && i.room_below,
@@ -303,7 +303,7 @@ impl Guard {
             Self::WayFree => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
-            Self::OnGround => i.on_ground && !i.vertical && (i.flown || i.landing),
+            Self::OnGround => i.on_ground && !i.vertical && (i.has_flown || i.landing),
             Self::PathBlocked => i.blocked,
             Self::PathClear => !i.blocked,
             Self::OurTurn => i.our_turn,
@@ -311,7 +311,7 @@ impl Guard {
             Self::DetourFailed => i.plan_failed,
             Self::NoWayAround => i.no_way_around && i.room_below,
             Self::NoWayOn => i.no_way_around && i.can_turn_back,
-            Self::Underneath => i.underneath > limit,
+            Self::Underneath => i.time_below_landing > limit,
             Self::Standing => i.standing,
             Self::Excluded => i.excluded,
             Self::MoreIsDone => i.more_is_done,

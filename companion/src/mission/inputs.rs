@@ -4,7 +4,7 @@ use crate::time::Duration;
 
 /// Inputs of the guards: a snapshot of the vehicle, the commands and the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Inputs {
+pub struct GuardInputs {
     /// Time in the state.
     pub in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
@@ -14,9 +14,9 @@ pub struct Inputs {
     /// The position jumped lately.
     pub jumped: bool,
     /// Time without progress along the path.
-    pub stalled: Duration,
+    pub stalled_for: Duration,
     /// Time for which the vehicle has stood though its setpoint is ahead.
-    pub unfollowed: Duration,
+    pub unfollowed_for: Duration,
     /// Time since its path was first blocked, short of where it has come no further; clear in between or not.
     pub blocked_for: Duration,
     /// Time in the state without any neighbour heard; zero when all have landed.
@@ -54,7 +54,7 @@ pub struct Inputs {
     /// On the pad: the estimate's bound does not fit into the margin at cruise speed.
     pub imprecise: bool,
     /// Time for which it has not even fitted at a crawl.
-    pub vague: Duration,
+    pub imprecise_for: Duration,
     /// The EKF origin moved while armed.
     pub origin_moved: bool,
     /// MISSION_START holds.
@@ -69,7 +69,7 @@ pub struct Inputs {
     pub turn_back: bool,
     /// The mission is a coverage mission.
     pub area: bool,
-    /// In a coverage mission: the way home can be planned from here.
+    /// In a coverage mission: the path home can be planned from here.
     pub over_field: bool,
     /// The vehicle may fly around what blocks its path, and back to its path.
     pub may_fly_beside: bool,
@@ -81,11 +81,11 @@ pub struct Inputs {
     pub own_plan_lost: bool,
     /// The vehicle is to fly home, or does.
     pub homeward: bool,
-    /// Time for which the vehicle has sought its way home, if it does.
-    pub sought_home: Option<Duration>,
-    /// The vehicle stands, and may request its way home.
+    /// Time for which the vehicle has sought its path home, if it does.
+    pub seeking_home_for: Option<Duration>,
+    /// The vehicle stands, and may request its path home.
     pub stands_to_return: bool,
-    /// The climb is not done: it goes on after the interruption.
+    /// The climb is not done: it continues after the interruption.
     pub in_climb: bool,
     /// Motors on.
     pub armed: bool,
@@ -96,7 +96,7 @@ pub struct Inputs {
     /// Disarming was refused.
     pub disarm_refused: bool,
     /// The setpoint mode was entered for this mission and not left since.
-    pub ours: bool,
+    pub own_mode: bool,
     /// The mode is the one that lands.
     pub landing: bool,
     /// The mode is Offboard or Guided.
@@ -105,15 +105,15 @@ pub struct Inputs {
     pub mode_foreign: bool,
     /// `MAV_STATE_CRITICAL` or worse.
     pub critical: bool,
-    /// The landing detector says ground.
+    /// The landing detector reports ground.
     pub on_ground: bool,
-    /// The landing detector said air since the motors were armed.
-    pub flown: bool,
+    /// The landing detector reported flight since the motors were armed.
+    pub has_flown: bool,
     /// Moves up or down.
     pub vertical: bool,
-    /// Motors on, and the landing detector says air.
+    /// Motors on, and the landing detector reports flight.
     pub airborne: bool,
-    /// The landing detector says air, or nobody waits for that.
+    /// The landing detector reports flight, or no row waits for that report.
     pub lifted_off: bool,
     /// The neighbours leave room to go.
     pub gates_open: bool,
@@ -126,11 +126,11 @@ pub struct Inputs {
     /// The way back to the path is free.
     pub near_path: bool,
     /// Time for which another vehicle has been in the column to the ground, or before take-off in the column to its top.
-    pub column_blocked: Duration,
+    pub column_blocked_for: Duration,
     /// Time for which a vehicle that stands for good, or is lost, has been in that column.
-    pub column_barred: Duration,
+    pub column_blocked_for_good_for: Duration,
     /// Time for which that column has been free.
-    pub column_clear: Duration,
+    pub column_clear_for: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
     /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way by a vehicle that stands for good.
@@ -144,9 +144,9 @@ pub struct Inputs {
     /// The vehicle must land: the battery is nearly empty, or the place to hold at is unknown.
     pub must_land: bool,
     /// Time for which the safety filter has made it yield.
-    pub yielded: Duration,
-    /// Time for which the safety filter has kept it from going on.
-    pub hindered: Duration,
+    pub yielded_for: Duration,
+    /// Time for which the safety filter has kept it from moving on.
+    pub hindered_for: Duration,
     /// Battery charge below the configured limit.
     pub battery_low: bool,
     /// Battery charge below half of it.
@@ -159,12 +159,12 @@ pub struct Inputs {
     pub blocked: bool,
     /// All others stand, and it is this vehicle's turn to fly around.
     pub our_turn: bool,
-    /// The way around has come.
+    /// The detour has come.
     pub detour_ready: bool,
-    /// No way around was found, often enough.
+    /// No detour was found, often enough.
     pub no_way_around: bool,
     /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
-    pub underneath: Duration,
+    pub time_below_landing: Duration,
     /// The vehicle moves more slowly than a hovering vehicle sways.
     pub standing: bool,
 }
@@ -172,14 +172,14 @@ pub struct Inputs {
 /// Longest wait above a vehicle that rests: a vehicle that rests makes no room.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
-impl Inputs {
+impl GuardInputs {
     /// Whether it may turn home over a field, and has not yet.
-    pub(super) fn turns_home(&self) -> bool {
-        self.over_field && self.sought_home.is_none()
+    pub(super) fn may_turn_home(&self) -> bool {
+        self.over_field && self.seeking_home_for.is_none()
     }
 
     /// Whether the column has not been free for `limit`, or a vehicle stands in it for good.
-    pub(super) fn no_room_for(&self, limit: Duration) -> bool {
-        self.column_blocked >= limit || self.column_barred >= MAX_WAIT_ABOVE_RESTING
+    pub(super) fn is_landing_blocked_for(&self, limit: Duration) -> bool {
+        self.column_blocked_for >= limit || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
     }
 }

@@ -5,9 +5,9 @@
 //! A start waits while another plan is heard. In flight it notes what it photographs, and what it hears of others, for the start after. An area that is whole is begun again: that is
 //! another round, and what is known of a round before does not count.
 
-use planner_core::flight::{Done, Path, Photographs, Range};
+use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
-use crate::link::done::{DoneReport, MAX_RANGES, RANGE_LEN, range_bytes, range_of};
+use crate::link::done::{DoneReport, MAX_RANGES, RANGE_LEN, decode_range, encode_range};
 use crate::storage::store::{self, MAX_PROGRAM};
 use crate::time::{Duration, Instant};
 
@@ -25,31 +25,31 @@ const _: () = assert!(HEADER_LEN + MAX_DONE_RANGES * RANGE_LEN <= MAX_PROGRAM);
 
 /// The photographed waypoints of an area.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Photographed {
+pub(crate) struct PhotographedWaypoints {
     /// Number of times that the area was begun again.
     round: u8,
     /// Waypoints that the plan leaves out, or will.
-    before: Done<MAX_DONE_RANGES>,
+    left_out_by_plan: WaypointSet<MAX_DONE_RANGES>,
     /// All that is known.
-    known: Done<MAX_DONE_RANGES>,
+    known: WaypointSet<MAX_DONE_RANGES>,
     /// Number of waypoints that the flash has.
-    kept: u32,
+    stored_count: u32,
     /// Whether `before` has changed since a plan was requested.
     outdated: bool,
     /// Round of the plan.
-    planned: u8,
+    planned_round: u8,
     /// Whether it has flown since.
-    flown: bool,
+    has_flown: bool,
     /// When one in flight last reported what its plan leaves out.
     followed_at: Option<Instant>,
     /// With this range the next report begins.
-    next: usize,
+    next_range: usize,
     /// Whether that is of what its plan leaves out.
     reports_plan: bool,
 }
 
-impl Photographed {
-    /// Takes what the flash has kept of this mission.
+impl PhotographedWaypoints {
+    /// Restores the record of this mission from flash.
     pub(crate) fn restore(&mut self, kept: &[u8], mission_crc: u32) {
         let Some((head, ranges)) = kept.split_at_checked(HEADER_LEN) else { return };
         if head[..4] != mission_crc.to_le_bytes() {
@@ -57,42 +57,42 @@ impl Photographed {
         }
         self.round = head[4];
         let (ranges, _) = ranges.as_chunks::<RANGE_LEN>();
-        ranges.iter().for_each(|bytes| _ = self.known.insert(range_of(bytes)));
-        self.kept = self.known.count();
-        self.before = self.known.clone();
+        ranges.iter().for_each(|bytes| _ = self.known.insert(decode_range(bytes)));
+        self.stored_count = self.known.count();
+        self.left_out_by_plan = self.known.clone();
     }
 
     /// The record for the flash, if it is worth one: at once where no further waypoint is to come.
-    pub(crate) fn keep(&mut self, mission_crc: u32, at_once: bool) -> Option<store::Photographed> {
+    pub(crate) fn record_to_store(&mut self, mission_crc: u32, at_once: bool) -> Option<store::Photographed> {
         let count = self.known.count();
-        let least = if at_once { self.kept + 1 } else { self.kept + STORE_EVERY_WAYPOINTS };
+        let least = if at_once { self.stored_count + 1 } else { self.stored_count + STORE_EVERY_WAYPOINTS };
         // Fewer than before: another round.
-        if (self.kept..least).contains(&count) {
+        if (self.stored_count..least).contains(&count) {
             return None;
         }
-        self.kept = count;
+        self.stored_count = count;
         let mut kept = store::Photographed::new();
         // Both fit: `HEADER_LEN` and `MAX_DONE_RANGES` ranges are no more than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
-        self.known.ranges().iter().for_each(|range| _ = kept.extend_from_slice(&range_bytes(range)));
+        self.known.ranges().iter().for_each(|range| _ = kept.extend_from_slice(&encode_range(range)));
         Some(kept)
     }
 
     /// A plan is requested: it leaves out what is known, or nothing.
-    pub(crate) fn begin(&mut self, resumes: bool) {
+    pub(crate) fn begin_plan(&mut self, resumes: bool) {
         if !resumes {
-            self.begin_again();
-            self.before.clear();
-        } else if self.flown {
-            self.before = self.known.clone();
+            self.begin_round();
+            self.left_out_by_plan.clear();
+        } else if self.has_flown {
+            self.left_out_by_plan = self.known.clone();
         }
-        (self.planned, self.flown, self.outdated) = (self.round, false, false);
+        (self.planned_round, self.has_flown, self.outdated) = (self.round, false, false);
     }
 
     /// Waypoints that the plan leaves out.
-    pub(crate) fn before(&self) -> &[Range] {
-        self.before.ranges()
+    pub(crate) fn waypoints_left_out(&self) -> &[WaypointRange] {
+        self.left_out_by_plan.ranges()
     }
 
     /// Whether more is known to be done than the plan leaves out.
@@ -107,34 +107,35 @@ impl Photographed {
 
     /// The vehicle leaves its pad. Where the area was whole the plan is for all of it again: another round, unless one that left
     /// before has said so.
-    pub(crate) fn leave_pad(&mut self, photographs: &Photographs) {
-        self.flown = true;
-        let whole = photographs.area() > 0 && self.before.count() >= photographs.area();
-        if whole && self.round == self.planned {
-            self.begin_again();
+    pub(crate) fn leave_pad(&mut self, photographs: &PicturePlan) {
+        self.has_flown = true;
+        let whole = photographs.area() > 0 && self.left_out_by_plan.count() >= photographs.area();
+        if whole && self.round == self.planned_round {
+            self.begin_round();
         }
     }
 
-    /// Waypoints of an earlier round do not count any more.
-    fn begin_again(&mut self) {
+    /// Begins a new round: waypoints of an earlier round do not count any more.
+    fn begin_round(&mut self) {
         self.round = self.round.wrapping_add(1);
         self.known.clear();
     }
 
     /// Notes these pictures of the path.
-    pub(crate) fn note<const W: usize>(
+    pub(crate) fn note_pictures<const W: usize>(
         &mut self,
-        photographs: &Photographs,
+        photographs: &PicturePlan,
         path: &Path<W>,
-        pictures: Range,
+        pictures: WaypointRange,
     ) {
         // A waypoint that does not fit is photographed again.
-        photographs.shown(path, pictures).for_each(|range| _ = self.known.insert(range));
+        photographs.shown_waypoints(path, pictures).for_each(|range| _ = self.known.insert(range));
     }
 
-    /// Takes in what another one knows. `waits`: this one stands on the ground, and is to plan as others do.
-    pub(crate) fn handle(&mut self, report: &DoneReport, waits: bool, now: Instant) {
-        if report.plan {
+    /// Handles a report of photographed waypoints from another vehicle. `waits`: this one stands on the ground, and is
+    /// to plan as others do.
+    pub(crate) fn handle_report(&mut self, report: &DoneReport, waits: bool, now: Instant) {
+        if report.is_left_out_by_plan {
             if waits {
                 self.adopt_plan_of(report, now);
             }
@@ -150,24 +151,24 @@ impl Photographed {
             self.round = report.round;
             self.known.clear();
             if plans {
-                self.outdated |= !self.before.is_empty();
-                self.before.clear();
+                self.outdated |= !self.left_out_by_plan.is_empty();
+                self.left_out_by_plan.clear();
             }
         }
         for range in &report.ranges {
             let _ = self.known.insert(*range);
             if plans {
-                self.outdated |= self.before.insert(*range) == Ok(true);
+                self.outdated |= self.left_out_by_plan.insert(*range) == Ok(true);
             }
         }
     }
 
-    /// Plans as one that has started already.
+    /// Adopts the plan inputs of a vehicle that has already started.
     fn adopt_plan_of(&mut self, report: &DoneReport, now: Instant) {
         self.followed_at = Some(now);
-        if self.before.ranges() != &report.ranges[..] {
-            self.before.clear();
-            report.ranges.iter().for_each(|range| _ = self.before.insert(*range));
+        if self.left_out_by_plan.ranges() != &report.ranges[..] {
+            self.left_out_by_plan.clear();
+            report.ranges.iter().for_each(|range| _ = self.left_out_by_plan.insert(*range));
             self.outdated = true;
         }
     }
@@ -175,15 +176,21 @@ impl Photographed {
     /// The report to other vehicles, one part after the other; in flight, in turn, the waypoints
     /// that the plan leaves out, if one report holds them.
     pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
-        let plan = flies && !self.reports_plan && self.before.ranges().len() <= MAX_RANGES;
+        let plan = flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
         self.reports_plan = plan;
         if plan {
-            let ranges = self.before.ranges().iter().copied().collect();
-            return DoneReport { round: self.round, flies, plan, ranges, ..DoneReport::default() };
+            let ranges = self.left_out_by_plan.ranges().iter().copied().collect();
+            return DoneReport {
+                round: self.round,
+                flies,
+                is_left_out_by_plan: plan,
+                ranges,
+                ..DoneReport::default()
+            };
         }
-        let done = if waits { &self.before } else { &self.known };
-        let first = if self.next < done.ranges().len() { self.next } else { 0 };
-        self.next = first + MAX_RANGES;
+        let done = if waits { &self.left_out_by_plan } else { &self.known };
+        let first = if self.next_range < done.ranges().len() { self.next_range } else { 0 };
+        self.next_range = first + MAX_RANGES;
         let ranges = done.ranges().iter().skip(first).take(MAX_RANGES).copied().collect();
         DoneReport { round: self.round, flies, ranges, ..DoneReport::default() }
     }

@@ -48,7 +48,7 @@ pub enum State {
     Aborted,
     /// Stopped on the path: what left the plan is in its way. Waits until all others stand.
     Blocked,
-    /// Hovers; the shell was asked for a way around.
+    /// Hovers; the shell was asked for a detour.
     Replanning,
     /// Replanning on the ground, before the take-off.
     PadReplanning,
@@ -141,7 +141,7 @@ impl State {
 
 /// Target of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum To {
+pub enum TargetState {
     /// To this state.
     State(State),
     /// Back to the state that was interrupted.
@@ -152,27 +152,27 @@ pub enum To {
 /// hand, and on the other those in which autopilot, position or pilot take the vehicle: a pause may
 /// itself be interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Interrupted {
+pub struct InterruptedStates {
     /// The state that the pause interrupted.
     pub by_pause: State,
     /// The state that a silent autopilot, a lost position or the pilot interrupted.
     pub by_loss: State,
 }
 
-impl Default for Interrupted {
+impl Default for InterruptedStates {
     fn default() -> Self {
         Self { by_pause: State::Follow, by_loss: State::Follow }
     }
 }
 
-impl Interrupted {
-    /// Target of [`To::Interrupted`] from `state`.
+impl InterruptedStates {
+    /// Target of [`TargetState::Interrupted`] from `state`.
     pub fn target(&self, state: State) -> State {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
 
     /// Remembers what a change of state interrupts.
-    pub(crate) fn note(&mut self, from: State, to: State) {
+    pub(crate) fn record_interruption(&mut self, from: State, to: State) {
         use State::*;
         // A request to the shell, and a disarming, begin again.
         let kept = match from {
@@ -188,7 +188,7 @@ impl Interrupted {
     }
 
     /// The text for a change of state that interrupts another.
-    pub(crate) fn text(&self, from: State, to: State) -> Option<&'static str> {
+    pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
         use State::*;
         let kept = match to {
             Paused if matches!(from, PilotReturned | PositionLost) => return Some("Still paused"),
@@ -215,7 +215,7 @@ impl Interrupted {
     }
 
     /// The state of the flight itself, beneath pause and loss.
-    pub(crate) fn beneath(&self, state: State) -> State {
+    pub(crate) fn uninterrupted_state(&self, state: State) -> State {
         use State::*;
         let state = match state {
             AutopilotSilent | PositionLost | PilotControl | PilotReturned => self.by_loss,

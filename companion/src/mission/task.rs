@@ -8,16 +8,16 @@ mod camera;
 
 use planner_core::flight::{Path, Task};
 
-pub(crate) use self::along::{Along, Place};
-use self::camera::Camera;
+pub(crate) use self::along::{PathProgress, PathRelation};
+use self::camera::CameraControl;
 use crate::autopilot::telemetry::Ack;
 use crate::link::Links;
 use crate::time::Instant;
 
-/// Memory of the tasks.
+/// State of the tasks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tasks {
-    camera: Camera,
+    camera: CameraControl,
 }
 
 impl Tasks {
@@ -26,12 +26,12 @@ impl Tasks {
         *self = Self::default();
     }
 
-    /// Commands what is due at this place of the path.
+    /// Sends the task's commands that are due at this place of the path.
     pub(crate) fn step<const W: usize>(
         &mut self,
         task: &Task,
         path: &Path<W>,
-        along: Along,
+        along: PathProgress,
         now: Instant,
         links: &mut Links,
     ) {

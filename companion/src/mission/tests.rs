@@ -20,13 +20,13 @@ fn printed() -> String {
         String::from("| from | guard | for | to | action | STATUSTEXT |\n|---|---|---|---|---|---|\n");
     for row in TABLE {
         let from: Vec<String> = row.from.iter().map(|s| std::format!("{s:?}")).collect();
-        let limit = match row.limit.micros() {
+        let limit = match row.min_duration.as_micros() {
             0 => String::new(),
             us => std::format!("{} s", us as f64 * 1e-6),
         };
         let to = match row.to {
-            To::State(to) => std::format!("{to:?}"),
-            To::Interrupted => "the interrupted state".into(),
+            TargetState::State(to) => std::format!("{to:?}"),
+            TargetState::Interrupted => "the interrupted state".into(),
         };
         let action = if row.action == A::None { String::new() } else { std::format!("{:?}", row.action) };
         writeln!(out, "| {} | {:?} | {limit} | {to} | {action} | {} |", from.join(", "), row.guard, row.text)
@@ -36,7 +36,7 @@ fn printed() -> String {
 }
 
 /// How the inputs show an interruption.
-type Shows = fn(&mut Inputs);
+type Shows = fn(&mut GuardInputs);
 
 /// What may interrupt a state.
 const INTERRUPTIONS: &[(&str, Shows)] = &[
@@ -58,11 +58,12 @@ const INTERRUPTIONS: &[(&str, Shows)] = &[
 ];
 
 /// Inputs of a state in which nothing happens.
-pub(crate) fn quiet(state: State) -> Inputs {
+pub(crate) fn quiet(state: State) -> GuardInputs {
     let on_ground =
         WAITING_ON_GROUND.contains(&state) || ON_PAD.contains(&state) || matches!(state, Done | Aborted);
-    let mut i = Inputs { armed: !on_ground, airborne: !on_ground, at_start: true, ..Inputs::default() };
-    (i.has_goal, i.flown, i.ours) = (true, !on_ground, !on_ground);
+    let mut i =
+        GuardInputs { armed: !on_ground, airborne: !on_ground, at_start: true, ..GuardInputs::default() };
+    (i.has_goal, i.has_flown, i.own_mode) = (true, !on_ground, !on_ground);
     match state {
         WaitAutopilot => i.heartbeat_age = MAX_HEARTBEAT_AGE,
         WaitPosition => i.position_age = MAX_POSITION_AGE,
@@ -73,7 +74,7 @@ pub(crate) fn quiet(state: State) -> Inputs {
         PilotControl | Failsafe => i.mode_foreign = true,
         _ => {}
     }
-    assert_eq!(update(state, &i).map(|row| row.guard), None, "{state:?}");
+    assert_eq!(first_applicable_row(state, &i).map(|row| row.guard), None, "{state:?}");
     i
 }
 
@@ -98,14 +99,15 @@ fn page() -> String {
         for (_, interrupt) in INTERRUPTIONS {
             let mut inputs = quiet(*state);
             interrupt(&mut inputs);
-            let back = |to| TABLE.iter().any(|row| row.from.contains(&to) && row.to == To::Interrupted);
-            match update(*state, &inputs).map(|row| row.to) {
+            let back =
+                |to| TABLE.iter().any(|row| row.from.contains(&to) && row.to == TargetState::Interrupted);
+            match first_applicable_row(*state, &inputs).map(|row| row.to) {
                 None => out += " |",
-                Some(To::Interrupted) => out += " the interrupted state |",
-                Some(To::State(to)) if back(to) || to == PilotControl || to == AutopilotSilent => {
+                Some(TargetState::Interrupted) => out += " the interrupted state |",
+                Some(TargetState::State(to)) if back(to) || to == PilotControl || to == AutopilotSilent => {
                     write!(out, " {to:?} (back) |").unwrap();
                 }
-                Some(To::State(to)) => write!(out, " {to:?} |").unwrap(),
+                Some(TargetState::State(to)) => write!(out, " {to:?} |").unwrap(),
             }
         }
         out += "\n";
@@ -129,9 +131,10 @@ fn the_page_prints_this_table() {
 #[test]
 fn every_state_is_reached_and_every_wait_ends() {
     for state in State::ALL {
-        let reached = TABLE.iter().any(|row| row.to == To::State(*state) && !row.from.contains(state));
+        let reached =
+            TABLE.iter().any(|row| row.to == TargetState::State(*state) && !row.from.contains(state));
         assert!(reached || *state == WaitAutopilot, "{state:?} is never reached");
-        let timed = |row: &&Row| row.from.contains(state) && row.limit > AT_ONCE;
+        let timed = |row: &&TransitionRow| row.from.contains(state) && row.min_duration > AT_ONCE;
         // On the ground, disarmed, waiting for a person, an autopilot or a neighbour may last.
         let patient = [WaitAutopilot, WaitPosition, Ready, Scheduled, Done, Aborted];
         assert!(
@@ -145,9 +148,9 @@ fn every_state_is_reached_and_every_wait_ends() {
 }
 
 /// Inputs under which a guard holds for ever, everything else quiet.
-fn inputs_for(guard: Guard) -> Inputs {
+fn inputs_for(guard: Guard) -> GuardInputs {
     let long = Duration::from_secs(3600);
-    let mut i = Inputs { armed: true, ..Inputs::default() };
+    let mut i = GuardInputs { armed: true, ..GuardInputs::default() };
     match guard {
         G::AutopilotHeard | G::PositionKnown => {}
         G::NoHeartbeat => i.heartbeat_age = long,
@@ -167,7 +170,7 @@ fn inputs_for(guard: Guard) -> Inputs {
             (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false);
             (i.imprecise, i.in_state) = (true, long);
         }
-        G::EstimateVague => i.vague = long,
+        G::EstimateVague => i.imprecise_for = long,
         G::OriginMoved => i.origin_moved = true,
         G::GatesOpen => i.gates_open = true,
         G::StartBatteryLow => {
@@ -186,7 +189,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::ArmedUnseen => i.armed_unseen = true,
         G::ArmingUnanswered => i.arming_unanswered = true,
         G::InAir => i.airborne = true,
-        G::Unattended => (i.airborne, i.offboard, i.ours) = (true, true, true),
+        G::Unattended => (i.airborne, i.offboard, i.own_mode) = (true, true, true),
         G::DisarmRefused => i.disarm_refused = true,
         G::PausedOnPad => (i.pause, i.in_state) = (true, long),
         G::LandUnattended => (i.land, i.airborne, i.offboard) = (true, true, true),
@@ -200,8 +203,8 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::LiftedOff => i.lifted_off = true,
         G::ClimbDone => i.climb_done = true,
         G::PathDone => i.path_done = true,
-        G::Unfollowed => i.unfollowed = long,
-        G::Stalled => i.stalled = long,
+        G::Unfollowed => i.unfollowed_for = long,
+        G::Stalled => i.stalled_for = long,
         G::PauseCommanded => i.pause = true,
         G::ResumeCommanded => i.resume = true,
         G::ResumedOnPath => (i.offboard, i.resume, i.near_path) = (true, true, true),
@@ -214,32 +217,32 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::AroundFlown => i.around_flown = true,
         G::OwnPlanReady => i.own_plan_ready = true,
         G::OwnPlanLost => i.own_plan_lost = true,
-        G::YieldedOverField => (i.yielded, i.hindered, i.over_field) = (long, long, true),
-        G::HinderedOverField => (i.hindered, i.over_field) = (long, true),
+        G::YieldedOverField => (i.yielded_for, i.hindered_for, i.over_field) = (long, long, true),
+        G::HinderedOverField => (i.hindered_for, i.over_field) = (long, true),
         G::StartAgain => i.start = true,
         G::StartOverField => (i.start, i.area) = (true, true),
-        G::StalledOverField => (i.stalled, i.over_field) = (long, true),
+        G::StalledOverField => (i.stalled_for, i.over_field) = (long, true),
         G::StandsToReturn => i.stands_to_return = true,
         G::WayHomeReady => (i.detour_ready, i.homeward) = (true, true),
-        G::NoWayHome => (i.sought_home, i.can_turn_back) = (Some(long), true),
-        G::LandingBlocked => i.column_blocked = long,
-        G::LandingClear => i.column_clear = long,
-        G::NoRoomToLand => (i.column_blocked, i.offboard, i.can_turn_back) = (long, true, true),
-        G::NoRoomHere => (i.column_blocked, i.offboard, i.can_land_aside) = (long, true, true),
+        G::NoWayHome => (i.seeking_home_for, i.can_turn_back) = (Some(long), true),
+        G::LandingBlocked => i.column_blocked_for = long,
+        G::LandingClear => i.column_clear_for = long,
+        G::NoRoomToLand => (i.column_blocked_for, i.offboard, i.can_turn_back) = (long, true, true),
+        G::NoRoomHere => (i.column_blocked_for, i.offboard, i.can_land_aside) = (long, true, true),
         G::PadTaken => (i.pad_blocked_for, i.can_land_aside) = (long, true),
         G::NoPlaceAside => (i.plan_failed, i.lands_aside) = (true, true),
         G::AsideReached => i.aside_reached = true,
-        G::ColumnBlocked => (i.column_blocked, i.in_state) = (long, long),
-        G::Yielded => (i.yielded, i.hindered) = (long, long),
+        G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),
+        G::Yielded => (i.yielded_for, i.hindered_for) = (long, long),
         G::WayFree => i.way_free = true,
         G::OutOfRange => (i.out_of_range, i.in_state) = (true, long),
-        G::Hindered => i.hindered = long,
+        G::Hindered => i.hindered_for = long,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
         G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
         G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
         G::NeighboursSilent => i.neighbour_age = long,
         G::NeighbourHeard => i.neighbour_heard = true,
-        G::OnGround => (i.on_ground, i.flown) = (true, true),
+        G::OnGround => (i.on_ground, i.has_flown) = (true, true),
         G::PathBlocked => i.blocked = true,
         G::PathClear => {}
         G::OurTurn => i.our_turn = true,
@@ -247,7 +250,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::DetourFailed => i.plan_failed = true,
         G::NoWayAround => (i.no_way_around, i.room_below) = (true, true),
         G::NoWayOn => (i.no_way_around, i.can_turn_back) = (true, true),
-        G::Underneath => i.underneath = long,
+        G::Underneath => i.time_below_landing = long,
         G::Standing => i.standing = true,
         G::Excluded => i.excluded = true,
         G::MoreIsDone => i.more_is_done = true,
@@ -283,11 +286,11 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             }
             // On the pad, where it should be.
             inputs.at_start |= !matches!(row.guard, G::AwayFromStart | G::StartElsewhere);
-            let taken = update(*from, &inputs).expect("a row");
+            let taken = first_applicable_row(*from, &inputs).expect("a row");
             assert!(core::ptr::eq(taken, row), "{from:?} with {:?}: {}", row.guard, taken.text);
-            if row.limit > AT_ONCE {
-                let quiet = Inputs { armed: inputs.armed, ..Inputs::default() };
-                let before = update(*from, &quiet);
+            if row.min_duration > AT_ONCE {
+                let quiet = GuardInputs { armed: inputs.armed, ..GuardInputs::default() };
+                let before = first_applicable_row(*from, &quiet);
                 assert!(
                     before.is_none_or(|r| !core::ptr::eq(r, row)),
                     "{from:?} {:?} ignores its limit",
@@ -300,10 +303,10 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
 
 #[test]
 fn the_pilot_outranks_everything_in_the_air() {
-    let everything = Inputs {
-        in_state: s(9999),
-        blocked_for: s(9999),
-        stalled: s(9999),
+    let everything = GuardInputs {
+        in_state: secs(9999),
+        blocked_for: secs(9999),
+        stalled_for: secs(9999),
         mode_foreign: true,
         armed: true,
         pause: true,
@@ -314,14 +317,14 @@ fn the_pilot_outranks_everything_in_the_air() {
         outside: true,
         path_done: true,
         climb_done: true,
-        position_age: s(9999),
-        ..Inputs::default()
+        position_age: secs(9999),
+        ..GuardInputs::default()
     };
     for state in FLYING.iter().chain(&[Land]) {
-        let to = |inputs| update(*state, inputs).map(|row| row.to);
-        assert_eq!(to(&everything), Some(To::State(PilotControl)), "{state:?}");
-        let failsafe = Inputs { critical: true, ..everything };
-        assert_eq!(to(&failsafe), Some(To::State(Failsafe)), "{state:?}");
+        let to = |inputs| first_applicable_row(*state, inputs).map(|row| row.to);
+        assert_eq!(to(&everything), Some(TargetState::State(PilotControl)), "{state:?}");
+        let failsafe = GuardInputs { critical: true, ..everything };
+        assert_eq!(to(&failsafe), Some(TargetState::State(Failsafe)), "{state:?}");
     }
 }
 

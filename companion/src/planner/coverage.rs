@@ -4,24 +4,24 @@ use core::fmt;
 
 use heapless::Vec;
 use planner_core::coverage::area::{Area, AreaError, Ring};
-use planner_core::coverage::flights::{self, Manner, Pad, Swarm};
-use planner_core::coverage::losses::{self, Fate, Loss};
+use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
+use planner_core::coverage::losses::{self, Loss, VehicleStatus};
 use planner_core::coverage::pack::{self, PackWorkspace, Plan, Vehicle, Work};
-use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, around};
-use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::field::FieldView;
-use planner_core::field::follow::Following;
-use planner_core::flight::{Look, Photographs, Range, VehiclePlan};
+use planner_core::field::follow::TerrainFollowing;
+use planner_core::flight::{HeadingMode, PicturePlan, VehiclePlan, WaypointRange};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
 
-use super::failure;
+use super::plan_failure;
 use crate::config::PlanFailure;
-use crate::storage::mission_file::coverage::{CoverageView, Heading, Parts};
+use crate::storage::mission_file::coverage::{CoverageView, HeadingRule, PartEligibility};
 use crate::storage::mission_file::{MissionVehicle, MissionView};
-use crate::swarm::fleet::Lot;
+use crate::swarm::fleet::DivisionInput;
 
 /// Changes of the lanes' order that companions try: on a board a few million instructions.
 pub const MAX_ORDER_CHANGES: u32 = 2000;
@@ -42,7 +42,7 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
 }
 
 impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             vertices: Vec::new(),
@@ -72,7 +72,7 @@ impl<const X: usize, const L: usize, const K: usize> Default for Workspace<X, L,
     }
 }
 
-/// Why there is no coverage plan.
+/// Reason why there is no coverage plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Error {
     /// The area, or how it is to be photographed.
@@ -117,7 +117,7 @@ impl fmt::Display for Error {
 impl From<Error> for PlanFailure {
     fn from(error: Error) -> Self {
         match error {
-            Error::Plan(error) => failure(&error),
+            Error::Plan(error) => plan_failure(&error),
             Error::NoField => Self::NoRoadmap,
             Error::Coverage(
                 CoverageError::Area(AreaError::AreaFull)
@@ -133,7 +133,7 @@ impl From<Error> for PlanFailure {
 }
 
 /// A vehicle as the packing sees it: it takes off and lands on the same pad.
-fn vehicle(
+fn packing_vehicle(
     mission: &MissionView<'_>,
     vehicle: &MissionVehicle,
     view: &CoverageView<'_>,
@@ -161,26 +161,26 @@ pub struct Request<'a, 'm> {
     /// The heights to fly above, where there are any: used if they are the mission's.
     pub field: Option<FieldView<'m>>,
     /// Most gates of one vehicle.
-    pub gates_most: usize,
+    pub max_gates: usize,
     /// Waypoints that were photographed before, by their numbers on the path along all lanes.
-    pub done: &'a [Range],
+    pub photographed: &'a [WaypointRange],
 }
 
 impl<'m> Request<'_, 'm> {
     /// The surface that lanes follow above the ground; none where it is level.
-    fn following(&self, vehicles: &[Vehicle]) -> Result<Option<Following<'m>>, Error> {
+    fn terrain_following(&self, vehicles: &[Vehicle]) -> Result<Option<TerrainFollowing<'m>>, Error> {
         let Some(ground) = &self.view.header().ground else { return Ok(None) };
         let crc = self.mission.header().roadmap_crc;
         let field = self.field.filter(|field| field.crc() == crc).ok_or(Error::NoField)?;
         let steepest = vehicles.iter().map(|v| libm::fminf(v.climb_mps, v.descend_mps) / v.cruise_mps);
         let slope = steepest.fold(f32::INFINITY, libm::fminf);
         let (height_m, tolerance_m) = (ground.height_m, ground.tolerance_m);
-        Ok(Some(Following { field, height_m, tolerance_m, slope }))
+        Ok(Some(TerrainFollowing { field, height_m, tolerance_m, slope }))
     }
 }
 
 /// The area of a mission.
-fn area<'a, const X: usize>(
+fn read_area<'a, const X: usize>(
     view: &CoverageView<'_>,
     vertices: &'a mut Vec<Flat, X>,
     rings: &'a mut Vec<Ring, MAX_RINGS>,
@@ -196,12 +196,12 @@ fn area<'a, const X: usize>(
     Area::new(vertices, rings).map_err(CoverageError::Area)
 }
 
-/// Plans one vehicle's way home over the area, or aside, that keeps off all `obstacles`, above the field and out of no-fly zones, which may
-/// have `C` corners.
+/// Plans one vehicle's way home over the area, or aside, that keeps clear of all `obstacles`, above the field and out
+/// of no-fly zones, which may have `C` corners.
 ///
 /// # Errors
-/// Why there is none.
-pub fn around<
+/// Reason why there is none.
+pub fn plan_detour<
     const X: usize,
     const L: usize,
     const K: usize,
@@ -212,23 +212,24 @@ pub fn around<
     view: &CoverageView<'_>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,
-    obstacles: &mut [KeepOff],
+    obstacles: &mut [KeepOutZone],
     ws: &mut Workspace<X, L, K>,
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), PlanFailure> {
-    let area = area(view, &mut ws.vertices, &mut ws.rings).map_err(Error::Coverage)?;
+    let area = read_area(view, &mut ws.vertices, &mut ws.rings).map_err(Error::Coverage)?;
     let mut transit = Transit::<C>::empty();
-    transit.learn(area).map_err(Error::Coverage)?;
+    transit.set_area(area).map_err(Error::Coverage)?;
     let field = field.filter(|_| view.header().ground.is_some());
-    around::plan_vehicle(&transit, field, request, obstacles, out).map_err(|_| PlanFailure::Unreachable)
+    around::plan_vehicle_detour(&transit, field, request, obstacles, out)
+        .map_err(|_| PlanFailure::Unreachable)
 }
 
 /// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been lost, division by
 /// division: the lots of all vehicles by the rank of their ids.
 ///
 /// # Errors
-/// Why there is no plan.
-pub fn plan<
+/// Reason why there is no plan.
+pub fn plan_flights<
     'l,
     const X: usize,
     const L: usize,
@@ -238,74 +239,78 @@ pub fn plan<
     const W: usize,
 >(
     request: &Request<'_, '_>,
-    losses: impl Iterator<Item = &'l [Lot]>,
+    losses: impl Iterator<Item = &'l [DivisionInput]>,
     ws: &mut Workspace<X, L, K>,
     schedule: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
-    let Request { mission, view, gates_most, done, .. } = *request;
+    let Request { mission, view, max_gates: gates_most, photographed: done, .. } = *request;
     let header = view.header();
-    let area = area(view, &mut ws.vertices, &mut ws.rings)?;
+    let area = read_area(view, &mut ws.vertices, &mut ws.rings)?;
     let mut transit = Transit::<C>::empty();
-    transit.learn(area)?;
-    let pattern = Pattern {
+    transit.set_area(area)?;
+    let pattern = LanePattern {
         spacing: header.spacing,
         angle_deg: header.angle_deg,
         margin_m: header.margin_m,
-        looks: header.looks,
+        search_steps: header.search_steps,
     };
     tracks::build(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
-    if ws.tracks.waypoint_count() > Photographs::MAX_AREA_WAYPOINTS {
+    if ws.tracks.waypoint_count() > PicturePlan::MAX_AREA_WAYPOINTS {
         return Err(CoverageError::LanesFull.into());
     }
     let (mut vehicles, mut pads) = (Vec::<_, K>::new(), Vec::<_, K>::new());
     for (i, own) in mission.vehicles().enumerate() {
         let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
-        let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, aloft: false };
-        vehicles.push(vehicle(mission, &own, view, i)).map_err(|_| CoverageError::Vehicles)?;
+        let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, airborne: false };
+        vehicles.push(packing_vehicle(mission, &own, view, i)).map_err(|_| CoverageError::Vehicles)?;
         pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
-        if area.forbids(&own.start.xy()) {
+        if area.is_in_no_fly_zone(&own.start.xy()) {
             return Err(CoverageError::InsideNoFly(i as u8).into());
         }
     }
     let (tracks, transit) = (&ws.tracks, &transit);
-    let (left, done) = ws.losses.begin(tracks, transit, done)?;
+    let (left, done) = ws.losses.start_plan(tracks, transit, done)?;
     let whole = Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
     let work = Work { tracks: left, ..whole };
     match header.parts {
-        Parts::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
-        Parts::Anyone => {
+        PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
+        PartEligibility::Anyone => {
             let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
             // The weights are parts of the work here, not the vehicles' own.
-            pack::by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
+            pack::binpat_with_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
         }
     }
-    let along = tracks.along();
+    let along = tracks.lane_direction();
     let look = match header.heading {
-        Heading::Sweep => Look::Fixed(libm::atan2f(along.y, along.x)),
-        Heading::Lane => Look::Ahead,
+        HeadingRule::Sweep => HeadingMode::Fixed(libm::atan2f(along.y, along.x)),
+        HeadingRule::Lane => HeadingMode::Ahead,
     };
-    let swarm = Swarm {
+    let swarm = FlightInputs {
         pads: &pads,
-        manner: Manner { waypoint_m: header.spacing.waypoint_m, look, trigger: header.trigger },
+        capture: CaptureSettings {
+            waypoint_m: header.spacing.waypoint_m,
+            heading_mode: look,
+            trigger: header.trigger,
+        },
         clearance_m: OPEN_FIELD_CLEARANCE_M,
         schedule: mission.header().schedule,
-        gates_most,
-        done: &[],
-        layers_held: 0,
-        following: request.following(&vehicles)?,
+        max_gates: gates_most,
+        photographed: &[],
+        held_layers: 0,
+        following: request.terrain_following(&vehicles)?,
     };
-    flights::plan(&work, &ws.routes, &Swarm { done, ..swarm }, schedule, out)?;
+    flights::plan_flights(&work, &ws.routes, &FlightInputs { photographed: done, ..swarm }, schedule, out)?;
     for lots in losses {
-        let mut fates: Vec<Fate, K> = Vec::new();
+        let mut fates: Vec<VehicleStatus, K> = Vec::new();
         for pad in &pads {
             let rank = pads.iter().filter(|other| other.id < pad.id).count();
             let lot = lots.get(rank).ok_or(CoverageError::Vehicles)?;
-            let fate = Fate { lives: lot.lives, along_m: lot.along_m() };
+            let fate = VehicleStatus { alive: lot.alive, along_m: lot.along_m() };
             fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
         let loss = Loss { work: &whole, swarm: &swarm, fates: &fates };
-        losses::redivide(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
+        losses::redivide_work(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
     Ok(())
 }

@@ -17,18 +17,18 @@ mod stream;
 
 use heapless::Deque;
 
-use self::memory::Memory;
+use self::memory::DuplicateDetection;
 #[cfg(test)]
 pub(crate) use self::packet::FTP_TEXTS;
 pub use self::packet::MAX_DATA;
 use self::packet::{
-    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NAK, NakError, Request, Text, chunk, decimal, is_open, op,
-    upload_text,
+    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NAK, NakError, Request, Text, chunk_len, format_decimal,
+    is_open, op, upload_text,
 };
-use self::stream::{Stream, due};
+use self::stream::{FtpBurst, next_request};
 use crate::link::frame::Frame;
-use crate::storage::store::window::Taken;
-use crate::storage::store::{Erasing, File, ReadOutcome, Store, UploadError, UploadState};
+use crate::storage::store::window::PieceOutcome;
+use crate::storage::store::{ErasePermission, File, ReadOutcome, Store, UploadError, UploadState};
 use crate::time::{Duration, Instant};
 
 /// Message id of FILE_TRANSFER_PROTOCOL.
@@ -62,12 +62,12 @@ struct Session {
     /// No byte was written to the file yet.
     fresh: bool,
     opened_by: Request,
-    used: Instant,
+    used_at: Instant,
 }
 
-/// Work of the server.
+/// Operation that the server executes.
 #[derive(Clone, Copy, Debug)]
-enum Doing {
+enum FtpOperation {
     Nothing,
     Read(Request, bool),
     Sum(Request, bool),
@@ -81,9 +81,9 @@ pub struct Ftp {
     queue: Deque<Request, MAX_QUEUED_REQUESTS>,
     reply: Option<Reply>,
     session: Option<Session>,
-    doing: Doing,
-    stream: Option<Stream>,
-    memory: Memory,
+    operation: FtpOperation,
+    burst: Option<FtpBurst>,
+    duplicates: DuplicateDetection,
     text: Option<Text>,
     now: Instant,
 }
@@ -94,9 +94,9 @@ impl Default for Ftp {
             queue: Deque::new(),
             reply: None,
             session: None,
-            doing: Doing::Nothing,
-            stream: None,
-            memory: Memory::default(),
+            operation: FtpOperation::Nothing,
+            burst: None,
+            duplicates: DuplicateDetection::default(),
             text: None,
             now: Instant::ZERO,
         }
@@ -105,13 +105,16 @@ impl Default for Ftp {
 
 impl Ftp {
     /// Queues a request. One that is queued already, or finds the queue full, is dropped: the client repeats it.
-    pub fn handle(&mut self, link: usize, now: Instant, frame: &Frame) {
+    pub fn queue_request(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
         let request = Request::read(link, frame);
-        let same = |held: &Request| held.is(&request);
-        let at_work = match &self.doing {
-            Doing::Nothing => false,
-            Doing::Read(held, _) | Doing::Sum(held, _) | Doing::Open(held) | Doing::Close(held) => same(held),
+        let same = |held: &Request| held.is_same_request(&request);
+        let at_work = match &self.operation {
+            FtpOperation::Nothing => false,
+            FtpOperation::Read(held, _)
+            | FtpOperation::Sum(held, _)
+            | FtpOperation::Open(held)
+            | FtpOperation::Close(held) => same(held),
         };
         if !at_work && !self.queue.iter().any(same) {
             // Full: the client asks again.
@@ -120,7 +123,7 @@ impl Ftp {
     }
 
     /// The answer that waits for a link: the whole payload of a FILE_TRANSFER_PROTOCOL.
-    pub fn poll(&mut self, link: usize) -> Option<[u8; PAYLOAD_LEN]> {
+    pub fn poll_reply(&mut self, link: usize) -> Option<[u8; PAYLOAD_LEN]> {
         let Reply { to, packet, .. } = self.reply.take_if(|reply| reply.link == link)?;
         let mut payload = [0; PAYLOAD_LEN];
         (payload[1], payload[2]) = to;
@@ -129,89 +132,91 @@ impl Ftp {
     }
 
     /// Text for a person.
-    pub fn text(&mut self) -> Option<Text> {
+    pub fn take_text(&mut self) -> Option<Text> {
         self.text.take()
     }
 
-    /// Goes on as far as the flash and the link let it.
-    pub fn advance(&mut self, store: &mut Store, now: Instant, erasing: Erasing) {
+    /// Continues the current operation as far as flash and link allow.
+    pub fn continue_work(&mut self, store: &mut Store, now: Instant, erasing: ErasePermission) {
         self.now = now;
         while self.reply.is_none() {
-            if !matches!(self.doing, Doing::Nothing) {
-                self.go_on(store);
+            if !matches!(self.operation, FtpOperation::Nothing) {
+                self.continue_operation(store);
                 return;
             }
             if let Some(request) = self.queue.pop_front() {
-                self.begin(&request, store, erasing);
+                self.begin_request(&request, store, erasing);
             } else {
-                self.next_of_stream(store);
+                self.send_next_burst_packet(store);
                 return;
             }
         }
     }
 
-    /// Takes what the flash answered.
-    pub fn answer(&mut self, answer: ReadOutcome<'_>) {
-        match (core::mem::replace(&mut self.doing, Doing::Nothing), answer) {
-            (Doing::Read(request, true), ReadOutcome::Bytes(bytes)) => match self.stream {
-                Some(stream) if stream.request().is(&request) => {
-                    let due = due(&request, Some(&stream));
-                    self.stream = stream.advanced_by(bytes.len());
-                    self.put(&due, ACK, u8::from(self.stream.is_none()), bytes);
+    /// Handles the result of a flash read.
+    pub fn handle_read_outcome(&mut self, answer: ReadOutcome<'_>) {
+        match (core::mem::replace(&mut self.operation, FtpOperation::Nothing), answer) {
+            (FtpOperation::Read(request, true), ReadOutcome::Bytes(bytes)) => match self.burst {
+                Some(stream) if stream.first_request().is_same_request(&request) => {
+                    let due = next_request(&request, Some(&stream));
+                    self.burst = stream.advanced_by(bytes.len());
+                    self.set_reply(&due, ACK, u8::from(self.burst.is_none()), bytes);
                 }
                 _ => self.ack(&request, bytes),
             },
-            (Doing::Sum(request, true), ReadOutcome::Sum(sum)) => {
+            (FtpOperation::Sum(request, true), ReadOutcome::Sum(sum)) => {
                 self.ack(&request, &sum.to_le_bytes());
             }
-            (Doing::Read(request, true) | Doing::Sum(request, true), _) => {
-                let due = due(&request, self.stream.take().as_ref());
+            (FtpOperation::Read(request, true) | FtpOperation::Sum(request, true), _) => {
+                let due = next_request(&request, self.burst.take().as_ref());
                 self.nak(&due, NakError::Errno(EIO));
             }
-            (other, _) => self.doing = other,
+            (other, _) => self.operation = other,
         }
     }
 
-    /// Asks the flash again, or sees whether an upload has come further.
-    fn go_on(&mut self, store: &mut Store) {
-        match &mut self.doing {
-            Doing::Nothing | Doing::Read(_, true) | Doing::Sum(_, true) => {}
-            Doing::Read(request, asked) => {
-                let due = due(request, self.stream.as_ref());
+    /// Continues the current operation: requests the flash again, or checks the progress of an upload.
+    fn continue_operation(&mut self, store: &mut Store) {
+        match &mut self.operation {
+            FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Sum(_, true) => {}
+            FtpOperation::Read(request, asked) => {
+                let due = next_request(request, self.burst.as_ref());
                 let file = self.session.map(|session| session.file);
-                let within = |file: &File| store.size(*file).is_some_and(|size| due.offset < size);
+                let within = |file: &File| store.file_size(*file).is_some_and(|size| due.offset < size);
                 if let Some(file) = file.filter(within) {
-                    *asked = store.read(file, due.offset, chunk(&due));
+                    *asked = store.request_read(file, due.offset, chunk_len(&due));
                 } else {
-                    (self.doing, self.stream) = (Doing::Nothing, None);
+                    (self.operation, self.burst) = (FtpOperation::Nothing, None);
                     self.nak(&due, NakError::EndOfFile);
                 }
             }
-            Doing::Sum(request, asked) => match request.file().filter(|file| store.size(*file).is_some()) {
-                Some(file) => *asked = store.sum(file, 0),
-                None => {
-                    let request = *request;
-                    self.doing = Doing::Nothing;
-                    self.nak(&request, NakError::NotFound);
+            FtpOperation::Sum(request, asked) => {
+                match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
+                    Some(file) => *asked = store.request_crc(file, 0),
+                    None => {
+                        let request = *request;
+                        self.operation = FtpOperation::Nothing;
+                        self.nak(&request, NakError::NotFound);
+                    }
                 }
-            },
-            Doing::Open(request) => {
+            }
+            FtpOperation::Open(request) => {
                 let request = *request;
-                match store.upload() {
+                match store.upload_state() {
                     Some(UploadState::Opening) => {}
                     Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
                     _ => {
-                        self.doing = Doing::Nothing;
+                        self.operation = FtpOperation::Nothing;
                         // The erasing for this session may have taken longer than a client may be
                         // silent.
-                        self.session = self.session.map(|session| Session { used: self.now, ..session });
+                        self.session = self.session.map(|session| Session { used_at: self.now, ..session });
                         self.finish(&request, Ok(()));
                     }
                 }
             }
-            Doing::Close(request) => {
+            FtpOperation::Close(request) => {
                 let request = *request;
-                match store.upload() {
+                match store.upload_state() {
                     Some(UploadState::Ended(result)) => self.end_upload(&request, result),
                     Some(_) => {}
                     None => self.end_upload(&request, Err(UploadError::Incomplete)),
@@ -221,42 +226,44 @@ impl Ftp {
     }
 
     fn end_upload(&mut self, request: &Request, result: Result<(), UploadError>) {
-        self.doing = Doing::Nothing;
+        self.operation = FtpOperation::Nothing;
         if let Some(session) = self.session.take() {
             self.text = Some(upload_text(session.file, result));
         }
         self.finish(request, result.map_err(NakError::from));
     }
 
-    fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
-        if let Some(done) = self.memory.recall(request, self.now) {
+    fn begin_request(&mut self, request: &Request, store: &mut Store, erasing: ErasePermission) {
+        if let Some(done) = self.duplicates.previous_outcome(request, self.now) {
             if !is_open(request) || done.is_err() {
                 self.respond(request, done);
-            } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
+            } else if let Some(session) =
+                self.session.filter(|session| session.opened_by.is_same_request(request))
+            {
                 // The answer was lost; a file that was opened since then stays open.
-                self.ack_open_again(request, &session, store);
+                self.repeat_open_ack(request, &session, store);
             }
             return;
         }
         if is_open(request) {
-            self.memory.forget_closed(request.client);
+            self.duplicates.forget_closed(request.client);
         }
         if matches!(request.opcode, op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ) {
-            self.stream = None;
+            self.burst = None;
         }
         match request.opcode {
             op::NONE => self.ack(request, &[]),
             op::TERMINATE => match self.session_of(request) {
                 Ok(Session { writes: true, .. }) => {
-                    store.close();
-                    self.doing = Doing::Close(*request);
+                    store.finish_upload();
+                    self.operation = FtpOperation::Close(*request);
                 }
                 Ok(_) => {
                     self.session = None;
                     self.finish(request, Ok(()));
                 }
                 Err(no) => {
-                    let closed = self.memory.recall_closed(request, self.now);
+                    let closed = self.duplicates.previous_close_outcome(request, self.now);
                     self.respond(request, closed.unwrap_or(Err(no)));
                 }
             },
@@ -269,36 +276,40 @@ impl Ftp {
                 }
                 self.finish(request, Ok(()));
             }
-            op::LIST => self.list(request, store),
-            op::OPEN_READ => match request.file().and_then(|file| Some((file, store.size(file)?))) {
-                None => self.nak(request, NakError::NotFound),
-                Some((file, size)) => {
-                    if self.take_session(request, file, false, store) {
-                        self.memory.note(request, Ok(()), self.now);
-                        self.ack(request, &size.to_le_bytes());
+            op::LIST => self.handle_list(request, store),
+            op::OPEN_READ => {
+                match request.requested_file().and_then(|file| Some((file, store.file_size(file)?))) {
+                    None => self.nak(request, NakError::NotFound),
+                    Some((file, size)) => {
+                        if self.open_session(request, file, false, store) {
+                            self.duplicates.remember(request, Ok(()), self.now);
+                            self.ack(request, &size.to_le_bytes());
+                        }
                     }
                 }
-            },
+            }
             op::READ | op::BURST_READ => match self.session_of(request) {
                 Ok(Session { writes: true, .. }) => self.nak(request, NakError::InvalidSession),
                 Ok(_) => {
-                    self.stream = (request.opcode == op::BURST_READ).then(|| Stream::new(request));
-                    self.doing = Doing::Read(*request, false);
+                    self.burst = (request.opcode == op::BURST_READ).then(|| FtpBurst::new(request));
+                    self.operation = FtpOperation::Read(*request, false);
                 }
                 Err(error) => self.nak(request, error),
             },
-            op::CREATE | op::OPEN_WRITE => self.open(request, store, erasing),
-            op::WRITE => self.write(request, store),
-            op::REMOVE => match request.file().filter(|file| store.size(*file).is_some()) {
+            op::CREATE | op::OPEN_WRITE => self.handle_open(request, store, erasing),
+            op::WRITE => self.handle_write(request, store),
+            op::REMOVE => match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
                 Some(file) => {
-                    store.remove(file);
+                    store.remove_file(file);
                     self.text = Some(FILE_REMOVED);
                     self.finish(request, Ok(()));
                 }
                 None => self.nak(request, NakError::NotFound),
             },
-            op::CRC32 => self.doing = Doing::Sum(*request, false),
-            op::TRUNCATE | op::RENAME if request.file().is_none_or(|file| store.size(file).is_none()) => {
+            op::CRC32 => self.operation = FtpOperation::Sum(*request, false),
+            op::TRUNCATE | op::RENAME
+                if request.requested_file().is_none_or(|file| store.file_size(file).is_none()) =>
+            {
                 self.nak(request, NakError::NotFound);
             }
             op::MAKE_DIRECTORY | op::REMOVE_DIRECTORY | op::TRUNCATE | op::RENAME => {
@@ -308,19 +319,19 @@ impl Ftp {
         }
     }
 
-    fn list(&mut self, request: &Request, store: &Store) {
+    fn handle_list(&mut self, request: &Request, store: &Store) {
         if !request.path().is_empty() {
             return self.nak(request, NakError::NotFound);
         }
         let mut entries = heapless::Vec::<u8, MAX_DATA>::new();
-        let held = File::ALL.iter().filter_map(|file| Some((file.name(), store.size(*file)?)));
+        let held = File::ALL.iter().filter_map(|file| Some((file.name(), store.file_size(*file)?)));
         for (name, size) in held.skip(request.offset as usize) {
             let mut digits = [0; 10];
             // Both names and sizes are short: there is room for all.
             let _ = entries.push(b'F');
             let _ = entries.extend_from_slice(name.as_bytes());
             let _ = entries.push(b'\t');
-            let _ = entries.extend_from_slice(decimal(size, &mut digits));
+            let _ = entries.extend_from_slice(format_decimal(size, &mut digits));
             let _ = entries.push(0);
         }
         if entries.is_empty() {
@@ -330,21 +341,21 @@ impl Ftp {
         }
     }
 
-    fn open(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
-        let Some(file) = request.file() else { return self.nak(request, NakError::Protected) };
+    fn handle_open(&mut self, request: &Request, store: &mut Store, erasing: ErasePermission) {
+        let Some(file) = request.requested_file() else { return self.nak(request, NakError::Protected) };
         let same = |session: &&mut Session| {
             (session.client, session.id, session.file) == (request.client, request.session, file)
                 && session.fresh
         };
         if let Some(session) = self.session.as_mut().filter(same) {
-            (session.opened_by, session.used) = (*request, self.now);
+            (session.opened_by, session.used_at) = (*request, self.now);
             return self.ack(request, &[]);
         }
-        if !self.take_session(request, file, true, store) {
+        if !self.open_session(request, file, true, store) {
             return;
         }
-        match store.open(file, erasing) {
-            Ok(()) => self.doing = Doing::Open(*request),
+        match store.open_upload(file, erasing) {
+            Ok(()) => self.operation = FtpOperation::Open(*request),
             Err(why) => {
                 self.session = None;
                 self.text = Some(upload_text(file, Err(why)));
@@ -353,7 +364,7 @@ impl Ftp {
         }
     }
 
-    fn write(&mut self, request: &Request, store: &mut Store) {
+    fn handle_write(&mut self, request: &Request, store: &mut Store) {
         match self.session_of(request) {
             Ok(Session { writes: true, .. }) => {}
             Ok(_) => return self.nak(request, NakError::Protected),
@@ -362,22 +373,22 @@ impl Ftp {
         if usize::from(request.size) > MAX_DATA || request.size == 0 {
             return self.nak(request, NakError::InvalidSize);
         }
-        if let Some(UploadState::Ended(Err(why))) = store.upload() {
+        if let Some(UploadState::Ended(Err(why))) = store.upload_state() {
             return self.nak(request, why.into());
         }
-        match store.take(request.offset, request.bytes()) {
-            Taken::Yes => {
+        match store.take_piece(request.offset, request.bytes()) {
+            PieceOutcome::Yes => {
                 self.session = self.session.map(|session| Session { fresh: false, ..session });
                 self.ack(request, &[]);
             }
-            Taken::TooLarge => self.nak(request, NakError::Errno(EFBIG)),
-            Taken::Later => {}
+            PieceOutcome::TooLarge => self.nak(request, NakError::Errno(EFBIG)),
+            PieceOutcome::Later => {}
         }
     }
 
-    /// Says once more what a session was opened with.
-    fn ack_open_again(&mut self, request: &Request, session: &Session, store: &Store) {
-        match store.size(session.file) {
+    /// Repeats the ACK with which a session was opened.
+    fn repeat_open_ack(&mut self, request: &Request, session: &Session, store: &Store) {
+        match store.file_size(session.file) {
             Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
             _ => self.ack(request, &[]),
         }
@@ -391,7 +402,7 @@ impl Ftp {
                 if (request.sequence.wrapping_sub(session.opened_by.sequence) as i16) < 0 {
                     return Err(NakError::InvalidSession);
                 }
-                session.used = now;
+                session.used_at = now;
                 Ok(*session)
             }
             _ => Err(NakError::InvalidSession),
@@ -399,11 +410,11 @@ impl Ftp {
     }
 
     fn is_idle(&self, session: &Session) -> bool {
-        self.now - session.used > SESSION_IDLE
+        self.now - session.used_at > SESSION_IDLE
     }
 
-    /// Opens a session; says so where there is none to be had.
-    fn take_session(&mut self, request: &Request, file: File, writes: bool, store: &mut Store) -> bool {
+    /// Opens a session. Sends a NAK if no session is free.
+    fn open_session(&mut self, request: &Request, file: File, writes: bool, store: &mut Store) -> bool {
         let held = |session: &Session| session.client != request.client && !self.is_idle(session);
         if self.session.as_ref().is_some_and(held) {
             self.nak(request, NakError::Sessions);
@@ -412,27 +423,28 @@ impl Ftp {
         self.drop_session(store);
         let Request { client, session: id, .. } = *request;
         let opened_by = *request;
-        self.session = Some(Session { id, client, file, writes, fresh: writes, opened_by, used: self.now });
+        self.session =
+            Some(Session { id, client, file, writes, fresh: writes, opened_by, used_at: self.now });
         true
     }
 
     fn drop_session(&mut self, store: &mut Store) {
         if self.session.take().is_some_and(|session| session.writes) {
-            store.abandon();
+            store.abandon_upload();
         }
     }
 
     /// The next packet of a burst.
-    fn next_of_stream(&mut self, store: &mut Store) {
-        if let Some(stream) = self.stream {
-            self.doing = Doing::Read(stream.request(), false);
-            self.go_on(store);
+    fn send_next_burst_packet(&mut self, store: &mut Store) {
+        if let Some(stream) = self.burst {
+            self.operation = FtpOperation::Read(stream.first_request(), false);
+            self.continue_operation(store);
         }
     }
 
-    /// Answers, and remembers the answer.
+    /// Sends the reply and remembers it for repeated requests.
     fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
-        self.memory.note(request, result, self.now);
+        self.duplicates.remember(request, result, self.now);
         self.respond(request, result);
     }
 
@@ -444,12 +456,12 @@ impl Ftp {
     }
 
     fn ack(&mut self, request: &Request, data: &[u8]) {
-        self.put(request, ACK, 0, data);
+        self.set_reply(request, ACK, 0, data);
     }
 
     fn nak(&mut self, request: &Request, error: NakError) {
         let code = match error {
-            NakError::Errno(errno) => return self.put(request, NAK, 0, &[2, errno]),
+            NakError::Errno(errno) => return self.set_reply(request, NAK, 0, &[2, errno]),
             NakError::InvalidSize => 3,
             NakError::InvalidSession => 4,
             NakError::Sessions => 5,
@@ -458,10 +470,10 @@ impl Ftp {
             NakError::Protected => 9,
             NakError::NotFound => 10,
         };
-        self.put(request, NAK, 0, &[code]);
+        self.set_reply(request, NAK, 0, &[code]);
     }
 
-    fn put(&mut self, request: &Request, opcode: u8, burst_complete: u8, data: &[u8]) {
+    fn set_reply(&mut self, request: &Request, opcode: u8, burst_complete: u8, data: &[u8]) {
         let data = &data[..data.len().min(MAX_DATA)];
         let mut packet = [0; HEADER_LEN + MAX_DATA];
         packet[..2].copy_from_slice(&request.sequence.wrapping_add(1).to_le_bytes());

@@ -8,7 +8,7 @@ use crate::config::{Config, REACHES_ALL_M};
 
 /// Longest name of a parameter, bytes.
 pub const NAME_LEN: usize = 16;
-/// Bytes of a kept parameter.
+/// Bytes of a stored parameter.
 const ENTRY_LEN: usize = NAME_LEN + 4;
 
 /// A parameter.
@@ -17,21 +17,21 @@ pub struct Parameter {
     /// At most 16 bytes of ASCII.
     pub name: &'static str,
     /// Smallest value.
-    pub least: f32,
+    pub min: f32,
     /// Largest value.
-    pub most: f32,
+    pub max: f32,
     /// Value of a new board.
     pub default: f32,
     /// Whether only whole numbers are allowed.
     pub whole: bool,
 }
 
-const fn real(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
-    Parameter { name, least, most, default, whole: false }
+const fn real_parameter(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
+    Parameter { name, min: least, max: most, default, whole: false }
 }
 
-const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
-    Parameter { name, least, most, default, whole: true }
+const fn whole_parameter(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
+    Parameter { name, min: least, max: most, default, whole: true }
 }
 
 /// Number of parameters.
@@ -41,16 +41,16 @@ pub const STORED_LEN: usize = PARAMETER_COUNT * ENTRY_LEN;
 
 /// All parameters, sorted by name; `companion/README.md` prints the same table.
 pub const TABLE: [Parameter; PARAMETER_COUNT] = [
-    real("FLK_ACCEL", 0.2, 5.0, 1.5),
-    whole("FLK_BATT_LOW", 0.0, 100.0, 15.0),
-    real("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
-    real("FLK_EST_M", 0.05, 10.0, 0.1),
-    real("FLK_RADIO_M", 1.0, REACHES_ALL_M, REACHES_ALL_M),
-    whole("FLK_RESUME", 0.0, 1.0, 1.0),
-    real("FLK_SPEED_MAX", 0.1, 20.0, 20.0),
-    real("FLK_START_TOL", 0.2, 20.0, 2.0),
-    whole("FLK_SWARM_HZ", 2.0, 10.0, 5.0),
-    whole("FLK_SYS_ID", 0.0, 250.0, 0.0),
+    real_parameter("FLK_ACCEL", 0.2, 5.0, 1.5),
+    whole_parameter("FLK_BATT_LOW", 0.0, 100.0, 15.0),
+    real_parameter("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
+    real_parameter("FLK_EST_M", 0.05, 10.0, 0.1),
+    real_parameter("FLK_RADIO_M", 1.0, REACHES_ALL_M, REACHES_ALL_M),
+    whole_parameter("FLK_RESUME", 0.0, 1.0, 1.0),
+    real_parameter("FLK_SPEED_MAX", 0.1, 20.0, 20.0),
+    real_parameter("FLK_START_TOL", 0.2, 20.0, 2.0),
+    whole_parameter("FLK_SWARM_HZ", 2.0, 10.0, 5.0),
+    whole_parameter("FLK_SYS_ID", 0.0, 250.0, 0.0),
 ];
 
 const ACCEL: usize = 0;
@@ -64,9 +64,9 @@ const START_TOL: usize = 7;
 const SWARM_HZ: usize = 8;
 const SYS_ID: usize = 9;
 
-/// Why a value was not taken.
+/// Reason why a parameter value was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refused {
+pub enum ParameterError {
     /// No parameter has this name or index.
     Unknown,
     /// NaN, infinite, out of range, or a fraction where a whole number is due.
@@ -100,13 +100,13 @@ impl Parameters {
     ///
     /// # Errors
     /// An index that is none, or a value out of range: nothing changes.
-    pub fn set(&mut self, index: usize, value: f32) -> Result<bool, Refused> {
+    pub fn set(&mut self, index: usize, value: f32) -> Result<bool, ParameterError> {
         let (Some(parameter), Some(held)) = (TABLE.get(index), self.values.get_mut(index)) else {
-            return Err(Refused::Unknown);
+            return Err(ParameterError::Unknown);
         };
         let fraction = parameter.whole && libm::truncf(value) != value;
-        if !(parameter.least..=parameter.most).contains(&value) || fraction {
-            return Err(Refused::Range);
+        if !(parameter.min..=parameter.max).contains(&value) || fraction {
+            return Err(ParameterError::Range);
         }
         Ok(core::mem::replace(held, value) != value)
     }
@@ -165,13 +165,13 @@ mod tests {
         for (index, parameter) in TABLE.iter().enumerate() {
             assert!(parameter.name.len() <= NAME_LEN && parameter.name.is_ascii());
             assert_eq!(values.set(index, parameter.default), Ok(false));
-            assert_eq!(values.set(index, parameter.most), Ok(parameter.most != parameter.default));
-            for bad in [f32::NAN, f32::INFINITY, parameter.least - 0.1, parameter.most * 1.1 + 0.1] {
-                assert_eq!(values.set(index, bad), Err(Refused::Range));
+            assert_eq!(values.set(index, parameter.max), Ok(parameter.max != parameter.default));
+            for bad in [f32::NAN, f32::INFINITY, parameter.min - 0.1, parameter.max * 1.1 + 0.1] {
+                assert_eq!(values.set(index, bad), Err(ParameterError::Range));
             }
-            assert_eq!(parameter.whole, values.set(index, parameter.least + 0.5) == Err(Refused::Range));
+            assert_eq!(parameter.whole, values.set(index, parameter.min + 0.5) == Err(ParameterError::Range));
         }
-        assert_eq!(values.set(PARAMETER_COUNT, 1.0), Err(Refused::Unknown));
+        assert_eq!(values.set(PARAMETER_COUNT, 1.0), Err(ParameterError::Unknown));
     }
 
     #[test]
@@ -179,7 +179,7 @@ mod tests {
         extern crate std;
         let readme = include_str!("../../README.md");
         for p in TABLE {
-            let row = std::format!("| {} | {} | {} | {} |", p.name, p.least, p.most, p.default);
+            let row = std::format!("| {} | {} | {} | {} |", p.name, p.min, p.max, p.default);
             assert!(readme.contains(&row), "{row}");
         }
     }

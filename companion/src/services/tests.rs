@@ -26,7 +26,7 @@ impl Ground {
     fn new() -> Self {
         let mut flash = Flash::new(9);
         let mut bench = Bench::new(config());
-        bench.companion.mount(started(&mut flash));
+        bench.companion.attach_store(started(&mut flash));
         Self { bench, flash, sequence: 0 }
     }
 
@@ -44,8 +44,8 @@ impl Ground {
         loop {
             let mut idle = true;
             while let Some(request) = self.bench.companion.poll_flash() {
-                let outcome =
-                    obey(&mut self.flash, request, Erasing::Allowed, &mut read).expect("no power cut");
+                let outcome = obey(&mut self.flash, request, ErasePermission::Allowed, &mut read)
+                    .expect("no power cut");
                 self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
             }
             loop {
@@ -161,7 +161,7 @@ fn a_flying_companion_asks_for_no_erasure() {
     ground.bench = Bench::following(config());
     // A flash as it comes: everything would have to be erased.
     let mut flash = Flash::new(1);
-    ground.bench.companion.mount(Store::mount(crate::testing::fake_flash::LAYOUT, &mut flash));
+    ground.bench.companion.attach_store(Store::mount(crate::testing::fake_flash::LAYOUT, &mut flash));
     for _ in 0..100 {
         ground.bench.run(0.1);
         assert!(ground.bench.companion.poll_flash().is_none());
@@ -174,7 +174,7 @@ fn time_and_version_are_told_on_either_link() {
         let mut ground = Ground::new();
         let heard = ground.ask(link, &TIMESYNC_DATA { tc1: 0, ts1: 42 });
         let answer = heard.iter().find_map(Frame::decode::<TIMESYNC_DATA>).expect("answered");
-        assert_eq!((answer.tc1, answer.ts1), (ground.bench.now.micros() as i64 * 1000, 42));
+        assert_eq!((answer.tc1, answer.ts1), (ground.bench.now.as_micros() as i64 * 1000, 42));
         let frame = heard.iter().find(|f| f.message_id == TIMESYNC_DATA::ID).unwrap();
         assert_eq!((frame.padded()[16], frame.padded()[17]), GROUND, "an autopilot does not forward its own");
         assert!(ground.ask(link, &TIMESYNC_DATA { tc1: 5, ts1: 42 }).iter().all(|f| f.message_id != 111));
@@ -271,7 +271,8 @@ fn a_parameter_counts_at_once_on_the_ground_and_after_the_flight_in_the_air() {
     let begun = ground.bench.setpoints.len();
     ground.bench.run(4.0);
     let pairs = ground.bench.setpoints[begun..].windows(2);
-    let fastest = pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).secs_f32()).fold(0.0, f32::max);
+    let fastest =
+        pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32()).fold(0.0, f32::max);
     assert!((0.4..0.55).contains(&fastest), "not while it flies: {fastest}");
     assert_eq!(speeds(&ground).0, 0.5);
     ground.bench.until(State::Done, 90.0);

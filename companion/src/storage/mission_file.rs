@@ -17,8 +17,10 @@ use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
 
 use self::coverage::{CoverageParts, CoverageView};
-use self::numbers::{MAX_SPEED_MPS, f32_at, in_range, point_at, positive, put, u16_at, u32_at};
-use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS, holds};
+use self::numbers::{
+    MAX_SPEED_MPS, f32_at, in_range, is_positive_up_to, point_at, put_numbers, u16_at, u32_at,
+};
+use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS, box_contains};
 
 pub mod coverage;
 mod error;
@@ -51,7 +53,7 @@ const KIND_COVERAGE: u8 = 1;
 pub struct MissionHeader {
     /// CRC-32 of the roadmap file it belongs to.
     pub roadmap_crc: u32,
-    /// How goals are given out.
+    /// Rule by which goals are assigned to vehicles.
     pub mode: Mode,
     /// How vehicles keep apart.
     pub method: Method,
@@ -76,22 +78,22 @@ impl MissionHeader {
             return refuse("origin");
         }
         let schedule = &self.schedule;
-        if !positive(self.cruise_mps, MAX_SPEED_MPS) {
+        if !is_positive_up_to(self.cruise_mps, MAX_SPEED_MPS) {
             return refuse("cruise_mps");
         }
-        if !positive(schedule.cruise_mps, MAX_SPEED_MPS) {
+        if !is_positive_up_to(schedule.cruise_mps, MAX_SPEED_MPS) {
             return refuse("schedule_mps");
         }
-        if !positive(schedule.vertical_mps, MAX_SPEED_MPS) {
+        if !is_positive_up_to(schedule.vertical_mps, MAX_SPEED_MPS) {
             return refuse("vertical_mps");
         }
-        if !positive(self.safety_distance_m, MAX_COORDINATE_M) {
+        if !is_positive_up_to(self.safety_distance_m, MAX_COORDINATE_M) {
             return refuse("safety_distance_m");
         }
-        if !positive(schedule.separation_m, MAX_COORDINATE_M) {
+        if !is_positive_up_to(schedule.separation_m, MAX_COORDINATE_M) {
             return refuse("separation_m");
         }
-        if !positive(schedule.parked_separation_m, MAX_COORDINATE_M) {
+        if !is_positive_up_to(schedule.parked_separation_m, MAX_COORDINATE_M) {
             return refuse("parked_separation_m");
         }
         let sound = |(low, high): &(Point, Point)| {
@@ -109,7 +111,7 @@ impl MissionHeader {
 
 /// Work of the vehicles of a mission.
 #[derive(Clone, Copy, Debug)]
-pub enum Kind<'a> {
+pub enum MissionKind<'a> {
     /// The vehicles fly to goals, on a roadmap.
     Goals,
     /// The vehicles photograph an area.
@@ -118,14 +120,14 @@ pub enum Kind<'a> {
 
 /// Work of the vehicles of a mission, as it is written.
 #[derive(Clone, Copy, Debug)]
-pub enum Block<'a> {
+pub enum MissionBlock<'a> {
     /// The vehicles fly to goals.
     Goals(&'a [MissionGoal]),
     /// The vehicles photograph an area.
     Coverage(CoverageParts<'a>),
 }
 
-impl Block<'_> {
+impl MissionBlock<'_> {
     fn goals(&self) -> &[MissionGoal] {
         match self {
             Self::Goals(goals) => goals,
@@ -152,10 +154,10 @@ pub const fn encoded_len(vehicles: usize, goals: usize) -> usize {
 ///
 /// # Errors
 /// Whatever [`MissionView::parse`] would refuse, or `out` is too small.
-pub fn write(
+pub fn write_mission(
     header: &MissionHeader,
     vehicles: &[MissionVehicle],
-    block: &Block<'_>,
+    block: &MissionBlock<'_>,
     out: &mut [u8],
 ) -> Result<usize, MissionError> {
     let goals = block.goals();
@@ -182,8 +184,8 @@ pub fn write(
     };
     out[22] = if header.geofence.is_some() { FLAG_FENCED } else { 0 };
     out[23] = match block {
-        Block::Goals(_) => KIND_GOALS,
-        Block::Coverage(_) => KIND_COVERAGE,
+        MissionBlock::Goals(_) => KIND_GOALS,
+        MissionBlock::Coverage(_) => KIND_COVERAGE,
     };
     out[24..26].copy_from_slice(&vehicle_count.to_le_bytes());
     out[26..28].copy_from_slice(&goal_count.to_le_bytes());
@@ -196,7 +198,7 @@ pub fn write(
     let numbers =
         [header.cruise_mps, s.vertical_mps, header.safety_distance_m, s.separation_m, s.parked_separation_m];
     let (low, high) = header.geofence.unwrap_or_default();
-    put(
+    put_numbers(
         &mut out[..HEADER_LEN],
         56,
         numbers.into_iter().chain(low.iter().copied()).chain(high.iter().copied()).chain([s.cruise_mps]),
@@ -207,9 +209,9 @@ pub fn write(
         to.copy_from_slice(&vehicle.to_bytes());
     }
     for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
-        put(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
+        put_numbers(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
     }
-    if let Block::Coverage(parts) = block {
+    if let MissionBlock::Coverage(parts) = block {
         parts.write(to_block);
     }
     let crc = CRC32.checksum(&out[..needed - CRC_LEN]);
@@ -225,7 +227,7 @@ pub struct MissionView<'a> {
     crc: u32,
     vehicles: &'a [[u8; VEHICLE_LEN]],
     goals: &'a [[u8; GOAL_LEN]],
-    kind: Kind<'a>,
+    kind: MissionKind<'a>,
 }
 
 impl<'a> MissionView<'a> {
@@ -294,8 +296,8 @@ impl<'a> MissionView<'a> {
         let (vehicles, rest) = covered[HEADER_LEN..].split_at(vehicle_count * VEHICLE_LEN);
         let (goals, block) = rest.split_at(goal_count * GOAL_LEN);
         let kind = match kind {
-            KIND_GOALS => Kind::Goals,
-            KIND_COVERAGE => Kind::Coverage(CoverageView::parse(block, vehicle_count)?),
+            KIND_GOALS => MissionKind::Goals,
+            KIND_COVERAGE => MissionKind::Coverage(CoverageView::parse(block, vehicle_count)?),
             _ => return Err(FileError::Header("kind").into()),
         };
         let (vehicles, goals) = (vehicles.as_chunks().0, goals.as_chunks().0);
@@ -311,12 +313,13 @@ impl<'a> MissionView<'a> {
 
     fn check_lists(&self) -> Result<(), MissionError> {
         let labelled = self.header.mode == Mode::Labelled;
-        let inside = |place: &Point| self.header.geofence.as_ref().is_none_or(|fence| holds(fence, place));
+        let inside =
+            |place: &Point| self.header.geofence.as_ref().is_none_or(|fence| box_contains(fence, place));
         let mut seen = [false; 256];
         for (i, vehicle) in self.vehicles().enumerate() {
             let id = vehicle.task.id;
             let known = core::mem::replace(&mut seen[usize::from(id)], true);
-            if known || !vehicle.is_sound(self.goals.len()) {
+            if known || !vehicle.is_valid(self.goals.len()) {
                 return Err(MissionError::Vehicle(i as u16));
             }
             let same = |other: &[u8; VEHICLE_LEN]| other[2..4] == self.vehicles[i][2..4];
@@ -328,7 +331,7 @@ impl<'a> MissionView<'a> {
             }
         }
         for (goal, i) in self.goals().zip(0..) {
-            if !goal.is_sound() {
+            if !goal.is_valid() {
                 return Err(MissionError::Goal(i));
             }
             if !inside(&goal.position) {
@@ -349,15 +352,15 @@ impl<'a> MissionView<'a> {
     }
 
     /// Work of the vehicles.
-    pub fn kind(&self) -> &Kind<'a> {
+    pub fn kind(&self) -> &MissionKind<'a> {
         &self.kind
     }
 
     /// Bytes the file takes.
     pub fn byte_len(&self) -> usize {
         let block = match &self.kind {
-            Kind::Goals => 0,
-            Kind::Coverage(view) => view.byte_len(),
+            MissionKind::Goals => 0,
+            MissionKind::Coverage(view) => view.byte_len(),
         };
         encoded_len(self.vehicles.len(), self.goals.len()) + block
     }
@@ -378,15 +381,15 @@ impl<'a> MissionView<'a> {
     }
 
     /// Whether it can be planned beside this roadmap, or beside none.
-    pub fn fits(&self, roadmap: Option<&RoadmapView<'_>>) -> bool {
+    pub fn can_be_planned_with(&self, roadmap: Option<&RoadmapView<'_>>) -> bool {
         match self.kind {
-            Kind::Goals => roadmap.is_some_and(|roadmap| self.is_of(roadmap)),
-            Kind::Coverage(_) => true,
+            MissionKind::Goals => roadmap.is_some_and(|roadmap| self.matches_roadmap(roadmap)),
+            MissionKind::Coverage(_) => true,
         }
     }
 
     /// Whether it was made for this roadmap.
-    fn is_of(&self, roadmap: &RoadmapView<'_>) -> bool {
+    fn matches_roadmap(&self, roadmap: &RoadmapView<'_>) -> bool {
         let terminals = (usize::from(roadmap.header().starts), usize::from(roadmap.header().goals));
         self.header.roadmap_crc == roadmap.crc() && terminals == (self.vehicles.len(), self.goals.len())
     }
@@ -396,7 +399,7 @@ impl<'a> MissionView<'a> {
     ///
     /// # Errors
     /// [`MissionError::RosterFull`] if there are more vehicles or goals than `V`.
-    pub fn request<'b, const V: usize>(
+    pub fn plan_request<'b, const V: usize>(
         &self,
         tasks: &'b mut Vec<VehicleTask, V>,
         descents_m: &'b mut Vec<f32, V>,
@@ -414,7 +417,7 @@ impl<'a> MissionView<'a> {
             descents_m,
             mode: self.header.mode,
             schedule: self.header.schedule,
-            gates_most,
+            max_gates: gates_most,
         })
     }
 
@@ -422,7 +425,7 @@ impl<'a> MissionView<'a> {
     ///
     /// # Errors
     /// The vehicle is not in the mission, or the mission has more vehicles than `V`.
-    pub fn config<const V: usize>(&self, system_id: u8) -> Result<Config<V>, MissionError> {
+    pub fn companion_config<const V: usize>(&self, system_id: u8) -> Result<Config<V>, MissionError> {
         let index = self.index_of(system_id).ok_or(MissionError::NotInRoster(system_id))?;
         let own = MissionVehicle::from_bytes(&self.vehicles[index]);
         if self.vehicles.len() > V {
@@ -440,11 +443,11 @@ impl<'a> MissionView<'a> {
         config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
         config.climb_mps = header.schedule.vertical_mps;
         config.descend_mps = header.schedule.vertical_mps;
-        if let Kind::Coverage(view) = &self.kind
+        if let MissionKind::Coverage(view) = &self.kind
             && let Some(share) = view.shares().nth(index)
         {
             (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
-            config.division = Some(view.down_s());
+            config.division = Some(view.time_to_ground_s());
             config.ground = view.header().ground;
         }
         config.radius_m = own.radius_m;

@@ -2,7 +2,7 @@
 //!
 //! From the byte to the speed scale: GLOBAL_POSITION_INT → [`Neighbours::handle_position`] → ENU in
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
-//! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
+//! [`Neighbours::states_at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
 
 mod bounds;
 mod contact;
@@ -18,15 +18,15 @@ use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
-use planner_core::safety::Joint;
+use planner_core::safety::PlaceOnPoints;
 
 pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
-use self::contact::Contact;
-pub(crate) use self::met::{Met, Reach};
+use self::contact::NeighbourEntry;
+pub(crate) use self::met::{FilterNeighbour, ReachQuery};
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
-use crate::link::echo::{Echo, Lateness};
+use crate::link::echo::{IntentEcho, MessageDelay};
 use crate::link::intent::{BLOCKED, GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
@@ -35,7 +35,7 @@ use crate::time::{Duration, Instant};
 /// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
-    contacts: Vec<Contact, V>,
+    contacts: Vec<NeighbourEntry, V>,
     heard: Vec<Neighbour, V>,
     /// The first contacts are the roster, sorted by id; the rest are strangers.
     roster: usize,
@@ -45,14 +45,14 @@ pub struct Neighbours<const V: usize> {
     /// No vehicle's progress grows faster, m/s.
     fastest_mps: f32,
     /// An unheard one makes this much at least, m/s.
-    reckoned_mps: f32,
+    assumed_speed_mps: f32,
     /// Distance from which on the radio may not reach, metres.
-    edge_m: f32,
+    range_edge_m: f32,
     /// Place of the own vehicle.
     place: Point,
     /// With the vehicle of this rank the next relay begins.
     relay_next: u16,
-    /// The own place in the roster.
+    /// Rank of this vehicle in the roster.
     own_rank: u16,
     /// The fleet: the state that all vehicles of a coverage mission agree on.
     fleet: Option<Fleet<V>>,
@@ -62,14 +62,14 @@ pub struct Neighbours<const V: usize> {
     down: Duration,
     /// Distance by which two vehicles in the air may be nearer than they believe, metres: over an
     /// area, where it is kept.
-    stray_m: f32,
+    pair_position_error_m: f32,
     /// With the vehicle of this rank the next report of all begins.
     roster_next: usize,
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The vehicles of a roster sorted by id, without the own one; nobody heard yet. None of them flies faster along its path
-    /// than `nominal_mps`, or than it lands.
+    /// The vehicles of a roster sorted by id, without the own one; no other vehicle heard yet. None of them flies
+    /// faster along its path than `nominal_mps`, or than it lands.
     pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
@@ -78,15 +78,15 @@ impl<const V: usize> Neighbours<V> {
             dropped: 0,
             clear_at: Instant::ZERO,
             fastest_mps: libm::fmaxf(nominal_mps, MAX_LANDING_MPS),
-            reckoned_mps: nominal_mps * RECKONED_SPEED_SHARE,
-            edge_m: f32::INFINITY,
+            assumed_speed_mps: nominal_mps * RECKONED_SPEED_SHARE,
+            range_edge_m: f32::INFINITY,
             place: Point::zeros(),
             relay_next: 0,
             own_rank: 0,
             fleet: None,
             ground: None,
             down: DOWN_AFTER,
-            stray_m: 0.0,
+            pair_position_error_m: 0.0,
             roster_next: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {
@@ -94,7 +94,7 @@ impl<const V: usize> Neighbours<V> {
                 table.own_rank = rank as u16;
             } else {
                 // A roster of at most V entries fits.
-                let _ = table.add(entry.system_id, rank as u16);
+                let _ = table.add_contact(entry.system_id, rank as u16);
             }
         }
         table.roster = table.contacts.len();
@@ -104,28 +104,30 @@ impl<const V: usize> Neighbours<V> {
     /// The own place now, and how far the radio reaches, metres.
     pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
         let all = radio_range_m >= REACHES_ALL_M;
-        self.edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
+        self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
         self.place = place;
     }
 
     /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the radio may not reach: no
     /// radio has failed.
-    pub(crate) fn all_beyond(&self) -> bool {
-        let beyond = |c: &Contact| c.at_edge || c.position_at.is_none() || c.tells(LANDED | OUT_OF_PLAN);
-        self.edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
+    pub(crate) fn are_all_out_of_range(&self) -> bool {
+        let beyond = |c: &NeighbourEntry| {
+            c.at_range_edge || c.position_at.is_none() || c.has_flag(LANDED | OUT_OF_PLAN)
+        };
+        self.range_edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
     }
 
-    /// The own place in the roster.
+    /// Rank of this vehicle in the roster.
     pub(crate) fn own_rank(&self) -> u16 {
         self.own_rank
     }
 
-    /// Vehicles that found no slot, by frames.
-    pub fn dropped(&self) -> u32 {
+    /// Number of frames from vehicles for which the table had no slot.
+    pub fn dropped_count(&self) -> u32 {
         self.dropped
     }
 
-    fn add(&mut self, id: u8, rank: u16) -> Option<usize> {
+    fn add_contact(&mut self, id: u8, rank: u16) -> Option<usize> {
         let state = Neighbour {
             id,
             rank,
@@ -134,10 +136,10 @@ impl<const V: usize> Neighbours<V> {
             age_s: 0.0,
             progress_m: None,
             grounded: false,
-            out: false,
+            out_of_plan: false,
             detours: false,
         };
-        let contact = Contact {
+        let contact = NeighbourEntry {
             id,
             rank,
             sequence: SequenceFilter::default(),
@@ -145,32 +147,32 @@ impl<const V: usize> Neighbours<V> {
             position_at: None,
             boot_ms: 0,
             flags: 0,
-            out_at: None,
+            out_since: None,
             hears_us_at: None,
-            hears: 0,
+            heard_bits: 0,
             relayed_m: None,
             relayed_at: None,
             intent_sequence: 0,
-            late: Lateness::default(),
-            belongs_at: None,
+            message_delay: MessageDelay::default(),
+            intent_at: None,
             points: Vec::new(),
-            beyond: 0,
-            joint: Joint::Unknown,
+            first_unheard_point: 0,
+            place_on_points: PlaceOnPoints::Unknown,
             extent_m: 0.0,
-            way_m: -1.0,
-            column: false,
-            clear_m: f32::NEG_INFINITY,
-            clear_in_s: 0,
-            at_edge: false,
-            reckoned_mps: self.reckoned_mps,
-            floor_m: f32::NAN,
+            unheard_way_m: -1.0,
+            may_come_down: false,
+            gates_open_up_to_m: f32::NEG_INFINITY,
+            gates_open_in_s: 0,
+            at_range_edge: false,
+            assumed_speed_mps: self.assumed_speed_mps,
+            ground_m: f32::NAN,
             speed_mps: 0.0,
             shares_plan: false,
             other_plan: false,
             moved_at: Instant::ZERO,
             furthest: None,
             pad: None,
-            avoided: NO_PLACE,
+            avoided_at: NO_PLACE,
             state,
         };
         self.contacts.push(contact).ok()?;
@@ -178,22 +180,22 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Rank in the roster of a vehicle whose intents are of our mission.
-    fn member(&self, id: u8, now: Instant) -> Option<usize> {
-        let at = self.in_roster(id)?;
-        self.contacts[at].belongs_at.is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME).then_some(at)
+    fn roster_rank(&self, id: u8, now: Instant) -> Option<usize> {
+        let at = self.roster_index(id)?;
+        self.contacts[at].intent_at.is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME).then_some(at)
     }
 
-    fn in_roster(&self, id: u8) -> Option<usize> {
+    fn roster_index(&self, id: u8) -> Option<usize> {
         self.contacts[..self.roster].binary_search_by_key(&id, |c| c.id).ok()
     }
 
-    fn stranger(&self, id: u8) -> Option<usize> {
+    fn stranger_index(&self, id: u8) -> Option<usize> {
         let strangers = &self.contacts[self.roster..];
         strangers.iter().position(|c| c.id == id).map(|at| at + self.roster)
     }
 
-    /// Forgets strangers that do not meet the condition.
-    fn keep_strangers(&mut self, mut keep: impl FnMut(&Contact) -> bool) {
+    /// Removes the strangers that do not meet the condition.
+    fn retain_strangers(&mut self, mut keep: impl FnMut(&NeighbourEntry) -> bool) {
         let mut at = self.roster;
         while let Some(contact) = self.contacts.get(at) {
             if keep(contact) {
@@ -205,13 +207,13 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// The slot of a position's sender: that of the roster, or a stranger's, made if there is room.
-    fn placed(&mut self, id: u8, now: Instant) -> Option<&mut Contact> {
-        if let Some(at) = self.member(id, now).or_else(|| self.stranger(id)) {
+    fn slot_for_position(&mut self, id: u8, now: Instant) -> Option<&mut NeighbourEntry> {
+        if let Some(at) = self.roster_rank(id, now).or_else(|| self.stranger_index(id)) {
             return self.contacts.get_mut(at);
         }
-        self.keep_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
+        self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
         let room = self.contacts.len() - self.roster < MAX_STRANGERS;
-        match Some(id).filter(|_| room).and_then(|id| self.add(id, STRANGER_RANK)) {
+        match Some(id).filter(|_| room).and_then(|id| self.add_contact(id, STRANGER_RANK)) {
             Some(at) => self.contacts.get_mut(at),
             None => {
                 self.dropped = self.dropped.wrapping_add(1);
@@ -222,8 +224,8 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that decodes and is of our mission:
     /// what anybody can send must not make the next true one look late. Positions carry their time instead.
-    pub fn accept(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
-        self.in_roster(id).is_some_and(|at| {
+    pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
+        self.roster_index(id).is_some_and(|at| {
             let contact = &mut self.contacts[at];
             let fresh = contact.sequence.accept(sequence, now);
             if fresh {
@@ -246,8 +248,8 @@ impl<const V: usize> Neighbours<V> {
             lon_deg: f64::from(data.lon) * 1e-7,
             alt_m: f64::from(data.alt) * 1e-3,
         };
-        let (own, edge_m) = (self.place, self.edge_m);
-        let Some(contact) = self.placed(id, now) else { return };
+        let (own, edge_m) = (self.place, self.range_edge_m);
+        let Some(contact) = self.slot_for_position(id, now) else { return };
         let behind = contact.boot_ms.wrapping_sub(data.time_boot_ms);
         if !place.is_valid() || (contact.position_at.is_some() && behind < RESTART_MS) {
             return;
@@ -256,8 +258,8 @@ impl<const V: usize> Neighbours<V> {
         contact.heard_at = Some(now);
         contact.position_at = Some(now);
         contact.state.position = frames::geodetic_to_enu(origin, &place);
-        contact.join();
-        contact.at_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
+        contact.update_place_on_points();
+        contact.at_range_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
         contact.speed_mps = contact.state.velocity.norm();
@@ -276,50 +278,54 @@ impl<const V: usize> Neighbours<V> {
         mission_crc: u32,
         plan_crc: Option<u32>,
     ) {
-        let Some(at) = self.in_roster(intent.system_id).filter(|_| intent.mission_crc == mission_crc) else {
+        let Some(at) = self.roster_index(intent.system_id).filter(|_| intent.mission_crc == mission_crc)
+        else {
             return;
         };
         // The vehicle is no stranger.
-        self.keep_strangers(|c| c.id != intent.system_id);
+        self.retain_strangers(|c| c.id != intent.system_id);
         let contact = &mut self.contacts[at];
         contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
         let on_plan = intent.flags & ON_PLAN != 0;
         let shared = on_plan && contact.shares_plan;
         let follows = on_plan && intent.flags & LANDED == 0 && intent.plan_crc != 0;
         contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
-        (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
+        (contact.heard_at, contact.intent_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
-        if contact.tells(GROUNDED) && !contact.tells(LANDED | OUT_OF_PLAN) && contact.position_at.is_some() {
+        if contact.has_flag(GROUNDED)
+            && !contact.has_flag(LANDED | OUT_OF_PLAN)
+            && contact.position_at.is_some()
+        {
             contact.pad = Some(contact.state.position);
         }
-        let out = contact.tells(OUT_OF_PLAN) && contact.position_at.is_some();
-        contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
+        let out = contact.has_flag(OUT_OF_PLAN) && contact.position_at.is_some();
+        contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
         // Ranks beyond the bitmap are not reported.
-        if rank >= 32 || intent.heard & (1 << rank) != 0 {
+        if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
         }
-        contact.hears = intent.heard;
+        contact.heard_bits = intent.heard_bits;
         contact.points.clone_from(&intent.points);
         let most = intent.points.len().saturating_sub(1) as u8;
-        contact.beyond = intent.beyond.min(most);
-        contact.way_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
+        contact.first_unheard_point = intent.first_unheard_point.min(most);
+        contact.unheard_way_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
-        contact.extent_m = libm::sqrtf(contact.near().iter().fold(0.0, most));
-        contact.join();
-        (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
-        contact.clear_m = if shared { intent.clear_m } else { f32::NEG_INFINITY };
-        contact.clear_in_s = intent.clear_in_s;
+        contact.extent_m = libm::sqrtf(contact.points_for_now().iter().fold(0.0, most));
+        contact.update_place_on_points();
+        (contact.may_come_down, contact.ground_m) = (intent.may_come_down, intent.ground_m);
+        contact.gates_open_up_to_m = if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };
+        contact.gates_open_in_s = intent.gates_open_in_s;
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m =
-            shared.then(|| contact.believed_m(intent.progress_m, self.fastest_mps, now));
+            shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was looked at
-    /// whether it blocks the path ([`Self::found_clear`]).
-    pub fn at(&mut self, now: Instant) -> &[Neighbour] {
+    /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was checked
+    /// whether it blocks the path ([`Self::mark_path_clear`]).
+    pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
-        self.keep_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
+        self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
         for contact in &self.contacts {
             let progress_m = contact.passed_m(now);
             let placed_at = contact.position_at;
@@ -330,12 +336,12 @@ impl<const V: usize> Neighbours<V> {
             let state = Neighbour {
                 // Of a vehicle that was never heard itself only the progress is known.
                 position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
-                age_s: placed_at.map_or(0.0, |at| (now - at).secs_f32()),
+                age_s: placed_at.map_or(0.0, |at| (now - at).as_secs_f32()),
                 rank: contact.rank,
                 progress_m,
                 grounded: contact.state.grounded || dead,
-                out: contact.out_at.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: contact.tells(ON_DETOUR),
+                out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
+                detours: contact.has_flag(ON_DETOUR),
                 ..contact.state
             };
             // Cannot overflow: there are as many slots as contacts.
@@ -346,26 +352,26 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether `gate` is open for good: its vehicle has come past it, or is out of the plan.
     pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
-        let contact = self.in_roster(gate.id).map(|at| &self.contacts[at]);
+        let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
         contact.is_some_and(|c| {
             let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
-            passed || c.out_at.is_some_and(|since| since <= self.clear_at) || c.is_dead(self.clear_at)
+            passed || c.out_since.is_some_and(|since| since <= self.clear_at) || c.is_dead(self.clear_at)
         })
     }
 
-    /// Seconds until `gate` is open for sure, whoever is heard until then; none where that is not known.
-    pub(crate) fn passes_in_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
+    /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where that is unknown.
+    pub(crate) fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
         if self.has_passed(gate, now) {
             return Some(0.0);
         }
-        self.contacts[self.in_roster(gate.id)?].passes_in_s(gate.until_m, now)
+        self.contacts[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)
     }
 
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
-    pub(crate) fn all_down(&self, now: Instant) -> bool {
+    pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster]
             .iter()
-            .all(|c| c.tells(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
+            .all(|c| c.has_flag(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster counts as dead, but not yet as one that lies.
@@ -373,73 +379,75 @@ impl<const V: usize> Neighbours<V> {
         let roster = &self.contacts[..self.roster];
         roster
             .iter()
-            .any(|c| !c.tells(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down))
+            .any(|c| !c.has_flag(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster has landed, or is out of the plan.
-    pub(crate) fn rests(&self, id: u8, now: Instant) -> bool {
-        self.in_roster(id).is_some_and(|at| self.contacts[at].tells(LANDED) || self.contacts[at].is_out(now))
+    pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
+        self.roster_index(id)
+            .is_some_and(|at| self.contacts[at].has_flag(LANDED) || self.contacts[at].is_out_of_plan(now))
     }
 
     /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
-        let waits =
-            |c: &Contact| c.heard_at.is_none() || (c.tells(GROUNDED) && !c.tells(LANDED | OUT_OF_PLAN));
-        self.in_roster(id).is_some_and(|at| waits(&self.contacts[at]))
+        let waits = |c: &NeighbourEntry| {
+            c.heard_at.is_none() || (c.has_flag(GROUNDED) && !c.has_flag(LANDED | OUT_OF_PLAN))
+        };
+        self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
     }
 
-    /// How late the messages of `id` are.
-    pub(crate) fn lateness(&mut self, id: u8) -> Option<&mut Lateness> {
-        let at = self.in_roster(id)?;
-        Some(&mut self.contacts[at].late)
+    /// Delay estimate of the messages from `id`.
+    pub(crate) fn message_delay(&mut self, id: u8) -> Option<&mut MessageDelay> {
+        let at = self.roster_index(id)?;
+        Some(&mut self.contacts[at].message_delay)
     }
 
-    /// How late the messages of those that are heard are at most, seconds.
-    pub(crate) fn latest_s(&self) -> f32 {
-        self.contacts[..self.roster].iter().fold(0.0, |most, c| libm::fmaxf(most, c.late.delay_s))
+    /// Greatest message delay of all vehicles that are heard, seconds.
+    pub(crate) fn max_message_delay_s(&self) -> f32 {
+        self.contacts[..self.roster].iter().fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
     }
 
-    /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
+    /// Whether no vehicle of the roster is heard: then this vehicle's own radio is assumed faulty.
     #[inline(never)]
-    pub(crate) fn is_deaf(&self, now: Instant) -> bool {
+    pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
         self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
     /// The echo of one neighbour's last intent, of each in turn.
-    pub(crate) fn echo(&self, turn: usize, now: Instant) -> Option<Echo> {
+    pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
         let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
-        Echo::new(contact.rank, contact.intent_sequence, now - contact.belongs_at?)
+        IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
     }
 
-    /// Whom we heard lately, a bit for each rank.
+    /// Vehicles heard lately, one bit for each rank.
     pub fn heard_bits(&self, now: Instant) -> u32 {
         let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
         heard.fold(0, |bits, c| bits | 1 << c.rank)
     }
 
     /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand and wait.
-    pub fn all_wait(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.waits(now))
+    pub fn are_all_waiting(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.is_waiting(now))
     }
 
-    /// As [`Self::all_wait`], but some vehicles may have claimed the turn for a detour.
-    pub fn all_stand(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.waits(now) || c.claims(now))
+    /// As [`Self::are_all_waiting`], but some vehicles may have claimed the turn for a detour.
+    pub fn are_all_standing(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
     }
 
     /// Whether a vehicle with a lower system id than `id` claims the turn to fly around.
-    pub fn claimed_before(&self, id: u8, now: Instant) -> bool {
-        self.contacts.iter().any(|c| c.id < id && c.claims(now))
+    pub fn is_turn_claimed_before(&self, id: u8, now: Instant) -> bool {
+        self.contacts.iter().any(|c| c.id < id && c.claims_turn(now))
     }
 
     /// Number of blocked vehicles that have a lower system id than `id`.
-    pub fn blocked_before(&self, id: u8) -> u64 {
-        self.contacts.iter().filter(|c| c.id < id && c.tells(BLOCKED)).count() as u64
+    pub fn blocked_count_before(&self, id: u8) -> u64 {
+        self.contacts.iter().filter(|c| c.id < id && c.has_flag(BLOCKED)).count() as u64
     }
 
     /// Whether a vehicle of this id is heard to follow the shared plan, or is none that is known.
     pub(crate) fn follows_plan(&self, id: u8) -> bool {
-        self.contacts.iter().find(|c| c.state.id == id).is_none_or(Contact::on_plan)
+        self.contacts.iter().find(|c| c.state.id == id).is_none_or(NeighbourEntry::on_plan)
     }
 
     /// Number of contacts.
@@ -447,7 +455,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.len()
     }
 
-    /// Whether there are none.
+    /// Whether the table has no entry.
     pub fn is_empty(&self) -> bool {
         self.contacts.is_empty()
     }
@@ -457,9 +465,9 @@ impl<const V: usize> Neighbours<V> {
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
         for contact in &mut self.contacts {
-            (contact.avoided, contact.furthest) = (NO_PLACE, None);
+            (contact.avoided_at, contact.furthest) = (NO_PLACE, None);
             (contact.relayed_m, contact.relayed_at) = (None, None);
-            contact.clear_m = f32::NEG_INFINITY;
+            contact.gates_open_up_to_m = f32::NEG_INFINITY;
         }
     }
 
@@ -471,14 +479,14 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether every other vehicle of the roster reported that it has landed or is out; true where there is none.
-    pub fn all_rest(&self) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT_OF_PLAN))
+    pub fn are_all_at_rest(&self) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.has_flag(LANDED | OUT_OF_PLAN))
     }
 
     /// Time since any neighbour of the roster was heard, or since one reported that it hears us, whichever is longer; zero when
     /// all of them have landed or are out, or there are none. Where neither ever was, the time since `since`.
-    pub fn silence(&self, now: Instant, since: Instant) -> Duration {
-        if self.all_rest() {
+    pub fn silence_duration(&self, now: Instant, since: Instant) -> Duration {
+        if self.are_all_at_rest() {
             return Duration::default();
         }
         let others = || self.contacts[..self.roster].iter();

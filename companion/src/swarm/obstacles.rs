@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{KeepOff, Nature};
+use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::frames::{self, Geodetic};
 
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
@@ -15,10 +15,10 @@ pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
 /// obstacle revokes it.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
-/// Obstacles that were not on the map, and for how many of them a way around was planned.
+/// Obstacles that were not on the map, and for how many of them a detour was planned.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Obstacles {
-    known: Vec<KeepOff, MAX_OBSTACLES>,
+    known: Vec<KeepOutZone, MAX_OBSTACLES>,
     avoided: usize,
     /// Number of obstacles known when a detour was last requested: the detour does not avoid those
     /// that came later.
@@ -32,7 +32,7 @@ impl Obstacles {
     }
 
     /// Forgets the obstacle at this place.
-    fn revoke(&mut self, centre: &Point) {
+    fn remove_at(&mut self, centre: &Point) {
         while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_OBSTACLE_M) {
             self.known.remove(at);
             self.avoided -= usize::from(at < self.avoided);
@@ -43,7 +43,7 @@ impl Obstacles {
     /// Takes an obstacle that is not on the map, ENU about `origin`: its centre, and its radius, to which the required clearance is
     /// added; a radius that is not above zero revokes the one at
     /// that place. It stays until revoked, or until the companion starts again: a wall does not go away by itself.
-    pub(crate) fn take(&mut self, command: &Command, origin: &Geodetic, clearance_m: f32) -> u8 {
+    pub(crate) fn handle_command(&mut self, command: &Command, origin: &Geodetic, clearance_m: f32) -> u8 {
         let Some((lat, lon, alt_m)) = command.place else { return DENIED };
         let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
         let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
@@ -52,27 +52,27 @@ impl Obstacles {
         }
         let centre = frames::geodetic_to_enu(origin, &place);
         if command.param1 <= 0.0 {
-            self.revoke(&centre);
+            self.remove_at(&centre);
             return ACCEPTED;
         }
         let radius_m = command.param1 + clearance_m;
-        let told = |o: &KeepOff| (o.from - centre).norm() < SAME_OBSTACLE_M && o.radius_m >= radius_m;
+        let told = |o: &KeepOutZone| (o.from - centre).norm() < SAME_OBSTACLE_M && o.radius_m >= radius_m;
         if self.known.iter().any(told) {
             return ACCEPTED;
         }
-        match self.known.push(KeepOff { from: centre, to: centre, radius_m, nature: Nature::Solid }) {
+        match self.known.push(KeepOutZone { from: centre, to: centre, radius_m, kind: ZoneKind::Static }) {
             Ok(()) => ACCEPTED,
             Err(_) => TEMPORARILY_REJECTED,
         }
     }
 
-    /// All of them.
-    pub(crate) fn known(&self) -> &[KeepOff] {
+    /// All reported obstacles.
+    pub(crate) fn all(&self) -> &[KeepOutZone] {
         &self.known
     }
 
     /// Obstacles that no detour was planned around.
-    pub(crate) fn new_ones(&self) -> &[KeepOff] {
+    pub(crate) fn new_ones(&self) -> &[KeepOutZone] {
         &self.known[self.avoided..]
     }
 
@@ -81,8 +81,8 @@ impl Obstacles {
         self.avoided = 0;
     }
 
-    /// A way around those known now is requested.
-    pub(crate) fn request(&mut self) {
+    /// Notes that a detour around all obstacles known now is requested.
+    pub(crate) fn mark_requested(&mut self) {
         self.requested = self.known.len();
     }
 

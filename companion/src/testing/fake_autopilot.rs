@@ -11,15 +11,15 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::coverage::around;
 use planner_core::coverage::transit::Transit;
-use planner_core::detour::{DetourRequest, Goal, KeepOff};
+use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::frames::{self, Geodetic};
 
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::autopilot::px4;
 use crate::link::frame::{self, Frame, Framer, Header, MAX_FRAME_LEN};
 use crate::link::intent;
-use crate::{Companion, Config, Duration, Event, Instant, Link, Wanted};
+use crate::{Companion, Config, Duration, Event, Instant, Link, PlanKind};
 
 mod commands;
 mod flight;
@@ -37,7 +37,7 @@ pub const GATES: usize = 8;
 
 /// The autopilot, the radio's other end, and the companion between them.
 pub struct Bench {
-    pub kind: Kind,
+    pub kind: AutopilotKind,
     /// ArduCopter: message ids whose streams were asked for.
     pub streams: Vec<u16>,
     /// ArduCopter: flags of EKF_STATUS_REPORT.
@@ -61,7 +61,7 @@ pub struct Bench {
     pub mute: bool,
     /// SYS_STATUS does not come.
     pub no_battery: bool,
-    /// The landing detector says ground, whatever the height.
+    /// The landing detector reports ground, whatever the height.
     pub false_ground: bool,
     /// Vertical speed as reported, m/s.
     pub climbs_mps: f32,
@@ -99,7 +99,7 @@ pub struct Bench {
     idle_since: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<Plan, crate::PlanFailure>>,
-    /// Whether there is a way around: by y = 16; over a field as planned.
+    /// Whether there is a detour: by y = 16; over a field as planned.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
@@ -118,7 +118,7 @@ pub struct Bench {
 impl Bench {
     pub fn new(config: Config<4>) -> Self {
         Self {
-            kind: Kind::Px4,
+            kind: AutopilotKind::Px4,
             streams: Vec::new(),
             ekf_flags: 0x33F,
             took_off: false,
@@ -233,18 +233,24 @@ impl Bench {
         }
         while let Some(event) = self.companion.poll_event() {
             self.events.push(event);
-            if event == Event::PlanRequested(Wanted::Division) {
+            if event == Event::PlanRequested(PlanKind::Division) {
                 self.divide();
             } else if let Some((request, mut obstacles)) = self.requested() {
-                if !self.companion.detours.beside.flies() {
+                if !self.companion.detours.field_detour.is_flying() {
                     self.own_plan = self.companion.mission.plan().cloned();
                 }
                 let answer = self.answer_detour.map(|answer| {
                     answer.and_then(|()| {
                         let mut path = Path::new();
                         if matches!(request.goal, Goal::Home { .. }) {
-                            around::plan(&Transit::<1>::empty(), None, &request, &mut obstacles, &mut path)
-                                .map_err(|_| crate::PlanFailure::Unreachable)?;
+                            around::plan_detour(
+                                &Transit::<1>::empty(),
+                                None,
+                                &request,
+                                &mut obstacles,
+                                &mut path,
+                            )
+                            .map_err(|_| crate::PlanFailure::Unreachable)?;
                             return Ok(VehiclePlan { path, descent_m: request.descent_m, ..plan() });
                         }
                         path.push(request.here, 1.2).unwrap();
@@ -265,26 +271,26 @@ impl Bench {
     }
 
     /// The detour that the vehicle requests.
-    fn requested(&self) -> Option<(DetourRequest, Vec<KeepOff>)> {
+    fn requested(&self) -> Option<(DetourRequest, Vec<KeepOutZone>)> {
         let mut obstacles = Vec::new();
-        let request = self.companion.detour(|obstacle| obstacles.push(obstacle))?;
+        let request = self.companion.detour_request(|obstacle| obstacles.push(obstacle))?;
         Some((request, obstacles))
     }
 
     /// Gives it all that is left: the rest of its path from where it holds.
     fn divide(&mut self) {
         if self.undividable {
-            self.companion.handle_plan(self.now, Wanted::Division, Err(crate::PlanFailure::Capacity));
+            self.companion.handle_plan(self.now, PlanKind::Division, Err(crate::PlanFailure::Capacity));
             return;
         }
-        let rank = usize::from(self.companion.config.own().expect("it is in the roster").0);
+        let rank = usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
-        // Beside its path its plan is the way around.
-        let own = self.own_plan.take_if(|_| self.companion.detours.beside.flies());
+        // Beside its path its plan is the detour.
+        let own = self.own_plan.take_if(|_| self.companion.detours.field_detour.is_flying());
         let plan = own.clone().or_else(|| self.companion.mission.plan().cloned());
         let Some(mut plan) = plan.filter(|_| self.answer_division) else { return };
         if own.is_some() {
-            self.companion.handle_plan(self.now, Wanted::Division, Ok(&plan));
+            self.companion.handle_plan(self.now, PlanKind::Division, Ok(&plan));
             return;
         }
         let held_m = f32::from(held_dm) / 10.0;
@@ -294,12 +300,12 @@ impl Bench {
             path.push(waypoint.position, 1.2).unwrap();
         }
         (plan.path, plan.climb_m, plan.plan_crc) = (path, 0.0, plan.plan_crc + 1);
-        self.companion.handle_plan(self.now, Wanted::Division, Ok(&plan));
+        self.companion.handle_plan(self.now, PlanKind::Division, Ok(&plan));
     }
 
     /// An ArduCopter that has just booted.
     pub fn ardupilot(config: Config<4>) -> Self {
-        Self { kind: Kind::ArduPilot, mode: 0, ..Self::new(config) }
+        Self { kind: AutopilotKind::ArduPilot, mode: 0, ..Self::new(config) }
     }
 
     /// 50 ms of flight and telemetry.

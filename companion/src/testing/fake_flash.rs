@@ -15,14 +15,14 @@ use planner_core::schedule::ScheduleConfig;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-use crate::storage::mission_file::{self, Block, MissionHeader, MissionVehicle};
+use crate::storage::mission_file::{self, MissionBlock, MissionHeader, MissionVehicle};
 use crate::storage::store::{
-    Erasing, Fault, FlashRequest, Layout, MAX_PROGRAM, MAX_READ, ReadFlash, Store, WORD,
+    ErasePermission, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM, MAX_READ, ReadFlash, Store, WORD,
 };
 
 /// Layout like the H743's bank, but smaller, so that many cuts are tried in little time.
-pub const LAYOUT: Layout =
-    Layout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
+pub const LAYOUT: FlashLayout =
+    FlashLayout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
 
 /// The power went.
@@ -114,10 +114,10 @@ impl Flash {
 }
 
 impl ReadFlash for Flash {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
         let (start, end) = (at as usize, at as usize + out.len());
         if (start / WORD..end.div_ceil(WORD)).any(|word| self.torn.contains(&(word as u32))) {
-            return Err(Fault);
+            return Err(FlashFault);
         }
         out.copy_from_slice(&self.bytes[start..end]);
         Ok(())
@@ -128,12 +128,12 @@ impl ReadFlash for Flash {
 pub fn obey(
     flash: &mut Flash,
     request: FlashRequest<'_>,
-    erasing: Erasing,
+    erasing: ErasePermission,
     read: &mut [u8; MAX_READ],
-) -> Result<Result<usize, Fault>, Cut> {
+) -> Result<Result<usize, FlashFault>, Cut> {
     match request {
         FlashRequest::Erase { at } => {
-            assert_eq!(erasing, Erasing::Allowed, "erased while armed");
+            assert_eq!(erasing, ErasePermission::Allowed, "erased while armed");
             flash.erase(at)?;
             Ok(Ok(0))
         }
@@ -149,12 +149,12 @@ pub fn obey(
 }
 
 /// Does what the store asks until it asks for nothing.
-pub fn run(store: &mut Store, flash: &mut Flash, erasing: Erasing) -> Result<(), Cut> {
+pub fn run(store: &mut Store, flash: &mut Flash, erasing: ErasePermission) -> Result<(), Cut> {
     let mut read = [0; MAX_READ];
     for _ in 0..100_000 {
-        let Some(request) = store.poll(erasing) else { return Ok(()) };
+        let Some(request) = store.poll_request(erasing) else { return Ok(()) };
         let outcome = obey(flash, request, erasing, &mut read)?;
-        store.handle(outcome.map(|len| &read[..len]));
+        store.handle_outcome(outcome.map(|len| &read[..len]));
     }
     panic!("it asks for ever");
 }
@@ -162,7 +162,7 @@ pub fn run(store: &mut Store, flash: &mut Flash, erasing: Erasing) -> Result<(),
 /// Tidies the flash up as a board that stands idle does.
 pub fn started(flash: &mut Flash) -> Store {
     let mut store = Store::mount(LAYOUT, flash);
-    run(&mut store, flash, Erasing::Allowed).expect("the power is on");
+    run(&mut store, flash, ErasePermission::Allowed).expect("the power is on");
     store
 }
 
@@ -208,7 +208,7 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
         .map(|id| MissionVehicle { task: task(id), start, radius_m: 0.3, speed_max_mps: 5.0 })
         .collect();
     let mut bytes = vec![0; mission_file::encoded_len(roster.len(), 0)];
-    mission_file::write(&header, &roster, &Block::Goals(&[]), &mut bytes).unwrap();
+    mission_file::write_mission(&header, &roster, &MissionBlock::Goals(&[]), &mut bytes).unwrap();
     bytes
 }
 

@@ -7,12 +7,12 @@ use core::cell::Cell;
 
 use critical_section::Mutex;
 use firmware::boards::stack;
-use firmware::calls::limits::{self, Answers, Listener};
-use firmware::calls::limits_routes::{self, Lent};
+use firmware::calls::limits::{self, CallListener, ResultChecksum};
+use firmware::calls::limits_routes::{self, RouteWorkspaces};
 use semihosting::println;
 use static_cell::ConstStaticCell;
 
-static LENT: ConstStaticCell<Lent> = ConstStaticCell::new(Lent::new());
+static LENT: ConstStaticCell<RouteWorkspaces> = ConstStaticCell::new(RouteWorkspaces::new());
 /// The call under way.
 static CALL: Mutex<Cell<&str>> = Mutex::new(Cell::new("none"));
 
@@ -23,9 +23,9 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 }
 
 /// Counts calls, and keeps the name of the last.
-struct Calls(usize);
+struct CallCounter(usize);
 
-impl Listener for Calls {
+impl CallListener for CallCounter {
     fn next(&mut self, name: &'static str) {
         self.0 += 1;
         critical_section::with(|cs| CALL.borrow(cs).set(name));
@@ -34,12 +34,12 @@ impl Listener for Calls {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let mut calls = Calls(0);
-    let mut answers = Answers::new(&mut calls);
-    limits::places(&mut answers);
+    let mut calls = CallCounter(0);
+    let mut answers = ResultChecksum::new(&mut calls);
+    limits::call_without_roadmap(&mut answers);
     let places = answers.sum();
-    let routes = limits_routes::routes(&mut answers, LENT.take());
+    let routes = limits_routes::call_all(&mut answers, LENT.take());
     println!("limits {} {places:08x} {routes:08x?}", calls.0);
-    println!("stack {} {}", stack::used(), stack::size());
+    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }

@@ -9,7 +9,7 @@ use firmware::boards::chosen::{clock, memory};
 use firmware::boards::stack;
 use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use firmware::cases::{self, StepCase};
-use firmware::scratch::{Planner, Scratch};
+use firmware::scratch::{Planner, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::deconflict::Method;
 use planner_core::plan::{self, Goals, SwarmPlan};
@@ -23,7 +23,7 @@ use static_cell::ConstStaticCell;
 
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static PLAN: ConstStaticCell<Plan> = ConstStaticCell::new(Plan::new());
 static CASES: ConstStaticCell<cases::Workspace> = ConstStaticCell::new(cases::Workspace::new());
 
@@ -36,53 +36,59 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     clock::start();
-    let view = counted("parse", || RoadmapView::parse(memory::bank2())).expect("a roadmap lies in bank 2");
+    let view = print_instructions("parse", || RoadmapView::parse(memory::bank2()))
+        .expect("a roadmap lies in bank 2");
     println!("roadmap {} {} {:08x}", view.node_count(), view.half_edge_count(), view.crc());
     let scratch = SCRATCH.take();
-    plan_swarm(&view, scratch.planner());
-    steps();
-    build(scratch, 0.0);
-    build(scratch, cases::CLEARANCE_M);
+    measure_plan(&view, scratch.planner());
+    measure_steps();
+    measure_build(scratch, 0.0);
+    measure_build(scratch, cases::CLEARANCE_M);
     let ws = CASES.take();
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, ws);
         let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
         println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
     }
-    println!("stack {} {}", stack::used(), stack::size());
+    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }
 
 /// Instructions that the work takes, those of asking the clock left out.
-fn instructions<T>(work: impl FnOnce() -> T) -> (T, u64) {
+fn count_instructions<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let idle = clock::instructions();
     let before = clock::instructions();
     let result = black_box(work());
     (result, (clock::instructions() - before).saturating_sub(before - idle))
 }
 
-fn counted<T>(name: &str, work: impl FnOnce() -> T) -> T {
-    let (result, count) = instructions(work);
+fn print_instructions<T>(name: &str, work: impl FnOnce() -> T) -> T {
+    let (result, count) = count_instructions(work);
     println!("count {name} {count}");
     result
 }
 
 /// The plan of a swarm of ten, step by step.
-fn plan_swarm(view: &RoadmapView<'_>, ws: &mut Planner) {
+fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
     let plan = PLAN.take();
-    let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
-    let request = cases::request(&vehicles, &descents_m);
+    let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
+    let request = cases::plan_request(&vehicles, &descents_m);
     let mut goals = Goals::new();
-    counted("costs", || plan::costs(view, &request, ws)).expect("a cost matrix");
-    counted("assign", || plan::assign(&request, ws, &mut goals)).expect("an assignment");
-    counted("paths", || paths(view, &goals, &mut ws.search));
-    counted("schedule", || plan::schedule(view, &request, &goals, ws, plan)).expect("a schedule");
+    print_instructions("costs", || plan::compute_costs(view, &request, ws)).expect("a cost matrix");
+    print_instructions("assign", || plan::assign_goals(&request, ws, &mut goals)).expect("an assignment");
+    print_instructions("paths", || measure_paths(view, &goals, &mut ws.search));
+    print_instructions("schedule", || plan::schedule_flights(view, &request, &goals, ws, plan))
+        .expect("a schedule");
     println!("plan {:08x}", plan.crc);
 }
 
 /// The shortest path of each vehicle to its goal.
-fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWorkspace<ROADMAP_NODES>) {
-    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+fn measure_paths(
+    view: &RoadmapView<'_>,
+    goals: &Goals<VEHICLES>,
+    search: &mut SearchWorkspace<ROADMAP_NODES>,
+) {
+    let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
     for (start, goal) in (0u16..).zip(goals) {
         let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
         let target = view.header().starts + goal.expect("every vehicle has a goal");
@@ -92,12 +98,12 @@ fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWor
 }
 
 /// One step of advice among 32 neighbours; the worst of many.
-fn steps() {
+fn measure_steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);
     for number in 0..cases::STEP_CASES {
         let case = StepCase::new(&mut rng, VEHICLES, number % 2 == 0);
-        let (_, count) = instructions(|| black_box(&case).advise(Method::Priority));
+        let (_, count) = count_instructions(|| black_box(&case).advise(Method::Priority));
         worst = worst.max(count);
         sum += count;
     }
@@ -106,13 +112,13 @@ fn steps() {
 }
 
 /// A roadmap built from the map.
-fn build(scratch: &mut Scratch, clearance_m: f32) {
-    let (head, words) = memory::map();
-    let grid = cases::map(&head, words);
+fn measure_build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
+    let (head, words) = memory::measurement_map();
+    let grid = cases::voxel_map(&head, words);
     let builder = scratch.builder();
     let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
     let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };
-    counted(name, || builder.build(&grid, &[], &config)).expect("a roadmap");
+    print_instructions(name, || builder.build(&grid, &[], &config)).expect("a roadmap");
     let (nodes, edges) = (builder.nodes(), builder.edges());
     println!("{name} {} {} {:08x}", nodes.len(), edges.len(), cases::roadmap_crc(nodes, edges));
 }

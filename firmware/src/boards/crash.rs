@@ -11,70 +11,70 @@ use heapless::String;
 
 use super::{chosen, stack};
 use crate::chips::{ResetCause, fault};
-use crate::kept::{Kept, RECORD_WORDS, TEXT, Work};
+use crate::kept::{CrashRecord, FileWork, RECORD_WORDS, TEXT};
 
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();
 
 /// Reads the kept record. Interrupts are off: tasks and the end of the program use it.
-fn read() -> Option<Kept> {
+fn read_record() -> Option<CrashRecord> {
     // SAFETY: nobody else runs, and any bytes are words.
-    Kept::from_words(&unsafe { (&raw const RECORD).cast::<[u32; RECORD_WORDS]>().read_volatile() })
+    CrashRecord::from_words(&unsafe { (&raw const RECORD).cast::<[u32; RECORD_WORDS]>().read_volatile() })
 }
 
-fn write(kept: &Kept) {
+fn write_record(kept: &CrashRecord) {
     // SAFETY: as above.
     unsafe { (&raw mut RECORD).cast::<[u32; RECORD_WORDS]>().write_volatile(kept.to_words()) };
 }
 
 /// Changes what is kept.
-fn change<T>(change: impl FnOnce(&mut Kept) -> T) -> T {
+fn update_record<T>(change: impl FnOnce(&mut CrashRecord) -> T) -> T {
     critical_section::with(|_| {
-        let mut kept = read().unwrap_or_default();
+        let mut kept = read_record().unwrap_or_default();
         let result = change(&mut kept);
-        write(&kept);
+        write_record(&kept);
         result
     })
 }
 
 /// Text that the last start left, once; none after the power came.
-pub fn take(cause: ResetCause) -> Option<String<TEXT>> {
+pub fn take_report(cause: ResetCause) -> Option<String<TEXT>> {
     critical_section::with(|_| {
-        let (kept, said) = Kept::start(read(), cause);
-        write(&kept);
+        let (kept, said) = CrashRecord::on_start(read_record(), cause);
+        write_record(&kept);
         said
     })
 }
 
 /// Whether work with files may begin.
-pub fn may_begin(work: Work, files: u32) -> bool {
-    change(|kept| kept.may_begin(work, files))
+pub fn may_begin(work: FileWork, files: u32) -> bool {
+    update_record(|kept| kept.may_begin(work, files))
 }
 
 /// Begins work with files; false if it brought three starts in a row down, and is not to be done.
-pub fn begin(work: Work, files: u32) -> bool {
-    change(|kept| kept.begin(work, files))
+pub fn begin_work(work: FileWork, files: u32) -> bool {
+    update_record(|kept| kept.begin_work(work, files))
 }
 
-/// The work came to its end.
-pub fn finish() {
-    change(Kept::finish);
+/// Notes that the work has ended.
+pub fn finish_work() {
+    update_record(CrashRecord::finish_work);
 }
 
-/// Restarts, as somebody asked for: there is nothing to report.
+/// Restarts on request: there is no crash to report.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
-    change(Kept::ask);
+    update_record(CrashRecord::note_requested_restart);
     chosen::reset()
 }
 
 /// Keeps what happened, logs it and restarts. Kept first, and logged once: what is wrong may be the log.
-fn end(text: &str) -> ! {
+fn record_and_restart(text: &str) -> ! {
     cortex_m::interrupt::disable();
-    let ended = change(|kept| {
+    let ended = update_record(|kept| {
         let ended = kept.has_crashed();
         if !ended {
-            kept.crash(text);
+            kept.note_crash(text);
         }
         ended
     });
@@ -93,7 +93,7 @@ pub fn panicked(info: &PanicInfo<'_>) -> ! {
         // Text that does not fit is left out.
         let _ = write!(text, "Restarted: panic at {file}:{}", place.line());
     }
-    end(&text)
+    record_and_restart(&text)
 }
 
 /// Keeps the program counter of a fault and restarts.
@@ -103,10 +103,10 @@ pub fn faulted(pc: u32) -> ! {
     let (cfsr, mmfar) = (scb.cfsr.read(), scb.mmfar.read());
     if fault::is_overflow(cfsr, mmfar, &stack::guard()) {
         // The place of the overflow lies on the stack that was too small.
-        end("Restarted: stack overflow")
+        record_and_restart("Restarted: stack overflow")
     }
     let mut text = String::<TEXT>::new();
     // The text fits.
     let _ = write!(text, "Restarted: fault at {pc:#010x}");
-    end(&text)
+    record_and_restart(&text)
 }

@@ -21,7 +21,7 @@ pub(super) fn start_plans(irq: impl InterruptNumber) -> SendSpawner {
 ///
 /// # Safety
 /// Only that handler may call it: the executor is there once its interrupt is enabled.
-pub(super) unsafe fn on_links() {
+pub(super) unsafe fn poll_links_executor() {
     // SAFETY: as the caller says.
     unsafe { LINKS.on_interrupt() }
 }
@@ -29,8 +29,8 @@ pub(super) unsafe fn on_links() {
 /// The handler of the interrupt given to [`start_plans`].
 ///
 /// # Safety
-/// As [`on_links`].
-pub(super) unsafe fn on_plans() {
+/// As [`poll_links_executor`].
+pub(super) unsafe fn poll_plans_executor() {
     // SAFETY: as the caller says.
     unsafe { PLANS.on_interrupt() }
 }

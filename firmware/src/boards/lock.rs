@@ -6,7 +6,7 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 
 use super::chosen::LINKS_PRIORITY;
 
-/// Holds both executors back, and no device: a byte that comes is taken all the same. An asynchronous mutex would not do. It
+/// Blocks both executors, but no device: bytes are still received. An asynchronous mutex would not do. It
 /// knows one task that waits for it; two tasks of the higher executor that wait while the lower one holds it wake each other for
 /// ever, and the lower one never comes to let it go.
 pub struct HoldsExecutors(());

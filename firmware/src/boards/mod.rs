@@ -1,6 +1,6 @@
 //! What differs from board to board: registers, clocks, memory. The only place with `unsafe`.
 
-use crate::kept::Work;
+use crate::kept::FileWork;
 
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod chosen;
@@ -46,15 +46,15 @@ pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawM
 
 /// Work with uploaded files begins; false if it brought three starts in a row down, and is not to
 /// be done. A desk has no starts.
-pub fn begin(work: Work, files: u32) -> bool {
+pub fn begin_work(work: FileWork, files: u32) -> bool {
     #[cfg(all(target_os = "none", feature = "board"))]
-    return crash::begin(work, files);
+    return crash::begin_work(work, files);
     #[cfg(not(all(target_os = "none", feature = "board")))]
-    return crate::kept::Kept::default().begin(work, files);
+    return crate::kept::CrashRecord::default().begin_work(work, files);
 }
 
-/// The work came to its end.
-pub fn finish() {
+/// Notes that the work has ended.
+pub fn finish_work() {
     #[cfg(all(target_os = "none", feature = "board"))]
-    crash::finish();
+    crash::finish_work();
 }

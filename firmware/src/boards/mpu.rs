@@ -13,13 +13,13 @@ use crate::chips::mpu::{Access, Region};
 const ON: u32 = 1 << 2 | 1;
 
 /// The guard below the stack: a processor whose stack reaches it takes a fault.
-pub(super) fn guard() -> Region {
+pub(super) fn stack_guard_region() -> Region {
     Region::new(stack::guard().start, GUARD_LEN, Access::None)
 }
 
 /// Sets regions, each of which counts more than those before it, and switches the unit on. To be
 /// called once, at the start.
-pub(super) fn enable(regions: &[Option<Region>]) {
+pub(super) fn enable_regions(regions: &[Option<Region>]) {
     // SAFETY: nobody else uses the unit but `set`, later. What runs uses none of what the regions
     // take away.
     unsafe {

@@ -7,7 +7,7 @@ use heapless::Vec;
 pub const MAX_WARNINGS: usize = 2;
 
 /// A board, ready: with its receivers, transmitters, flash and watchdog.
-pub struct Parts<R, T, F, W> {
+pub struct BoardResources<R, T, F, W> {
     /// Runs links and setpoints, by interrupt.
     pub links: SendSpawner,
     /// Runs what takes long, by an interrupt below that.

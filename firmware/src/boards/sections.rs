@@ -22,7 +22,7 @@ unsafe extern "C" {
 ///
 /// # Safety
 /// Only once, before any of these statics is used; the memories' clocks run.
-pub unsafe fn zero() {
+pub unsafe fn zero_sections() {
     let sections = [
         (addr_of_mut!(__s_shell), addr_of_mut!(__e_shell)),
         (addr_of_mut!(__s_swarm_plan), addr_of_mut!(__e_swarm_plan)),

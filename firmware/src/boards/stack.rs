@@ -15,19 +15,19 @@ unsafe extern "C" {
 }
 
 /// Bytes the stack has.
-pub fn size() -> usize {
+pub fn size_bytes() -> usize {
     addr_of!(_stack_start) as usize - addr_of!(_stack_end) as usize
 }
 
 /// Most bytes it has held since the start.
-pub fn used() -> usize {
+pub fn used_bytes() -> usize {
     let end = addr_of!(_stack_end);
-    let words = size() / size_of::<u32>();
+    let words = size_bytes() / size_of::<u32>();
     let untouched = (0..words).take_while(|&word| {
         // SAFETY: between the linker's two symbols lies the stack, readable memory that the start has painted.
         unsafe { end.add(word).read_volatile() == PAINT }
     });
-    size() - untouched.count() * size_of::<u32>()
+    size_bytes() - untouched.count() * size_of::<u32>()
 }
 
 /// The memory below the stack that nothing may touch.

@@ -7,68 +7,68 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
-use planner_core::coverage::pack::{self, Heights, Plan, Unit, Vehicle, Work};
-use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::pack::{self, Heights, Plan, TrackUnit, Vehicle, Work};
+use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{Flat, around, powell, sweep};
-use planner_core::detour::{DetourRequest, Goal, KeepOff, Nature};
-use planner_core::flight::{Range, VehiclePlan};
+use planner_core::detour::{DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::flight::{VehiclePlan, WaypointRange};
 
 use super::Meter;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use crate::scratch::Coverage;
+use crate::scratch::CoverageWorkspace;
 
 /// Changes of the lanes' order that are tried.
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
 /// Vehicles of the plans that have a limit.
 const LIMITED_VEHICLES: usize = 3;
 /// Packings that POWELL tries.
-const POWELL_SEARCH: powell::Config = powell::Config::USUAL;
+const POWELL_SEARCH: powell::PowellConfig = powell::PowellConfig::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 
 /// A sum of bits in which order counts.
-struct Sum(u32);
+struct Checksum(u32);
 
-impl Sum {
+impl Checksum {
     fn add(&mut self, bits: u32) {
         self.0 = (self.0 ^ bits).wrapping_mul(0x0100_0193);
     }
 
-    fn reals(&mut self, reals: &[f32]) {
+    fn add_floats(&mut self, reals: &[f32]) {
         reals.iter().for_each(|real| self.add(real.to_bits()));
     }
 
-    fn tracks(&mut self, tracks: &Tracks<LANES>) {
+    fn add_tracks(&mut self, tracks: &Tracks<LANES>) {
         for lane in tracks.lanes() {
-            self.reals(&[lane.from.x, lane.from.y, lane.to.x, lane.to.y, lane.start_m]);
+            self.add_floats(&[lane.from.x, lane.from.y, lane.to.x, lane.to.y, lane.start_m]);
             self.add(lane.count);
         }
     }
 
-    fn plan(&mut self, plan: &Plan<VEHICLES>) {
+    fn add_plan(&mut self, plan: &Plan<VEHICLES>) {
         for route in &plan.routes {
             let numbers = [u32::from(route.vehicle), route.first, route.end, u32::from(route.layer)];
             numbers.into_iter().for_each(|number| self.add(number));
             self.add(route.heading as u32);
-            self.reals(&[route.ground_m, route.cost_m, route.cost_s]);
+            self.add_floats(&[route.ground_m, route.cost_m, route.cost_s]);
         }
     }
 }
 
 /// Makes all of them; the sum of the answers.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter, lent: &mut Coverage) -> u32 {
-    let mut sum = Sum(1);
-    cameras(meter, &mut sum);
+pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageWorkspace) -> u32 {
+    let mut sum = Checksum(1);
+    measure_cameras(meter, &mut sum);
     // Five vertices, 300 by 150 m, lanes of 10 m.
     let five = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]].map(flat);
     let area = Area::new(&five, &[Ring { end: 5, kind: RingKind::Outer }]).expect("an area");
-    plans(meter, area, lent, &mut sum);
+    measure_plans(meter, area, lent, &mut sum);
     // The most lanes, for the most vehicles.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(flat);
     let area = Area::new(&wide, &[Ring { end: 4, kind: RingKind::Outer }]).expect("an area");
-    division(meter, area, lent, &mut sum);
-    edges(meter, lent, &mut sum);
+    measure_division(meter, area, lent, &mut sum);
+    measure_largest_area(meter, lent, &mut sum);
     sum.0
 }
 
@@ -85,13 +85,13 @@ fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
     (0..count).map(vehicle).collect()
 }
 
-fn pattern(angle_deg: Option<f32>, lane_m: f32) -> Pattern {
+fn pattern(angle_deg: Option<f32>, lane_m: f32) -> LanePattern {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    Pattern { spacing, angle_deg, margin_m: 0.0, looks: MAX_ORDER_CHANGES }
+    LanePattern { spacing, angle_deg, margin_m: 0.0, search_steps: MAX_ORDER_CHANGES }
 }
 
-fn cameras(meter: &mut impl Meter, sum: &mut Sum) {
+fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {
     let sensor = Camera::Sensor { sides_mm: [23.5, 15.6], focal_mm: 16.0, pixels: [6000, 4000] };
     for camera in [sensor, Camera::Diagonal { fov_deg: 73.7, aspect: 1.5 }] {
         let footprint = meter.call("footprint::Camera::footprint", 0, || camera.footprint(35.0));
@@ -103,58 +103,73 @@ fn cameras(meter: &mut impl Meter, sum: &mut Sum) {
 }
 
 /// The whole plan of three vehicles, and its parts.
-fn plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
+fn measure_plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
     let transit = Transit::<1>::empty();
     let few = vehicles(LIMITED_VEHICLES);
-    let Coverage { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
-        let work = Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: Unit::Waypoint };
+        let work =
+            Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: TrackUnit::Waypoint };
         powell::powell(&work, &POWELL_SEARCH, powell, plan).expect("routes");
     });
-    sum.tracks(tracks);
-    sum.plan(plan);
-    let work = Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: Unit::Waypoint };
+    sum.add_tracks(tracks);
+    sum.add_plan(plan);
+    let work =
+        Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: TrackUnit::Waypoint };
     meter
         .call("powell::powell, 3", size_of_val(powell), || {
             powell::powell(&work, &POWELL_SEARCH, powell, plan)
         })
         .expect("routes");
     let pack = &mut powell.pack;
-    for unit in [Unit::Lane, Unit::Waypoint] {
+    for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
         let work = Work { unit, ..work };
         meter.call("pack::binpat, 3", size_of_val(pack), || pack::binpat(&work, pack, plan)).expect("routes");
-        sum.plan(plan);
+        sum.add_plan(plan);
     }
     let bound_s = meter.call("bound::lower_bound_s, 3", 0, || lower_bound_s(&work)).expect("a bound");
     sum.add(bound_s.to_bits());
     // Each has flown ten waypoints, and the first is lost.
-    let done = flown(plan, 10);
+    let done = flown_ranges(plan, 10);
     let rest = &few[1..];
     let bytes = size_of_val(left) + size_of_val(pack);
     meter.call("left and binpat, 3", bytes, || {
-        divide::left(tracks, &done, &transit, left).expect("something is left");
-        let work =
-            Work { tracks: left, transit: &transit, vehicles: rest, heights: HEIGHTS, unit: Unit::Waypoint };
+        divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
+        let work = Work {
+            tracks: left,
+            transit: &transit,
+            vehicles: rest,
+            heights: HEIGHTS,
+            unit: TrackUnit::Waypoint,
+        };
         pack::binpat(&work, pack, plan).expect("routes");
     });
-    sum.tracks(left);
-    sum.plan(plan);
+    sum.add_tracks(left);
+    sum.add_plan(plan);
 }
 
-fn flown(plan: &Plan<VEHICLES>, count: u32) -> Vec<Range, VEHICLES> {
-    let mut done: Vec<Range, VEHICLES> =
-        plan.routes.iter().map(|r| Range { first: r.first, end: (r.first + count).min(r.end) }).collect();
+fn flown_ranges(plan: &Plan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLES> {
+    let mut done: Vec<WaypointRange, VEHICLES> = plan
+        .routes
+        .iter()
+        .map(|r| WaypointRange { first: r.first, end: (r.first + count).min(r.end) })
+        .collect();
     done.sort_unstable_by_key(|range| range.first);
     done
 }
 
 /// The division of the rest after a loss, of 512 lanes among 32 vehicles.
-fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
+fn measure_division(
+    meter: &mut impl Meter,
+    area: Area<'_>,
+    lent: &mut CoverageWorkspace,
+    sum: &mut Checksum,
+) {
     let transit = Transit::<1>::empty();
     let many = vehicles(VEHICLES);
-    let Coverage { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let pack = &mut powell.pack;
     // The order is unchanged yet, and each step compares all lanes.
     let pattern = pattern(Some(90.0), 5.0);
@@ -164,52 +179,63 @@ fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &m
         })
         .expect("lanes");
     assert_eq!(tracks.lanes().len(), LANES);
-    sum.tracks(tracks);
-    let work = Work { tracks, transit: &transit, vehicles: &many, heights: HEIGHTS, unit: Unit::Waypoint };
+    sum.add_tracks(tracks);
+    let work =
+        Work { tracks, transit: &transit, vehicles: &many, heights: HEIGHTS, unit: TrackUnit::Waypoint };
     meter.call("pack::binpat, 32", size_of_val(pack), || pack::binpat(&work, pack, plan)).expect("routes");
-    sum.plan(plan);
+    sum.add_plan(plan);
     for number in [0, 1000, tracks.waypoint_count() - 1] {
         let place =
             meter.call("lanes::Tracks::waypoint", 0, || tracks.waypoint(number)).expect("it is there");
-        let along_m = meter.call("lanes::Tracks::along_m", 0, || tracks.along_m(number));
-        sum.reals(&[place.x, place.y, along_m]);
+        let along_m =
+            meter.call("lanes::Tracks::distance_to_waypoint_m", 0, || tracks.distance_to_waypoint_m(number));
+        sum.add_floats(&[place.x, place.y, along_m]);
     }
     // Whole lanes from where each began: no lane is cut in two, so all fit again.
-    let whole = |range: Range| {
+    let whole = |range: WaypointRange| {
         let lane = |number: u32| &tracks.lanes()[tracks.lane_of(number)];
         let (from, to) = (lane(range.first), lane(range.end - 1));
-        Range { first: from.first, end: to.first + to.count }
+        WaypointRange { first: from.first, end: to.first + to.count }
     };
-    let mut done: Vec<Range, VEHICLES> = flown(plan, 10).into_iter().map(whole).collect();
+    let mut done: Vec<WaypointRange, VEHICLES> = flown_ranges(plan, 10).into_iter().map(whole).collect();
     for k in 1..done.len() {
         done[k].first = done[k].first.max(done[k - 1].end);
     }
     let rest = &many[1..];
     meter.call("left and binpat, 32", size_of_val(left) + size_of_val(pack), || {
-        divide::left(tracks, &done, &transit, left).expect("something is left");
-        let work =
-            Work { tracks: left, transit: &transit, vehicles: rest, heights: HEIGHTS, unit: Unit::Waypoint };
+        divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
+        let work = Work {
+            tracks: left,
+            transit: &transit,
+            vehicles: rest,
+            heights: HEIGHTS,
+            unit: TrackUnit::Waypoint,
+        };
         pack::binpat(&work, pack, plan).expect("routes");
     });
-    sum.tracks(left);
-    sum.plan(plan);
+    sum.add_tracks(left);
+    sum.add_plan(plan);
     let last = left.waypoint_count() - 1;
-    sum.add(meter.call("divide::original, 32", 0, || divide::original(&done, last)));
+    sum.add(
+        meter.call("divide::original_waypoint_number, 32", 0, || {
+            divide::original_waypoint_number(&done, last)
+        }),
+    );
 }
 
 /// The way home, and aside, among zones and four things of each vehicle.
-fn ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &mut Sum) {
+fn measure_ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &mut Checksum) {
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::new();
     meter.call("transit::Transit::corners", 0, || transit.corners().len());
-    meter.call("transit::Transit::forbids", 0, || transit.forbids(&Flat::zeros()));
+    meter.call("transit::Transit::is_in_no_fly_zone", 0, || transit.is_in_no_fly_zone(&Flat::zeros()));
     for case in 0..4 {
         let here = Point::new(150.0, 70.0 - 20.0 * case as f32, 25.0);
         let thing = |i: usize| {
             let from = Point::new(-120.0 + 7.0 * (i % 32) as f32, -40.0 + 23.0 * (i / 32) as f32, 45.0);
             let to = Point::new(from.x, from.y, if i.is_multiple_of(3) { from.z } else { 0.0 });
-            KeepOff { from, to, radius_m: 2.0, nature: Nature::Solid }
+            KeepOutZone { from, to, radius_m: 2.0, kind: ZoneKind::Static }
         };
-        let mut things: Vec<KeepOff, { 4 * VEHICLES }> = (0..4 * VEHICLES).map(thing).collect();
+        let mut things: Vec<KeepOutZone, { 4 * VEHICLES }> = (0..4 * VEHICLES).map(thing).collect();
         let request = DetourRequest {
             aside: case == 3,
             here,
@@ -221,19 +247,19 @@ fn ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &
             fence: None,
         };
         // That no path exists is an answer too.
-        let found = meter.call("around::plan, 128 things", 0, || {
-            around::plan(transit, None, &request, &mut things, &mut own.path)
+        let found = meter.call("around::plan_detour, 128 things", 0, || {
+            around::plan_detour(transit, None, &request, &mut things, &mut own.path)
         });
         sum.add(u32::from(found.is_ok()) ^ own.path.length_m().to_bits());
-        let again = meter.call("around::plan_vehicle, 128 things", 0, || {
-            around::plan_vehicle(transit, None, &request, &mut things, &mut own)
+        let again = meter.call("around::plan_vehicle_detour, 128 things", 0, || {
+            around::plan_vehicle_detour(transit, None, &request, &mut things, &mut own)
         });
         sum.add(u32::from(again.is_ok()));
     }
 }
 
 /// An area with as many vertices as there may be, some of them of no-fly zones with as many corners.
-fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
+fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
     const ZONES: usize = AREA_CORNERS / 4;
     const OUTER: usize = AREA_VERTICES - AREA_CORNERS;
     let mut vertices: Vec<Flat, AREA_VERTICES> = Vec::new();
@@ -255,18 +281,20 @@ fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
     let area = meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
     let mut transit = Transit::<AREA_CORNERS>::empty();
     let bytes = size_of_val(&transit);
-    meter.call("transit::Transit::learn, 32 corners", bytes, || transit.learn(area)).expect("they fit");
+    meter.call("transit::Transit::set_area, 32 corners", bytes, || transit.set_area(area)).expect("they fit");
     for k in 0..16 {
         let (from, to) = (Flat::new(-150.0, 10.0 * k as f32 - 80.0), Flat::new(150.0, 70.0 - 9.0 * k as f32));
-        let clear = meter.call("transit::Transit::is_clear", 0, || transit.is_clear(&from, &to));
+        let clear = meter.call("transit::Transit::is_line_clear", 0, || transit.is_line_clear(&from, &to));
         let far_m = meter.call("transit::Transit::distance_m", 0, || transit.distance_m(&from, &to));
         let mut corners: Vec<Flat, AREA_CORNERS> = Vec::new();
-        meter.call("transit::Transit::way", 0, || transit.way(&from, &to, &mut corners)).expect("a way");
-        let inside = meter.call("area::Area::forbids", 0, || area.forbids(&from));
+        meter
+            .call("transit::Transit::shortest_path", 0, || transit.shortest_path(&from, &to, &mut corners))
+            .expect("a way");
+        let inside = meter.call("area::Area::is_in_no_fly_zone", 0, || area.is_in_no_fly_zone(&from));
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
-    ways_home(meter, &transit, sum);
-    let Coverage { tracks, build, powell, plan, .. } = lent;
+    measure_ways_home(meter, &transit, sum);
+    let CoverageWorkspace { tracks, build, powell, plan, .. } = lent;
     let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
     let direction =
         meter.call("sweep::least_width, 256", size_of_val(&hull), || sweep::least_width(&area, &mut hull));
@@ -278,15 +306,16 @@ fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
             tracks::build(&area, &pattern, &transit, build, tracks)
         })
         .expect("lanes");
-    sum.tracks(tracks);
+    sum.add_tracks(tracks);
     let few = vehicles(LIMITED_VEHICLES);
-    let work = Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: Unit::Waypoint };
+    let work =
+        Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: TrackUnit::Waypoint };
     meter
         .call("pack::binpat, 3 around zones", size_of_val(&powell.pack), || {
             pack::binpat(&work, &mut powell.pack, plan)
         })
         .expect("routes");
-    sum.plan(plan);
+    sum.add_plan(plan);
 }
 
 #[cfg(test)]
@@ -307,9 +336,9 @@ mod tests {
 
     #[test]
     fn all_calls_are_made_and_the_sum_is_the_same_again() {
-        let mut lent = Box::<Coverage>::default();
-        let first = run(&mut Desk, &mut lent);
-        assert_eq!(run(&mut Desk, &mut lent), first);
-        std::println!("lent {} bytes", size_of::<Coverage>());
+        let mut lent = Box::<CoverageWorkspace>::default();
+        let first = measure_coverage_calls(&mut Desk, &mut lent);
+        assert_eq!(measure_coverage_calls(&mut Desk, &mut lent), first);
+        std::println!("lent {} bytes", size_of::<CoverageWorkspace>());
     }
 }

@@ -2,21 +2,25 @@
 //! routes and the flights of all vehicles with their departures. What is planned is summed up bit by bit, to be compared with the desk's.
 
 use companion::planner::coverage::{self, Request};
-use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, Heading, Parts, Share};
-use companion::storage::mission_file::{self, Block, Kind, MissionHeader, MissionVehicle, MissionView};
-use companion::swarm::fleet::Lot;
+use companion::storage::mission_file::coverage::{
+    CoverageHeader, CoverageParts, HeadingRule, PartEligibility, VehicleShare,
+};
+use companion::storage::mission_file::{
+    self, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
+};
+use companion::swarm::fleet::DivisionInput;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
-use planner_core::coverage::flights::{self, Manner, Pad, Swarm};
+use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::losses::{self, Fate, Loss};
-use planner_core::coverage::pack::{self, Heights, Unit, Vehicle, Work};
-use planner_core::coverage::tracks::{self, Pattern};
+use planner_core::coverage::losses::{self, Loss, VehicleStatus};
+use planner_core::coverage::pack::{self, Heights, TrackUnit, Vehicle, Work};
+use planner_core::coverage::tracks::{self, LanePattern};
 use planner_core::coverage::transit::Transit;
 use planner_core::deconflict::Method;
-use planner_core::flight::{Look, Trigger};
+use planner_core::flight::{HeadingMode, Trigger};
 use planner_core::plan::{SwarmPlan, VehicleTask};
 use planner_core::schedule::ScheduleConfig;
 
@@ -40,14 +44,18 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     vertical_mps: DESCEND_MPS,
 };
 /// A swarm without vehicles, on lanes 10 m apart.
-pub(super) const SWARM: Swarm<'static> = Swarm {
+pub(super) const SWARM: FlightInputs<'static> = FlightInputs {
     pads: &[],
-    manner: Manner { waypoint_m: 10.0, look: Look::Fixed(0.0), trigger: Trigger::Distance },
+    capture: CaptureSettings {
+        waypoint_m: 10.0,
+        heading_mode: HeadingMode::Fixed(0.0),
+        trigger: Trigger::Distance,
+    },
     clearance_m: 10.0,
     schedule: SCHEDULE,
-    gates_most: GATES,
-    done: &[],
-    layers_held: 0,
+    max_gates: GATES,
+    photographed: &[],
+    held_layers: 0,
     following: None,
 };
 /// Height of a path's first point above the pad, metres.
@@ -64,21 +72,25 @@ const NO_FLY_ZONES: [[[f32; 2]; 4]; 2] = [
 
 /// Counts all coverage plans and divisions; returns a checksum of the results.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter, lent: &mut scratch::Scratch, out: &mut Flights) -> u32 {
-    whole(meter, lent.area(), out) ^ parts(meter, lent.coverage(), out)
+pub fn measure_coverage_flights(
+    meter: &mut impl Meter,
+    lent: &mut scratch::WorkspaceOverlay,
+    out: &mut Flights,
+) -> u32 {
+    measure_whole_plans(meter, lent.area(), out) ^ measure_plan_parts(meter, lent.coverage(), out)
 }
 
 /// Whole plans.
 #[inline(never)]
-fn whole(meter: &mut impl Meter, lent: &mut scratch::Area, out: &mut Flights) -> u32 {
+fn measure_whole_plans(meter: &mut impl Meter, lent: &mut scratch::AreaWorkspace, out: &mut Flights) -> u32 {
     let mut sum = 1;
     for zones in [&[][..], &NO_FLY_ZONES[..]] {
-        mission(meter, zones, lent, out, &mut sum);
+        measure_mission_plans(meter, zones, lent, out, &mut sum);
     }
     sum
 }
 
-fn add(sum: &mut u32, flights: &Flights) {
+fn add_to_checksum(sum: &mut u32, flights: &Flights) {
     *sum = sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ flights.crc;
 }
 
@@ -90,7 +102,7 @@ fn rings(zones: usize) -> Vec<Ring, 4> {
 }
 
 /// The mission file of three vehicles.
-fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
+fn mission_file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
     let header = MissionHeader {
         roadmap_crc: 0,
         mode: crate::cases::ASSIGNMENT_MODE,
@@ -110,18 +122,18 @@ fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
     };
     let vehicles: Vec<_, LIMITED_VEHICLES> = (0..LIMITED_VEHICLES).map(vehicle).collect();
     let area = CoverageHeader {
-        unit: Unit::Waypoint,
-        parts: Parts::Anyone,
-        heading: Heading::Sweep,
+        unit: TrackUnit::Waypoint,
+        parts: PartEligibility::Anyone,
+        heading: HeadingRule::Sweep,
         trigger: Trigger::Distance,
-        looks: super::coverage::MAX_ORDER_CHANGES,
+        search_steps: super::coverage::MAX_ORDER_CHANGES,
         heights: HEIGHTS,
         spacing: spacing(10.0),
         angle_deg: None,
         margin_m: 0.0,
         ground: None,
     };
-    let share = Share { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };
+    let share = VehicleShare { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };
     let corners = FIVE_VERTICES.iter().chain(zones.iter().flatten());
     let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
     let parts = CoverageParts {
@@ -130,7 +142,8 @@ fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
         rings: &rings(zones.len()),
         vertices: &vertices,
     };
-    mission_file::write(&header, &vehicles, &Block::Coverage(parts), out).expect("a good mission")
+    mission_file::write_mission(&header, &vehicles, &MissionBlock::Coverage(parts), out)
+        .expect("a good mission")
 }
 
 fn spacing(lane_m: f32) -> Spacing {
@@ -138,38 +151,38 @@ fn spacing(lane_m: f32) -> Spacing {
 }
 
 /// The plans that a board makes from its mission file, before the start and after two losses.
-fn mission(
+fn measure_mission_plans(
     meter: &mut impl Meter,
     zones: &[[[f32; 2]; 4]],
-    lent: &mut scratch::Area,
+    lent: &mut scratch::AreaWorkspace,
     out: &mut Flights,
     sum: &mut u32,
 ) {
     let mut bytes = [0; 1024];
-    let len = file(zones, &mut bytes);
+    let len = mission_file(zones, &mut bytes);
     let view = MissionView::parse(&bytes[..len]).expect("it was written");
-    let Kind::Coverage(area) = view.kind() else { return };
-    let request = Request { mission: &view, view: area, field: None, gates_most: GATES, done: &[] };
+    let MissionKind::Coverage(area) = view.kind() else { return };
+    let request = Request { mission: &view, view: area, field: None, max_gates: GATES, photographed: &[] };
     let names = match zones.is_empty() {
         true => ["planner::coverage::plan, 3", "planner::coverage::plan, 3 after two losses"],
         false => ["planner::coverage::plan, 3, zones", "planner::coverage::plan, 3 after two losses, zones"],
     };
-    let lent_bytes = size_of::<scratch::Area>();
-    let mut losses: Vec<[Lot; LIMITED_VEHICLES], 2> = Vec::new();
+    let lent_bytes = size_of::<scratch::AreaWorkspace>();
+    let mut losses: Vec<[DivisionInput; LIMITED_VEHICLES], 2> = Vec::new();
     for lost in [None, Some(0), Some(1)] {
         if let Some(lost) = lost {
             // Each in the air stands in the middle of its path; one that was lost before is on the ground.
             let lot = |k: usize| {
-                let flies = out.flights[k].task.flies();
+                let flies = out.flights[k].task.leaves_pad();
                 let along_dm = if flies { (out.flights[k].path.length_m() * 5.0) as u16 } else { 0 };
-                Lot { lives: k > lost, along_dm }
+                DivisionInput { alive: k > lost, along_dm }
             };
             losses.push(core::array::from_fn(lot)).expect("there is room");
         }
         let name = names[usize::from(lost.is_some())];
         meter
             .call(name, lent_bytes, || {
-                coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+                coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
                     &request,
                     losses.iter().map(|lots| &lots[..]),
                     &mut lent.area,
@@ -178,15 +191,19 @@ fn mission(
                 )
             })
             .expect("a plan");
-        add(sum, out);
+        add_to_checksum(sum, out);
     }
 }
 
 /// The flights of routes alone, and divisions of what a vehicle leaves.
 #[inline(never)]
-fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights) -> u32 {
+fn measure_plan_parts(
+    meter: &mut impl Meter,
+    lent: &mut scratch::CoverageWorkspace,
+    out: &mut Flights,
+) -> u32 {
     let mut sum = 1;
-    let names = ["flights::plan, 3", "losses::redivide, 3"];
+    let names = ["flights::plan_flights, 3", "losses::redivide_work, 3"];
     for zones in [&[][..], &NO_FLY_ZONES[..]] {
         let corners = FIVE_VERTICES.iter().chain(zones.iter().flatten());
         let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
@@ -197,7 +214,7 @@ fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights
             lane_m: 10.0,
             count: LIMITED_VEHICLES,
         };
-        divided(meter, &case, names, lent, out, &mut sum);
+        measure_division(meter, &case, names, lent, out, &mut sum);
     }
     // The most lanes, for the most vehicles.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
@@ -208,7 +225,14 @@ fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights
         lane_m: 5.0,
         count: VEHICLES,
     };
-    divided(meter, &case, ["flights::plan, 32", "losses::redivide, 32"], lent, out, &mut sum);
+    measure_division(
+        meter,
+        &case,
+        ["flights::plan_flights, 32", "losses::redivide_work, 32"],
+        lent,
+        out,
+        &mut sum,
+    );
     sum
 }
 
@@ -236,46 +260,53 @@ fn vehicles(count: usize) -> (Vec<Vehicle, VEHICLES>, Vec<Pad, VEHICLES>) {
         climb_m: CLIMB_M,
         end_z_m: CLIMB_M,
         descent_m: CLIMB_M,
-        aloft: false,
+        airborne: false,
     };
     ((0..count).map(vehicle).collect(), (0..count).map(pad).collect())
 }
 
-fn divided(
+fn measure_division(
     meter: &mut impl Meter,
     case: &Case<'_>,
     [flights_name, again_name]: [&'static str; 2],
-    lent: &mut scratch::Coverage,
+    lent: &mut scratch::CoverageWorkspace,
     out: &mut Flights,
     sum: &mut u32,
 ) {
     let mut transit = Transit::<AREA_CORNERS>::empty();
-    transit.learn(case.area).expect("they fit");
-    let scratch::Coverage { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
+    transit.set_area(case.area).expect("they fit");
+    let scratch::CoverageWorkspace { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
     let pack = &mut powell.pack;
     let looks = super::coverage::MAX_ORDER_CHANGES;
-    let pattern = Pattern { spacing: spacing(case.lane_m), angle_deg: case.angle_deg, margin_m: 0.0, looks };
+    let pattern = LanePattern {
+        spacing: spacing(case.lane_m),
+        angle_deg: case.angle_deg,
+        margin_m: 0.0,
+        search_steps: looks,
+    };
     tracks::build(&case.area, &pattern, &transit, build, tracks).expect("lanes");
     let (vehicles, pads) = vehicles(case.count);
     let work =
-        Work { tracks, transit: &transit, vehicles: &vehicles, heights: HEIGHTS, unit: Unit::Waypoint };
-    losses.begin(tracks, &transit, &[]).expect("nothing is done");
+        Work { tracks, transit: &transit, vehicles: &vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    losses.start_plan(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
-    let manner = Manner { waypoint_m: case.lane_m, ..SWARM.manner };
-    let swarm = Swarm { pads: &pads, manner, ..SWARM };
+    let manner = CaptureSettings { waypoint_m: case.lane_m, ..SWARM.capture };
+    let swarm = FlightInputs { pads: &pads, capture: manner, ..SWARM };
     meter
-        .call(flights_name, size_of_val(schedule), || flights::plan(&work, routes, &swarm, schedule, out))
+        .call(flights_name, size_of_val(schedule), || {
+            flights::plan_flights(&work, routes, &swarm, schedule, out)
+        })
         .expect("flights");
-    add(sum, out);
+    add_to_checksum(sum, out);
     let bytes = size_of_val(losses) + size_of_val(pack) + size_of_val(schedule);
     // Each lives on from where it holds, and the first is lost.
-    let fate = |k: usize| Fate { lives: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
-    let fates: Vec<Fate, VEHICLES> = (0..case.count).map(fate).collect();
+    let fate = |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
+    let fates: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();
     let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
     meter
-        .call(again_name, bytes, || losses::redivide(&loss, losses, pack, schedule, routes, out))
+        .call(again_name, bytes, || losses::redivide_work(&loss, losses, pack, schedule, routes, out))
         .expect("a division");
-    add(sum, out);
+    add_to_checksum(sum, out);
 }
 
 #[cfg(test)]
@@ -300,9 +331,14 @@ mod tests {
     #[test]
     fn all_flights_are_planned_and_the_sum_is_the_same_again() {
         let mut out = Box::new(Flights::new());
-        let mut area = Box::<scratch::Area>::default();
-        let mut lent = Box::<scratch::Coverage>::default();
-        let mut sums = || [whole(&mut Desk, &mut area, &mut out), parts(&mut Desk, &mut lent, &mut out)];
+        let mut area = Box::<scratch::AreaWorkspace>::default();
+        let mut lent = Box::<scratch::CoverageWorkspace>::default();
+        let mut sums = || {
+            [
+                measure_whole_plans(&mut Desk, &mut area, &mut out),
+                measure_plan_parts(&mut Desk, &mut lent, &mut out),
+            ]
+        };
         let first = sums();
         assert_eq!(sums(), first);
     }

@@ -5,7 +5,7 @@
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
-use companion::link::roster::{self, Entry, Roster};
+use companion::link::roster::{self, RosterReport, RosterReportEntry};
 use companion::{Duration, Event, Instant, Link, PlanFailure};
 use heapless::Vec;
 use planner_core::flight::{Task, VehiclePlan};
@@ -20,7 +20,7 @@ pub use self::drawn::{area_config, config, random_area_plan, random_path, random
 use super::Meter;
 use crate::capacity::BoardCompanion;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
-use crate::cases::{anywhere, below, uniform};
+use crate::cases::{random_below, random_between, random_point};
 
 /// Mission and EKF origin of every flight.
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
@@ -35,7 +35,7 @@ pub const NEAR_STEP: &str = "a control step, 32 near";
 /// neighbours.
 pub const AREA_STEP: &str = "a control step, coverage, 32 near";
 /// Name of the safety filter alone, which is part of each control step.
-pub const FILTER: &str = "Companion::ask_filter, 32 near";
+pub const FILTER: &str = "Companion::query_filter, 32 near";
 /// Name of any other control step.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
 const SYSTEM: u8 = 1;
@@ -71,7 +71,7 @@ const MISSION_START: u16 = 300;
 const ARM_DISARM: u16 = 400;
 const REQUEST_MESSAGE: u16 = 512;
 
-struct Other {
+struct SimulatedNeighbour {
     place: Point,
     flags: u8,
     progress_m: f32,
@@ -79,7 +79,7 @@ struct Other {
 }
 
 /// One flight.
-pub struct Flight<'a, M> {
+pub struct BenchFlight<'a, M> {
     companion: &'a mut BoardCompanion,
     meter: &'a mut M,
     now: Instant,
@@ -88,19 +88,19 @@ pub struct Flight<'a, M> {
     mode: u32,
     armed: bool,
     sequences: [u8; 256],
-    others: Vec<Other, VEHICLES>,
+    others: Vec<SimulatedNeighbour, VEHICLES>,
     plan: &'a VehiclePlan<WAYPOINTS, GATES>,
 }
 
 /// Whether most of a flight's neighbours leave the plan or fall silent.
-pub fn is_hard(seed: u64) -> bool {
+pub fn has_many_off_plan(seed: u64) -> bool {
     seed.is_multiple_of(2)
 }
 
 /// Vector from this vehicle to a neighbour. In every other hard flight the neighbour is beside, so
 /// that the path is checked to its end.
-fn near(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
-    let at = anywhere(rng, reach_m);
+fn offset_to_neighbour(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
+    let at = random_point(rng, reach_m);
     if seed.is_multiple_of(4) { at + at * (MIN_BESIDE_M / at.norm().max(0.1)) } else { at }
 }
 
@@ -108,31 +108,31 @@ fn near(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
 ///
 /// # Panics
 /// The companion does not take off: the script is wrong.
-pub fn fly<M: Meter>(
+pub fn measure_flight<M: Meter>(
     seed: u64,
     plan: &VehiclePlan<WAYPOINTS, GATES>,
     companion: &mut BoardCompanion,
     meter: &mut M,
 ) -> usize {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let hard = is_hard(seed);
-    let mut flight = Flight::on_pad(plan, companion, meter);
+    let hard = has_many_off_plan(seed);
+    let mut flight = BenchFlight::on_pad(plan, companion, meter);
     flight.take_off();
     for (i, other) in flight.others.iter_mut().enumerate() {
         let (flags, silent) = match seed % 4 {
-            // All on ways of their own: each is looked at along the whole path ahead.
+            // All on ways of their own: each is checked along the whole path ahead.
             1 => (AIR | intent::ON_DETOUR, false),
-            3 => EASY[below(&mut rng, EASY.len())],
-            _ => HARD[below(&mut rng, HARD.len())],
+            3 => EASY[random_below(&mut rng, EASY.len())],
+            _ => HARD[random_below(&mut rng, HARD.len())],
         };
         // One neighbour is always heard, so that this vehicle is not alone.
         (other.flags, other.silent) = (flags, silent && i > 0);
-        other.place = flight.place + near(seed, &mut rng, if hard { 6.0 } else { 20.0 });
-        other.progress_m = uniform(&mut rng, 0.0, 60.0);
+        other.place = flight.place + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
+        other.progress_m = random_between(&mut rng, 0.0, 60.0);
     }
     flight.send_states_from(&mut rng, |_| true);
     if hard {
-        for _ in 0..below(&mut rng, MAX_AGEING_STEPS) {
+        for _ in 0..random_below(&mut rng, MAX_AGEING_STEPS) {
             flight.send_state_from(0, &mut rng);
             flight.tick(OTHER_STEP, AGEING_TIME);
         }
@@ -144,35 +144,35 @@ pub fn fly<M: Meter>(
         if step.is_multiple_of(8) {
             let here = flight.place;
             for other in flight.others.iter_mut().filter(|other| !other.silent) {
-                other.place = here + near(seed, &mut rng, if hard { 3.0 } else { 12.0 });
+                other.place = here + offset_to_neighbour(seed, &mut rng, if hard { 3.0 } else { 12.0 });
             }
             flight.send_states_from(&mut rng, |other| !other.silent);
         }
         let (now, companion) = (flight.now, &mut *flight.companion);
-        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
+        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.query_filter(now));
         flight.tick(if hard { HARD_STEP } else { STEP }, STEP_TIME);
     }
     COUNTED_STEPS
 }
 
-/// One flight among neighbours that are near but seldom on the path, the safety filter alone counted by `meter`: in full flight,
+/// One flight among neighbours that are near but rarely on the path, the safety filter alone counted by `meter`: in full flight,
 /// and stopped, when it looks further ahead.
 ///
 /// # Panics
 /// The companion does not take off: the script is wrong.
-pub fn filter<M: Meter>(
+pub fn measure_filter<M: Meter>(
     seed: u64,
     plan: &VehiclePlan<WAYPOINTS, GATES>,
     companion: &mut BoardCompanion,
     meter: &mut M,
 ) {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let mut flight = Flight::on_pad(plan, companion, meter);
+    let mut flight = BenchFlight::on_pad(plan, companion, meter);
     flight.take_off();
     for round in 0..FILTER_ROUNDS {
         for i in 0..flight.others.len() {
             flight.others[i].place = flight.place + far_away();
-            flight.others[i].flags = FILTERED[below(&mut rng, FILTERED.len())];
+            flight.others[i].flags = FILTERED[random_below(&mut rng, FILTERED.len())];
         }
         if round % 2 == 1 {
             flight.others[0].place = flight.place;
@@ -181,15 +181,16 @@ pub fn filter<M: Meter>(
         for _ in 0..4 {
             flight.tick(OTHER_STEP, STEP_TIME);
         }
-        let (nearest_m, furthest_m) = (uniform(&mut rng, 3.0, 12.0), uniform(&mut rng, 6.0, 24.0));
+        let (nearest_m, furthest_m) =
+            (random_between(&mut rng, 3.0, 12.0), random_between(&mut rng, 6.0, 24.0));
         for i in 0..flight.others.len() {
-            let way = anywhere(&mut rng, 1.0);
-            let away_m = uniform(&mut rng, nearest_m, nearest_m.max(furthest_m) + 0.1);
+            let way = random_point(&mut rng, 1.0);
+            let away_m = random_between(&mut rng, nearest_m, nearest_m.max(furthest_m) + 0.1);
             flight.others[i].place = flight.place + way * (away_m / way.norm().max(0.01));
         }
         flight.send_states_from(&mut rng, |_| true);
         let (now, companion) = (flight.now, &mut *flight.companion);
-        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
+        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.query_filter(now));
         // The whole step beside them; and time passes, so that what they say next is new.
         flight.tick(NEAR_STEP, STEP_TIME);
     }
@@ -219,14 +220,14 @@ const HARD: [(u8, bool); 4] = [
     (intent::FLYING, true),
 ];
 
-impl<'a, M: Meter> Flight<'a, M> {
+impl<'a, M: Meter> BenchFlight<'a, M> {
     /// On its pad, all others far away, and past every gate.
     fn on_pad(
         plan: &'a VehiclePlan<WAYPOINTS, GATES>,
         companion: &'a mut BoardCompanion,
         meter: &'a mut M,
     ) -> Self {
-        let far = || Other { place: far_away(), flags: AIR, progress_m: 1e3, silent: false };
+        let far = || SimulatedNeighbour { place: far_away(), flags: AIR, progress_m: 1e3, silent: false };
         Self {
             companion,
             meter,
@@ -261,7 +262,7 @@ impl<'a, M: Meter> Flight<'a, M> {
                 let mut order = [0; 33];
                 order[28..30].copy_from_slice(&MISSION_START.to_le_bytes());
                 (order[30], order[31]) = (SYSTEM, companion::COMPANION_COMPONENT);
-                self.hear(Link::Swarm, (255, 190), COMMAND_LONG, &order);
+                self.feed_frame(Link::Swarm, (255, 190), COMMAND_LONG, &order);
             }
             self.tick(OTHER_STEP, STEP_TIME);
             if self.companion.state() == companion::State::Follow {
@@ -277,33 +278,33 @@ impl<'a, M: Meter> Flight<'a, M> {
         let name = if self.has_area() { AREA_STEP } else { name };
         let (now, companion) = (self.now, &mut *self.companion);
         self.meter.call(name, size_of::<BoardCompanion>(), || companion.handle_timeout(now));
-        self.drain();
+        self.drain_outputs();
         if let Some(target) = self.target.filter(|_| self.armed) {
             let way = target - self.place;
             let reach_m = CRUISE_MPS * 0.05;
             self.place += way * (reach_m / way.norm().max(reach_m));
         }
-        if time > STEP_TIME || self.now.micros().is_multiple_of(1_000_000) {
+        if time > STEP_TIME || self.now.as_micros().is_multiple_of(1_000_000) {
             let [a, b, c, d] = self.mode.to_le_bytes();
             let armed = if self.armed { 129 } else { 1 };
-            self.hear(Link::Autopilot, (SYSTEM, 1), HEARTBEAT, &[a, b, c, d, 2, 12, armed, 4, 3]);
+            self.feed_frame(Link::Autopilot, (SYSTEM, 1), HEARTBEAT, &[a, b, c, d, 2, 12, armed, 4, 3]);
             let landed = if self.place.z > 9.05 { 2 } else { 1 };
-            self.hear(Link::Autopilot, (SYSTEM, 1), EXTENDED_SYS_STATE, &[0, landed]);
+            self.feed_frame(Link::Autopilot, (SYSTEM, 1), EXTENDED_SYS_STATE, &[0, landed]);
             let mut status = [0; 31];
             status[30] = 90;
-            self.hear(Link::Autopilot, (SYSTEM, 1), SYS_STATUS, &status);
+            self.feed_frame(Link::Autopilot, (SYSTEM, 1), SYS_STATUS, &status);
             // An accuracy of 0.
-            self.hear(Link::Autopilot, (SYSTEM, 1), ESTIMATOR_STATUS, &[0; 42]);
+            self.feed_frame(Link::Autopilot, (SYSTEM, 1), ESTIMATOR_STATUS, &[0; 42]);
         }
         let ned = swap_enu_ned(&self.place);
         let mut position = [0; 28];
-        position[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
-        put(&mut position[4..], &[ned.x, ned.y, ned.z]);
-        self.hear(Link::Autopilot, (SYSTEM, 1), LOCAL_POSITION_NED, &position);
+        position[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
+        put_floats(&mut position[4..], &[ned.x, ned.y, ned.z]);
+        self.feed_frame(Link::Autopilot, (SYSTEM, 1), LOCAL_POSITION_NED, &position);
     }
 
     /// Gives the companion a frame.
-    fn hear(&mut self, link: Link, from: (u8, u8), id: u32, payload: &[u8]) {
+    fn feed_frame(&mut self, link: Link, from: (u8, u8), id: u32, payload: &[u8]) {
         let sequence = &mut self.sequences[usize::from(from.0)];
         *sequence = sequence.wrapping_add(1);
         let header = Header { system: from.0, component: from.1, sequence: *sequence };
@@ -315,10 +316,10 @@ impl<'a, M: Meter> Flight<'a, M> {
         self.meter.call("Companion::handle_bytes, a frame", size_of::<BoardCompanion>(), || {
             companion.handle_bytes(link, now, bytes);
         });
-        self.drain();
+        self.drain_outputs();
     }
 
-    fn send_states_from(&mut self, rng: &mut Pcg32, who: impl Fn(&Other) -> bool) {
+    fn send_states_from(&mut self, rng: &mut Pcg32, who: impl Fn(&SimulatedNeighbour) -> bool) {
         for i in 0..self.others.len() {
             if who(&self.others[i]) {
                 self.send_state_from(i, rng);
@@ -328,54 +329,70 @@ impl<'a, M: Meter> Flight<'a, M> {
 
     /// A neighbour sends its intent and its position.
     fn send_state_from(&mut self, i: usize, rng: &mut Pcg32) {
-        let Other { place, flags, progress_m, .. } = self.others[i];
+        let SimulatedNeighbour { place, flags, progress_m, .. } = self.others[i];
         let system_id = 2 + i as u8;
-        let points = (0..intent::MAX_POINTS).map(|_| place + anywhere(rng, 3.0)).collect();
+        let points = (0..intent::MAX_POINTS).map(|_| place + random_point(rng, 3.0)).collect();
         let intent = Intent {
             system_id,
             flags,
             mission_crc: MISSION_CRC,
             plan_crc: PLAN_CRC,
             progress_m,
-            clear_m: -1e6,
-            heard: u32::MAX,
+            gates_open_up_to_m: -1e6,
+            heard_bits: u32::MAX,
             points,
             ..Intent::default()
         };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);
-        self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
+        self.feed_frame(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
         if self.has_area() {
             self.send_roster_from(system_id);
         }
         let at = frames::enu_to_geodetic(&ORIGIN, &place);
         let mut position = [0; 28];
-        position[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+        position[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
         let whole = [(at.lat_deg * 1e7) as i32, (at.lon_deg * 1e7) as i32, (at.alt_m * 1e3) as i32];
         for (to, number) in position[4..].chunks_exact_mut(4).zip(whole) {
             to.copy_from_slice(&number.to_le_bytes());
         }
         for to in position[20..26].chunks_exact_mut(2) {
-            to.copy_from_slice(&(uniform(rng, -200.0, 200.0) as i16).to_le_bytes());
+            to.copy_from_slice(&(random_between(rng, -200.0, 200.0) as i16).to_le_bytes());
         }
-        self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), GLOBAL_POSITION_INT, &position);
+        self.feed_frame(
+            Link::Swarm,
+            (system_id, companion::COMPANION_COMPONENT),
+            GLOBAL_POSITION_INT,
+            &position,
+        );
     }
 
     /// Gives the companion the roster message of a neighbour: all fly.
     fn send_roster_from(&mut self, system_id: u8) {
         for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES) {
             let known = VEHICLES.min(first + roster::MAX_ENTRIES) - first;
-            let entries = core::iter::repeat_n(Entry::default(), known).collect();
+            let entries = core::iter::repeat_n(RosterReportEntry::default(), known).collect();
             let mission_crc = MISSION_CRC;
-            let roster = Roster { system_id, first: first as u8, mission_crc, entries, ..Roster::default() };
+            let roster = RosterReport {
+                system_id,
+                first: first as u8,
+                mission_crc,
+                entries,
+                ..RosterReport::default()
+            };
             let mut payload = [0; roster::MAX_LEN];
             let len = roster.encode(&mut payload);
-            self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
+            self.feed_frame(
+                Link::Swarm,
+                (system_id, companion::COMPANION_COMPONENT),
+                TUNNEL,
+                &payload[..len],
+            );
         }
     }
 
     /// Takes all that the companion has to say, and does as it asks.
-    fn drain(&mut self) {
+    fn drain_outputs(&mut self) {
         for link in [Link::Autopilot, Link::Swarm] {
             loop {
                 let mut out = [0; MAX_FRAME_LEN];
@@ -387,7 +404,7 @@ impl<'a, M: Meter> Flight<'a, M> {
                     break;
                 }
                 if link == Link::Autopilot {
-                    self.obey(&out[..len]);
+                    self.execute_command(&out[..len]);
                 }
             }
         }
@@ -395,8 +412,8 @@ impl<'a, M: Meter> Flight<'a, M> {
             let Event::PlanRequested(wanted) = event else { continue };
             let (now, companion) = (self.now, &mut *self.companion);
             let mut obstacles = 0_usize;
-            let around = self.meter.call("Companion::detour", size_of::<BoardCompanion>(), || {
-                companion.detour(|_| obstacles += 1)
+            let around = self.meter.call("Companion::detour_request", size_of::<BoardCompanion>(), || {
+                companion.detour_request(|_| obstacles += 1)
             });
             let answer = if around.is_some() { Err(PlanFailure::Unreachable) } else { Ok(self.plan) };
             self.meter.call("Companion::handle_plan", size_of::<BoardCompanion>(), || {
@@ -406,7 +423,7 @@ impl<'a, M: Meter> Flight<'a, M> {
     }
 
     /// Does what a frame commands the autopilot.
-    fn obey(&mut self, frame: &[u8]) {
+    fn execute_command(&mut self, frame: &[u8]) {
         let mut p = [0; 255];
         let payload = &frame[10..frame.len() - 2];
         p[..payload.len()].copy_from_slice(payload);
@@ -424,7 +441,7 @@ impl<'a, M: Meter> Flight<'a, M> {
                     for (to, number) in origin.chunks_exact_mut(4).zip(whole) {
                         to.copy_from_slice(&(number as i32).to_le_bytes());
                     }
-                    self.hear(Link::Autopilot, (SYSTEM, 1), GPS_GLOBAL_ORIGIN, &origin);
+                    self.feed_frame(Link::Autopilot, (SYSTEM, 1), GPS_GLOBAL_ORIGIN, &origin);
                 }
                 _ => {}
             },
@@ -433,7 +450,7 @@ impl<'a, M: Meter> Flight<'a, M> {
     }
 }
 
-fn put(to: &mut [u8], numbers: &[f32]) {
+fn put_floats(to: &mut [u8], numbers: &[f32]) {
     for (to, number) in to.chunks_exact_mut(4).zip(numbers) {
         to.copy_from_slice(&number.to_le_bytes());
     }

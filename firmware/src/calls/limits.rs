@@ -5,11 +5,11 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
-use planner_core::flight::{Done, Look, Path, Photographs, Range, Task, Trigger};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
+use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, WaypointRange};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
-use planner_core::safety::{Bounds, Braking, Heard, Joint, OwnSet, Set};
+use planner_core::safety::{Braking, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet};
 use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
@@ -32,19 +32,19 @@ pub(super) const HARD_NUMBERS: [f32; 14] = [
     f32::NAN,
 ];
 
-/// Hears which call comes next.
-pub trait Listener {
+/// Receives the name of each call before it is made.
+pub trait CallListener {
     /// `name` is its file, its type if it has one, and its own name.
     fn next(&mut self, name: &'static str);
 }
 
 /// Reported answers, and their sum.
-pub struct Answers<'a, L> {
+pub struct ResultChecksum<'a, L> {
     listener: &'a mut L,
     sum: u32,
 }
 
-impl<'a, L: Listener> Answers<'a, L> {
+impl<'a, L: CallListener> ResultChecksum<'a, L> {
     /// No answers yet.
     pub fn new(listener: &'a mut L) -> Self {
         Self { listener, sum: 0 }
@@ -59,19 +59,19 @@ impl<'a, L: Listener> Answers<'a, L> {
     /// Adds an answer; every NaN is the same.
     pub(super) fn add(&mut self, answer: f32) {
         let bits = if answer.is_nan() { 0x7fc0_0000 } else { answer.to_bits() };
-        self.count(bits as usize);
+        self.add_count(bits as usize);
     }
 
-    pub(super) fn point(&mut self, answer: &Point) {
+    pub(super) fn add_point(&mut self, answer: &Point) {
         answer.iter().for_each(|&c| self.add(c));
     }
 
-    pub(super) fn count(&mut self, answer: usize) {
+    pub(super) fn add_count(&mut self, answer: usize) {
         self.sum = self.sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ answer as u32;
     }
 
-    pub(super) fn is(&mut self, answer: bool) {
-        self.count(usize::from(answer));
+    pub(super) fn add_bool(&mut self, answer: bool) {
+        self.add_count(usize::from(answer));
     }
 
     /// The sum of all answers so far.
@@ -81,31 +81,31 @@ impl<'a, L: Listener> Answers<'a, L> {
 }
 
 /// Points of hard numbers.
-pub(super) fn points() -> impl Iterator<Item = Point> {
+pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
     let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
     (0..HARD_NUMBERS.len() * 3).map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
 }
 
 /// Makes all calls that need no roadmap.
-pub fn places(to: &mut Answers<'_, impl Listener>) {
-    frames(to);
-    grids(to);
-    segments(to);
-    samples(to);
-    paths(to);
-    neighbours(to);
-    sets(to);
+pub fn call_without_roadmap(to: &mut ResultChecksum<'_, impl CallListener>) {
+    call_frames(to);
+    call_grids(to);
+    call_segments(to);
+    call_sampling(to);
+    call_paths(to);
+    call_deconfliction(to);
+    call_reachable_sets(to);
 }
 
-fn frames(to: &mut Answers<'_, impl Listener>) {
-    for p in points() {
+fn call_frames(to: &mut ResultChecksum<'_, impl CallListener>) {
+    for p in extreme_points() {
         let hard = Geodetic { lat_deg: p.x.into(), lon_deg: p.y.into(), alt_m: p.z.into() };
         let good = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
         let valid = to.call("frames::Geodetic::is_valid", || hard.is_valid());
         assert!(!valid || hard.lat_deg.abs() <= 90.0);
         for (a, b) in [(good, hard), (hard, good)] {
             let enu = to.call("frames::geodetic_to_enu", || frames::geodetic_to_enu(&a, &b));
-            to.point(&enu);
+            to.add_point(&enu);
             let back = to.call("frames::enu_to_geodetic", || frames::enu_to_geodetic(&a, &p));
             to.add(back.alt_m as f32);
             let apart_m = to.call("frames::haversine_m", || frames::haversine_m(&a, &b));
@@ -116,7 +116,7 @@ fn frames(to: &mut Answers<'_, impl Listener>) {
             }
         }
         let swapped = to.call("frames::swap_enu_ned", || frames::swap_enu_ned(&p));
-        to.point(&swapped);
+        to.add_point(&swapped);
     }
 }
 
@@ -124,7 +124,7 @@ fn frames(to: &mut Answers<'_, impl Listener>) {
 const SHAPE: GridShape = GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
 const WORDS: [u64; 4] = [1 << 17, 0, 0, 0];
 
-fn grids(to: &mut Answers<'_, impl Listener>) {
+fn call_grids(to: &mut ResultChecksum<'_, impl CallListener>) {
     let dims = [0, 1, 4, MAX_DIM, MAX_DIM + 1, u32::MAX];
     for i in 0..dims.len() * dims.len() {
         let shape = GridShape { dims: [dims[i % 6], dims[i / 6], dims[(i * 5 + 1) % 6]], ..SHAPE };
@@ -133,7 +133,7 @@ fn grids(to: &mut Answers<'_, impl Listener>) {
         assert!(bricks.iter().all(|&b| b as usize <= count.max(b as usize)));
         to.call("voxel::GridShape::max", || shape.max());
         let (word, mask) = to.call("voxel::GridShape::address", || shape.address([u32::MAX, 7, dims[i / 6]]));
-        to.count(word ^ mask as usize);
+        to.add_count(word ^ mask as usize);
         let grid = to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
         // Of these shapes only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
         assert!(grid.is_err(), "{shape:?}");
@@ -142,7 +142,7 @@ fn grids(to: &mut Answers<'_, impl Listener>) {
         let shape = GridShape { resolution_m: hard, ..SHAPE };
         let grid = VoxelGrid::new(shape, Outside::Free, &WORDS);
         assert_eq!(grid.is_ok(), hard > 0.0 && hard.is_finite());
-        for p in points() {
+        for p in extreme_points() {
             let cell = to.call("voxel::GridShape::cell_of", || shape.cell_of(&p));
             assert!(cell.is_none_or(|cell| (0..3).all(|a| cell[a] < shape.dims[a])));
         }
@@ -164,18 +164,18 @@ fn grids(to: &mut Answers<'_, impl Listener>) {
             let blocked = to.call("voxel::VoxelGrid::is_occupied", || grid.is_occupied(cell));
             assert_eq!(blocked, outside == Outside::Blocked);
         }
-        for p in points() {
+        for p in extreme_points() {
             let blocked = to.call("voxel::VoxelGrid::is_blocked_at", || grid.is_blocked_at(&p));
-            to.is(blocked);
+            to.add_bool(blocked);
         }
     }
 }
 
-fn segments(to: &mut Answers<'_, impl Listener>) {
+fn call_segments(to: &mut ResultChecksum<'_, impl CallListener>) {
     for outside in [Outside::Free, Outside::Blocked] {
         let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
         let inside = Point::new(2.2, 2.7, 1.2);
-        for p in points() {
+        for p in extreme_points() {
             let snapped = to.call("lattice::snap", || segment::snap(&SHAPE, &p));
             for hard in HARD_NUMBERS {
                 let clear = to.call("segment::segment_is_clear", || {
@@ -193,7 +193,7 @@ fn segments(to: &mut Answers<'_, impl Listener>) {
                 let alone =
                     to.call("distance::point_clearance", || segment::point_clearance(&grid, &p, hard));
                 assert_eq!(alone.to_bits(), distance[0].to_bits());
-                to.is(clear);
+                to.add_bool(clear);
                 to.add(distance[1]);
             }
         }
@@ -212,7 +212,7 @@ fn segments(to: &mut Answers<'_, impl Listener>) {
     }
 }
 
-fn samples(to: &mut Answers<'_, impl Listener>) {
+fn call_sampling(to: &mut ResultChecksum<'_, impl CallListener>) {
     let grid = VoxelGrid::new(SHAPE, Outside::Blocked, &WORDS).expect("a good grid");
     let solid =
         VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX]).expect("it is");
@@ -251,13 +251,14 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
                 Err(PrmError::RoadmapFull) => assert!(pairs > edges.len()),
                 Err(error) => assert_eq!(all, Err(error)),
             }
-            to.count(pairs);
+            to.add_count(pairs);
         }
     }
     assert!(prm::sample_nodes(&solid, None, &[], &good, &mut nodes) == Err(PrmError::NoFreeSpace(0)));
     assert!(prm::sample_nodes(&grid, None, &[Point::zeros()], &good, &mut nodes[..3]).is_err());
-    for p in points() {
-        let indexed = to.call("neighbours::Workspace::index", || index.index(&[p, Point::zeros()], &good));
+    for p in extreme_points() {
+        let indexed =
+            to.call("neighbours::Workspace::build_index", || index.build_index(&[p, Point::zeros()], &good));
         assert_eq!(indexed.is_ok(), p.iter().all(|c| c.abs() <= 1e6));
         let len = to.call("neighbours::Workspace::len", || index.len());
         assert_eq!(len, if indexed.is_ok() { 2 } else { 0 });
@@ -266,12 +267,12 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
             let found = to.call("prm::connect_range", || {
                 prm::connect_range(&grid, &index, &good, range.clone(), |_| Err(PrmError::RoadmapFull))
             });
-            to.is(found.is_ok());
+            to.add_bool(found.is_ok());
             let full = |_: prm::Edge, _: f32| Err(PrmError::RoadmapFull);
             let found = to.call("prm::connect_range_with", || {
                 prm::connect_range_with(&grid, &index, &good, range, |_| None, full)
             });
-            to.is(found.is_ok());
+            to.add_bool(found.is_ok());
         }
         let square = to.call("config::squared_length", || prm::squared_length(p.into(), [0.0; 3]));
         to.add(square);
@@ -285,7 +286,7 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
     }
 }
 
-fn paths(to: &mut Answers<'_, impl Listener>) {
+fn call_paths(to: &mut ResultChecksum<'_, impl CallListener>) {
     let mut path: Path<4> = to.call("flight::Path::new", Path::new);
     let track = TrackConfig::default();
     let advice =
@@ -293,7 +294,7 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
     assert!(track::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
     assert!(path.point_at(f32::NAN).is_none() && path.points_from(0.0, 1.0).next().is_none());
     for round in 0..3 {
-        for p in points() {
+        for p in extreme_points() {
             let before = path.waypoints().len();
             let pushed = to.call("flight::Path::push", || path.push(p, p.x));
             assert!(pushed.is_ok() || path.waypoints().len() == before);
@@ -304,9 +305,11 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
         assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
         for (i, &hard) in HARD_NUMBERS.iter().enumerate() {
             let other = HARD_NUMBERS[(i * 5 + round) % HARD_NUMBERS.len()];
-            to.call("flight::Path::label", || path.label(hard, other));
-            to.call("flight::Path::label_last", || path.label_last(hard, other));
-            to.call("flight::Path::label_by", || path.label_by(hard, |from, to| (to - from).norm() * other));
+            to.call("flight::Path::label_times", || path.label_times(hard, other));
+            to.call("flight::Path::set_last_times", || path.set_last_times(hard, other));
+            to.call("flight::Path::label_times_by", || {
+                path.label_times_by(hard, |from, to| (to - from).norm() * other)
+            });
             let at =
                 to.call("flight::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
             let count =
@@ -332,9 +335,8 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
             assert_eq!(checked.is_ok(), good(hard) && good(other));
             track::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
         }
-        tasks(to, &path);
-        sets_of_waypoints(to);
-        to.count(to_len(&path));
+        call_tasks(to, &path);
+        to.add_count(push_until_full(&path));
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
     }
@@ -342,33 +344,34 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
 }
 
 /// Pictures along a path, whatever their spacing.
-fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
+fn call_tasks(to: &mut ResultChecksum<'_, impl CallListener>, path: &Path<4>) {
     let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
     let waypoints =
-        Range { first: Photographs::MAX_AREA_WAYPOINTS - 1, end: Photographs::MAX_AREA_WAYPOINTS };
+        WaypointRange { first: PicturePlan::MAX_AREA_WAYPOINTS - 1, end: PicturePlan::MAX_AREA_WAYPOINTS };
     for spacing_m in HARD_NUMBERS {
-        let new = || Photographs::new(spacing_m, Look::Ahead, Trigger::Distance);
-        let mut photographs = to.call("photographs::Photographs::new", new);
-        for (from, until) in [(0, last), (last, last), (1, 0), (0, Photographs::MAX_PATH_WAYPOINTS), (62, 63)]
+        let new = || PicturePlan::new(spacing_m, HeadingMode::Ahead, Trigger::Distance);
+        let mut plan = to.call("photographs::PicturePlan::new", new);
+        for (from, until) in [(0, last), (last, last), (1, 0), (0, PicturePlan::MAX_PATH_WAYPOINTS), (62, 63)]
         {
             let marked =
-                to.call("photographs::Photographs::mark", || photographs.mark(from, until, waypoints));
-            assert_eq!(marked.is_ok(), from <= until && until < Photographs::MAX_PATH_WAYPOINTS);
+                to.call("photographs::PicturePlan::add_stretch", || plan.add_stretch(from, until, waypoints));
+            assert_eq!(marked.is_ok(), from <= until && until < PicturePlan::MAX_PATH_WAYPOINTS);
         }
-        let photographs =
-            to.call("photographs::Photographs::of_area", || photographs.of_area(u32::MAX, spacing_m > 0.0));
-        assert_eq!(to.call("photographs::Photographs::area", || photographs.area()), u32::MAX);
-        let all = to.call("photographs::Photographs::count", || photographs.count(path));
-        let end_m = to.call("photographs::Photographs::end_m", || photographs.end_m(path));
+        let plan =
+            to.call("photographs::PicturePlan::with_area", || plan.with_area(u32::MAX, spacing_m > 0.0));
+        assert_eq!(to.call("photographs::PicturePlan::area", || plan.area()), u32::MAX);
+        let all = to.call("photographs::PicturePlan::count", || plan.count(path));
+        let end_m = to.call("photographs::PicturePlan::last_picture_m", || plan.last_picture_m(path));
         assert!(end_m.is_none_or(|end_m| end_m <= path.length_m()));
-        let stretches =
-            to.call("photographs::Photographs::stretches", || photographs.stretches(path).count());
+        let stretches = to.call("photographs::PicturePlan::stretches", || plan.stretches(path).count());
         for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {
-            let taken = to.call("photographs::Photographs::taken_by", || photographs.taken_by(path, along_m));
+            let taken = to.call("photographs::PicturePlan::taken_count", || plan.taken_count(path, along_m));
             let passed =
-                to.call("photographs::Photographs::passed_by", || photographs.passed_by(path, along_m));
+                to.call("photographs::PicturePlan::passed_count", || plan.passed_count(path, along_m));
             assert!(passed <= taken || spacing_m <= 0.0, "{along_m}: {passed} of {taken}");
-            let at_m = to.call("photographs::Photographs::last_by", || photographs.last_by(path, along_m));
+            let at_m = to.call("photographs::PicturePlan::last_picture_before_m", || {
+                plan.last_picture_before_m(path, along_m)
+            });
             assert!(
                 taken <= all && at_m.is_none_or(|at_m| at_m <= path.length_m() + 1.0),
                 "{along_m}: {taken}"
@@ -376,48 +379,32 @@ fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
         }
         assert!(all as usize >= stretches && stretches <= 4, "{spacing_m}: {all} in {stretches}");
         for count in [0, 1, all, u32::MAX] {
-            let pictures = Range { first: 0, end: count };
-            let shown =
-                to.call("photographs::Photographs::shown", || photographs.shown(path, pictures).count());
+            let pictures = WaypointRange { first: 0, end: count };
+            let shown = to.call("photographs::PicturePlan::shown_waypoints", || {
+                plan.shown_waypoints(path, pictures).count()
+            });
             assert!(shown <= stretches, "{count}: {shown} of {stretches}");
         }
-        for shots in photographs.stretches(path) {
-            let place_m = to.call("photographs::Shots::place_m", || shots.place_m(shots.count));
+        for shots in plan.stretches(path) {
+            let place_m =
+                to.call("photographs::PictureStretch::picture_at_m", || shots.picture_at_m(shots.count));
             to.add(place_m);
         }
-        let task = Task::Photograph(photographs);
-        assert!(to.call("flight::Task::flies", || task.flies()));
+        let task = Task::Photograph(plan);
+        assert!(to.call("flight::Task::leaves_pad", || task.leaves_pad()));
         assert_eq!(to.call("flight::Task::goal", || task.goal()), None);
     }
 }
 
-/// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
-fn sets_of_waypoints(to: &mut Answers<'_, impl Listener>) {
-    let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
-    let mut done = to.call("done::Done::new", Done::<2>::new);
-    for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {
-        let before = to.call("done::Done::count", || done.count());
-        let inserted = to.call("done::Done::insert", || done.insert(Range { first, end }));
-        let after = done.count();
-        assert_eq!(inserted == Ok(true), after > before, "{first} to {end}: {before}, {after}");
-        let ranges = to.call("done::Done::ranges", || done.ranges().len());
-        assert_eq!(to.call("done::Done::is_empty", || done.is_empty()), ranges == 0);
-        to.count(after as usize);
-        if after == u32::MAX || inserted.is_err() {
-            to.call("done::Done::clear", || done.clear());
-        }
-    }
-}
-
-fn to_len<const W: usize>(path: &Path<W>) -> usize {
+fn push_until_full<const W: usize>(path: &Path<W>) -> usize {
     path.waypoints().len()
 }
 
-fn neighbours(to: &mut Answers<'_, impl Listener>) {
+fn call_deconfliction(to: &mut ResultChecksum<'_, impl CallListener>) {
     let mut path: Path<4> = Path::new();
     let empty: Path<4> = Path::new();
     [0.0, 4.0].iter().for_each(|&x| path.push(Point::new(x, 0.0, 1.0), 1.0).expect("two points"));
-    for (i, p) in points().enumerate() {
+    for (i, p) in extreme_points().enumerate() {
         let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
         let all: Vec<Neighbour, 4> = (0..4)
             .map(|k| Neighbour {
@@ -434,7 +421,7 @@ fn neighbours(to: &mut Answers<'_, impl Listener>) {
         for method in [Method::Off, Method::Algorithm2, Method::Priority] {
             let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
             for path in [&path, &empty] {
-                let own = Own { rank: 0, position: p, along_m: hard, path, detours: i % 2 == 0 };
+                let own = OwnVehicle { rank: 0, position: p, along_m: hard, path, detours: i % 2 == 0 };
                 let advice = to.call("deconflict::advise", || deconflict::advise(&cfg, &own, &gates, &all));
                 assert!((0.0..=1.0).contains(&advice.speed_scale), "{p:?} {hard} {advice:?}");
                 to.add(advice.stop_within_m);
@@ -447,53 +434,56 @@ fn neighbours(to: &mut Answers<'_, impl Listener>) {
     }
 }
 
-fn sets(to: &mut Answers<'_, impl Listener>) {
-    for (i, p) in points().enumerate() {
+fn call_reachable_sets(to: &mut ResultChecksum<'_, impl CallListener>) {
+    for (i, p) in extreme_points().enumerate() {
         let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
         let braking = Braking { accel_mps2: hard, jerk_mps3: p.x };
         let stop_m = to.call("safety::Braking::stop_m", || braking.stop_m(p.y));
         to.add(stop_m);
-        let bounds = Bounds { braking, speed_max_mps: p.y, silent_s: p.z };
-        let checked = to.call("safety::Bounds::check", || bounds.check());
+        let bounds = MotionBounds { braking, speed_max_mps: p.y, silent_s: p.z };
+        let checked = to.call("safety::MotionBounds::check", || bounds.check());
         assert!(checked.is_err() || (stop_m >= 0.0 && hard > 0.0));
-        let sane = Bounds {
+        let sane = MotionBounds {
             braking: Braking { accel_mps2: 1.5, jerk_mps3: 4.0 },
             speed_max_mps: 2.0,
             silent_s: 45.0,
         };
-        let ahead: Vec<Point, 12> = points().chain(points()).skip(i).take(12).collect();
+        let ahead: Vec<Point, 12> = extreme_points().chain(extreme_points()).skip(i).take(12).collect();
         let own = [
-            to.call("safety::Set::at", || Set::at(p)),
-            to.call("safety::Set::along", || Set::along(p, ahead.iter().copied(), hard)),
-            to.call("safety::Set::vertical", || Set::vertical(p, hard)),
+            to.call("safety::ReachableSet::at", || ReachableSet::at(p)),
+            to.call("safety::ReachableSet::along", || ReachableSet::along(p, ahead.iter().copied(), hard)),
+            to.call("safety::ReachableSet::vertical", || ReachableSet::vertical(p, hard)),
         ];
         for bounds in [bounds, sane] {
-            let heard = Heard {
+            let heard = NeighbourMotion {
                 position: p,
                 velocity: p,
                 speed_mps: hard,
                 age_s: p.x,
                 delay_s: 0.3,
                 points: &ahead[..i % 3],
-                joint: to.call("safety::Joint::find", || Joint::find(&p, &ahead[..i % 3])),
+                place_on_points: to
+                    .call("safety::PlaceOnPoints::find", || PlaceOnPoints::find(&p, &ahead[..i % 3])),
                 extent_m: hard,
                 rests_within_m: 0.0,
                 grounded: i % 5 == 0,
                 column_to_m: (i % 2 == 0).then_some(hard),
             };
-            let reach_m = to.call("safety::Heard::reach_m", || heard.reach_m(&bounds, hard));
+            let reach_m = to.call("safety::NeighbourMotion::reach_m", || heard.reach_m(&bounds, hard));
             to.add(reach_m);
-            let more_m = to.call("safety::Joint::more_m", || heard.joint.more_m());
+            let more_m =
+                to.call("safety::PlaceOnPoints::flown_beyond_m", || heard.place_on_points.flown_beyond_m());
             to.add(more_m);
-            let other = to.call("safety::Heard::set", || heard.set(&bounds, hard));
+            let other =
+                to.call("safety::NeighbourMotion::reachable_set", || heard.reachable_set(&bounds, hard));
             for own in &own {
-                let reach_m = to.call("safety::Set::reach_m", || own.reach_m());
+                let reach_m = to.call("safety::ReachableSet::reach_m", || own.reach_m());
                 let own = to.call("own::OwnSet::new", || OwnSet::new(own));
                 to.add(reach_m);
                 let reach_m = to.call("own::OwnSet::reach_m", || own.reach_m());
                 to.add(reach_m);
                 let near = to.call("own::OwnSet::conflicts", || own.conflicts(&other, &p, hard));
-                to.is(near);
+                to.add_bool(near);
             }
         }
     }

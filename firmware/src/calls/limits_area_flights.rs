@@ -1,20 +1,22 @@
 //! The calls on the flights of a divided area, on divisions after losses and on ways home at their limits and beyond.
 
 use planner_core::Point;
-use planner_core::coverage::flights::{self, Manner, Pad, Swarm};
-use planner_core::coverage::losses::{self, Fate, Loss};
-use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, Route, Unit, Vehicle, Work};
+use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
+use planner_core::coverage::losses::{self, Loss, VehicleStatus};
+use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work};
 use planner_core::coverage::{CoverageError, Flat, around};
-use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOff, Nature};
-use planner_core::field::follow::Following;
+use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::field::follow::TerrainFollowing;
 use planner_core::field::{self, FieldShape, FieldView};
-use planner_core::flight::{Look, Path, Range, Trigger, VehiclePlan};
+use planner_core::flight::{HeadingMode, Path, Trigger, VehiclePlan, WaypointRange};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 
 use super::coverage_flights;
-use super::limits::{Answers, HARD_NUMBERS, Listener, points};
-use super::limits_coverage::{self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, Ways};
+use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum, extreme_points};
+use super::limits_coverage::{
+    self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, ZoneTransit,
+};
 
 /// Waypoints and gates of one vehicle.
 const WAYPOINTS: usize = 24;
@@ -23,18 +25,18 @@ const GATES: usize = 8;
 type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Memory lent to the calls.
-pub(super) struct Lent {
-    area: coverage::Lent,
+pub(super) struct FlightWorkspaces {
+    area: coverage::CoverageWorkspaces,
     losses: losses::Workspace<LANES, VEHICLES>,
     out: Flights,
     own: VehiclePlan<WAYPOINTS, GATES>,
 }
 
-impl Lent {
-    /// All zeros.
+impl FlightWorkspaces {
+    /// Creates it empty: all zeros.
     pub(super) const fn new() -> Self {
         Self {
-            area: coverage::Lent::new(),
+            area: coverage::CoverageWorkspaces::new(),
             losses: losses::Workspace::new(),
             out: SwarmPlan::new(),
             own: VehiclePlan::new(),
@@ -48,39 +50,39 @@ const PAD: Pad = Pad {
     climb_m: 1.5,
     end_z_m: 1.5,
     descent_m: 1.5,
-    aloft: false,
+    airborne: false,
 };
 const PADS: [Pad; VEHICLES] = [
     PAD,
     Pad { id: 2, start: Point::new(5.0, -5.0, 1.5), ..PAD },
     Pad { id: 3, start: Point::new(15.0, -5.0, 1.5), ..PAD },
 ];
-const SWARM: Swarm<'_> = Swarm {
+const SWARM: FlightInputs<'_> = FlightInputs {
     pads: &PADS,
-    manner: Manner { waypoint_m: 10.0, look: Look::Ahead, trigger: Trigger::None },
-    gates_most: GATES,
+    capture: CaptureSettings { waypoint_m: 10.0, heading_mode: HeadingMode::Ahead, trigger: Trigger::None },
+    max_gates: GATES,
     ..coverage_flights::SWARM
 };
 
 /// Makes all calls on coverage.
-pub(super) fn coverage(
-    to: &mut Answers<'_, impl Listener>,
+pub(super) fn call_area_flights(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     schedule: &mut ScheduleWorkspace,
-    lent: &mut Lent,
+    lent: &mut FlightWorkspaces,
 ) {
-    let Lent { area, losses, out, own } = lent;
-    coverage::coverage(to, area);
-    let mut transit = Ways::empty();
-    transit.learn(coverage::area()).expect("there is room");
-    let good = work(&area.tracks, &transit);
-    plans(to, &good, &area.plan, schedule, out);
+    let FlightWorkspaces { area, losses, out, own } = lent;
+    coverage::call_coverage(to, area);
+    let mut transit = ZoneTransit::empty();
+    transit.set_area(coverage::test_area()).expect("there is room");
+    let good = coverage_work(&area.tracks, &transit);
+    call_flight_plans(to, &good, &area.plan, schedule, out);
     let pack = &mut area.powell.pack;
-    divisions(to, &good, &area.plan, &mut Memory { losses, pack, schedule, out });
-    ways_home(to, &transit, own);
+    call_divisions(to, &good, &area.plan, &mut BorrowedWorkspaces { losses, pack, schedule, out });
+    call_ways_home(to, &transit, own);
 }
 
-fn work<'a>(tracks: &'a Lanes, transit: &'a Ways<'a>) -> Work<'a, LANES, CORNERS> {
-    Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: Unit::Waypoint }
+fn coverage_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
+    Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint }
 }
 
 fn is_good(number: f32) -> bool {
@@ -93,16 +95,17 @@ fn is_finite(out: &Flights) -> bool {
     places.into_iter().all(|waypoint| waypoint.position.iter().all(|c| c.is_finite()))
 }
 
-fn plans(
-    to: &mut Answers<'_, impl Listener>,
+fn call_flight_plans(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
     ws: &mut ScheduleWorkspace,
     out: &mut Flights,
 ) {
-    let mut plan = |work: &Work<'_, LANES, CORNERS>, routes: &Plan<VEHICLES>, swarm: &Swarm<'_>| {
-        let planned = to.call("flights::plan", || flights::plan(work, routes, swarm, ws, out));
-        to.is(planned.is_ok());
+    let mut plan = |work: &Work<'_, LANES, CORNERS>, routes: &Plan<VEHICLES>, swarm: &FlightInputs<'_>| {
+        let planned =
+            to.call("flights::plan_flights", || flights::plan_flights(work, routes, swarm, ws, out));
+        to.add_bool(planned.is_ok());
         assert!(planned.is_err() || is_finite(out), "{swarm:?}");
         planned
     };
@@ -129,41 +132,45 @@ fn plans(
             Pad { end_z_m: hard, ..pad },
             Pad { climb_m: hard, ..pad },
             Pad { descent_m: hard, ..pad },
-            Pad { start: Point::new(hard, hard, 30.0), climb_m: 0.0, aloft: true, ..pad },
+            Pad { start: Point::new(hard, hard, 30.0), climb_m: 0.0, airborne: true, ..pad },
         ] {
             let pads = [PADS[0], pad, PADS[2]];
-            let planned = plan(good, routes, &Swarm { pads: &pads, ..SWARM });
+            let planned = plan(good, routes, &FlightInputs { pads: &pads, ..SWARM });
             assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
         }
-        for look in [Look::Ahead, Look::Fixed(hard)] {
+        for look in [HeadingMode::Ahead, HeadingMode::Fixed(hard)] {
             for clearance_m in [10.0, hard] {
-                let manner = Manner { waypoint_m: hard, look, ..SWARM.manner };
-                let planned = plan(good, routes, &Swarm { manner, clearance_m, ..SWARM });
+                let manner = CaptureSettings { waypoint_m: hard, heading_mode: look, ..SWARM.capture };
+                let planned = plan(good, routes, &FlightInputs { capture: manner, clearance_m, ..SWARM });
                 assert!(is_good(hard) || planned.is_err());
             }
         }
         let schedule = ScheduleConfig { separation_m: hard, ..SWARM.schedule };
-        let planned = plan(good, routes, &Swarm { schedule, ..SWARM });
+        let planned = plan(good, routes, &FlightInputs { schedule, ..SWARM });
         assert!(is_good(hard) || matches!(planned, Err(PlanError::Config(_))));
     }
     let pads = [PADS[0], PADS[0], PADS[2]];
-    assert_eq!(plan(good, routes, &Swarm { pads: &pads, ..SWARM }), Err(PlanError::SameId(1)));
-    assert_eq!(plan(good, routes, &Swarm { pads: &PADS[1..], ..SWARM }), Err(PlanError::Terminals));
-    let ranges = [Range { first: 4, end: 9 }, Range { first: 8, end: u32::MAX }];
-    assert_eq!(plan(good, routes, &Swarm { done: &ranges, ..SWARM }), Err(PlanError::Terminals));
+    assert_eq!(plan(good, routes, &FlightInputs { pads: &pads, ..SWARM }), Err(PlanError::SameId(1)));
+    assert_eq!(plan(good, routes, &FlightInputs { pads: &PADS[1..], ..SWARM }), Err(PlanError::Terminals));
+    let ranges = [WaypointRange { first: 4, end: 9 }, WaypointRange { first: 8, end: u32::MAX }];
+    assert_eq!(
+        plan(good, routes, &FlightInputs { photographed: &ranges, ..SWARM }),
+        Err(PlanError::Terminals)
+    );
     for done in [&ranges[..1], &ranges[1..]] {
-        let _ = plan(good, routes, &Swarm { done, ..SWARM });
+        let _ = plan(good, routes, &FlightInputs { photographed: done, ..SWARM });
     }
     for (gates_most, layers_held) in [(0, 0), (usize::MAX, u64::MAX)] {
-        let _ = plan(good, routes, &Swarm { gates_most, layers_held, ..SWARM });
+        let _ =
+            plan(good, routes, &FlightInputs { max_gates: gates_most, held_layers: layers_held, ..SWARM });
     }
     wrong_routes(&mut plan, good, routes);
-    fields(&mut plan, good, routes);
+    call_field_plans(&mut plan, good, routes);
 }
 
 /// Plans routes whose lanes or vehicles are not those of the request: each must be refused.
 fn wrong_routes(
-    plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &Swarm<'_>) -> Result<(), PlanError>,
+    plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Result<(), PlanError>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
 ) {
@@ -184,82 +191,82 @@ fn wrong_routes(
         routes.routes[0] = Route { heading, layer, ..first };
         let _ = plan(good, &routes, &SWARM);
     }
-    let aloft = PADS.map(|pad| Pad { start: pad.start + Point::new(0.0, 0.0, 40.0), aloft: true, ..pad });
-    assert_eq!(plan(good, &Plan::new(), &Swarm { pads: &aloft, ..SWARM }), Ok(()));
+    let aloft = PADS.map(|pad| Pad { start: pad.start + Point::new(0.0, 0.0, 40.0), airborne: true, ..pad });
+    assert_eq!(plan(good, &Plan::new(), &FlightInputs { pads: &aloft, ..SWARM }), Ok(()));
     assert_eq!(plan(good, &Plan::new(), &SWARM), Ok(()));
 }
 
 /// Lanes over a field.
-fn fields(
-    plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &Swarm<'_>) -> Result<(), PlanError>,
+fn call_field_plans(
+    plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Result<(), PlanError>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
 ) {
     let mut file = [0; 64];
-    let field = ground(&mut file);
+    let field = uneven_field(&mut file);
     for hard in HARD_NUMBERS {
-        let usual = Following { field, height_m: 30.0, tolerance_m: 3.0, slope: 0.5 };
+        let usual = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: 0.5 };
         for following in [
             usual,
-            Following { height_m: hard, ..usual },
-            Following { tolerance_m: hard, ..usual },
-            Following { slope: hard, ..usual },
+            TerrainFollowing { height_m: hard, ..usual },
+            TerrainFollowing { tolerance_m: hard, ..usual },
+            TerrainFollowing { slope: hard, ..usual },
         ] {
-            let _ = plan(good, routes, &Swarm { following: Some(following), ..SWARM });
+            let _ = plan(good, routes, &FlightInputs { following: Some(following), ..SWARM });
         }
     }
 }
 
 /// Uneven ground under the area.
-fn ground(file: &mut [u8]) -> FieldView<'_> {
+fn uneven_field(file: &mut [u8]) -> FieldView<'_> {
     let shape = FieldShape { low: Flat::new(-20.0, -20.0), cell_m: 40.0, columns: 2, rows: 3 };
     let length = field::write(&shape, &[0, 20, 40, 10, -30, 50], file).expect("it fits");
     FieldView::parse(&file[..length]).expect("a field")
 }
 
-struct Memory<'m> {
+struct BorrowedWorkspaces<'m> {
     losses: &'m mut losses::Workspace<LANES, VEHICLES>,
     pack: &'m mut PackWorkspace<VEHICLES>,
     schedule: &'m mut ScheduleWorkspace,
     out: &'m mut Flights,
 }
 
-fn divisions(
-    to: &mut Answers<'_, impl Listener>,
+fn call_divisions(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
-    memory: &mut Memory<'_>,
+    memory: &mut BorrowedWorkspaces<'_>,
 ) {
     *memory.losses = to.call("losses::Workspace::new", losses::Workspace::new);
     let all = good.tracks.waypoint_count();
     for (first, end) in [(0, 0), (1, 3), (all, all), (3, 1), (0, u32::MAX), (u32::MAX, u32::MAX), (0, all)] {
-        let done = [Range { first, end }];
-        let begun = to.call("losses::Workspace::begin", || {
-            memory.losses.begin(good.tracks, good.transit, &done).is_ok()
+        let done = [WaypointRange { first, end }];
+        let begun = to.call("losses::Workspace::start_plan", || {
+            memory.losses.start_plan(good.tracks, good.transit, &done).is_ok()
         });
-        to.is(begun);
+        to.add_bool(begun);
         let done = to.call("losses::Workspace::done", || memory.losses.done().len());
         assert!(done <= 1);
     }
-    let fate = Fate { lives: true, along_m: 60.0 };
-    let lost = Fate { lives: false, along_m: 60.0 };
+    let fate = VehicleStatus { alive: true, along_m: 60.0 };
+    let lost = VehicleStatus { alive: false, along_m: 60.0 };
     for hard in HARD_NUMBERS {
-        for hit in [Fate { along_m: hard, ..fate }, Fate { along_m: hard, ..lost }] {
+        for hit in [VehicleStatus { along_m: hard, ..fate }, VehicleStatus { along_m: hard, ..lost }] {
             for fates in [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]] {
-                memory.losses.begin(good.tracks, good.transit, &[]).expect("nothing is done");
-                flights::plan(good, routes, &SWARM, memory.schedule, memory.out).expect("as before");
+                memory.losses.start_plan(good.tracks, good.transit, &[]).expect("nothing is done");
+                flights::plan_flights(good, routes, &SWARM, memory.schedule, memory.out).expect("as before");
                 let mut routes = routes.clone();
                 let loss = Loss { work: good, swarm: &SWARM, fates };
-                let divided = again(to, &loss, memory, &mut routes);
+                let divided = call_redivide(to, &loss, memory, &mut routes);
                 assert!(fates.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into()));
                 let setting = Err(CoverageError::Setting("along_m").into());
                 assert!(fates.len() != VEHICLES || hard >= 0.0 || divided == setting);
-                to.count(routes.routes.len());
+                to.add_count(routes.routes.len());
                 // Once more: what is done stays done.
-                let _ = again(to, &loss, memory, &mut routes);
+                let _ = call_redivide(to, &loss, memory, &mut routes);
                 if let Some(route) = routes.routes.first_mut() {
                     route.vehicle = u8::MAX;
-                    let unknown = again(to, &loss, memory, &mut routes);
+                    let unknown = call_redivide(to, &loss, memory, &mut routes);
                     assert_eq!(unknown, Err(CoverageError::Vehicles.into()));
                 }
             }
@@ -267,26 +274,27 @@ fn divisions(
     }
 }
 
-fn again(
-    to: &mut Answers<'_, impl Listener>,
+fn call_redivide(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     loss: &Loss<'_, LANES, CORNERS>,
-    memory: &mut Memory<'_>,
+    memory: &mut BorrowedWorkspaces<'_>,
     routes: &mut Plan<VEHICLES>,
 ) -> Result<(), losses::Error> {
-    let Memory { losses, pack, schedule, out } = memory;
-    let divided = to.call("losses::redivide", || losses::redivide(loss, losses, pack, schedule, routes, out));
+    let BorrowedWorkspaces { losses, pack, schedule, out } = memory;
+    let divided =
+        to.call("losses::redivide_work", || losses::redivide_work(loss, losses, pack, schedule, routes, out));
     assert!(divided.is_err() || is_finite(out), "{:?}", loss.fates);
-    to.is(divided.is_ok());
+    to.add_bool(divided.is_ok());
     divided
 }
 
-fn ways_home(
-    to: &mut Answers<'_, impl Listener>,
-    transit: &Ways<'_>,
+fn call_ways_home(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    transit: &ZoneTransit<'_>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
     let mut file = [0; 64];
-    let field = ground(&mut file);
+    let field = uneven_field(&mut file);
     let here = Point::new(30.0, 20.0, 35.0);
     let over = Point::new(-5.0, -5.0, 1.5);
     let good = DetourRequest {
@@ -299,10 +307,10 @@ fn ways_home(
         required_clearance_m: 0.8,
         fence: None,
     };
-    let natures = [Nature::Solid, Nature::Landing, Nature::Lying];
-    for (i, p) in points().enumerate() {
+    let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
+    for (i, p) in extreme_points().enumerate() {
         let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
-        let thing = KeepOff { from: p, to: here, radius_m: hard, nature: natures[i % 3] };
+        let thing = KeepOutZone { from: p, to: here, radius_m: hard, kind: natures[i % 3] };
         for request in [
             good,
             DetourRequest { aside: true, ..good },
@@ -318,18 +326,19 @@ fn ways_home(
             for field in [None, Some(field)] {
                 let mut path = Path::<WAYPOINTS>::new();
                 let bad = request.check().is_err() || thing.check().is_err();
-                let found = to
-                    .call("around::plan", || around::plan(transit, field, &request, &mut [thing], &mut path));
+                let found = to.call("around::plan_detour", || {
+                    around::plan_detour(transit, field, &request, &mut [thing], &mut path)
+                });
                 assert_eq!(matches!(found, Err(DetourError::Config(_))), bad, "{request:?} {thing:?}");
                 let finite = path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()));
                 assert!(found.is_err() || finite);
-                to.is(found.is_ok());
-                let again = to.call("around::plan_vehicle", || {
-                    around::plan_vehicle(transit, field, &request, &mut [thing], own)
+                to.add_bool(found.is_ok());
+                let again = to.call("around::plan_vehicle_detour", || {
+                    around::plan_vehicle_detour(transit, field, &request, &mut [thing], own)
                 });
                 assert_eq!(again, found);
                 let mut short = Path::<1>::new();
-                to.is(around::plan(transit, field, &request, &mut [], &mut short).is_ok());
+                to.add_bool(around::plan_detour(transit, field, &request, &mut [], &mut short).is_ok());
             }
         }
     }

@@ -3,14 +3,16 @@
 use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
-use planner_core::coverage::pack::{self, Heading, Heights, PackWorkspace, Plan, Route, Unit, Vehicle, Work};
+use planner_core::coverage::pack::{
+    self, Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work,
+};
 use planner_core::coverage::powell::{self, powell};
-use planner_core::coverage::tracks::{self, Lane, Pattern, Tracks};
+use planner_core::coverage::tracks::{self, Lane, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
-use planner_core::flight::Range;
+use planner_core::flight::{WaypointRange, WaypointSet};
 
-use super::limits::{Answers, HARD_NUMBERS, Listener};
+use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum};
 
 /// Capacities: lanes, vertices, corners of no-fly zones, vehicles.
 pub(super) const LANES: usize = 8;
@@ -33,7 +35,8 @@ const CORNERS_OF_ALL: [Flat; 8] = [
 const RINGS: [Ring; 2] = [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 8, kind: RingKind::NoFly }];
 const SPACING: Spacing =
     Spacing { footprint: Footprint { along_m: 10.0, across_m: 10.0 }, lane_m: 10.0, waypoint_m: 10.0 };
-const PATTERN: Pattern = Pattern { spacing: SPACING, angle_deg: None, margin_m: 0.0, looks: 100 };
+const PATTERN: LanePattern =
+    LanePattern { spacing: SPACING, angle_deg: None, margin_m: 0.0, search_steps: 100 };
 pub(super) const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 const VEHICLE: Vehicle = Vehicle {
     place: Flat::new(-5.0, -5.0),
@@ -51,10 +54,10 @@ pub(super) const FLEET: [Vehicle; VEHICLES] = [
 const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
 
 pub(super) type Lanes = Tracks<LANES>;
-pub(super) type Ways<'a> = Transit<'a, CORNERS>;
+pub(super) type ZoneTransit<'a> = Transit<'a, CORNERS>;
 
 /// Memory lent to the calls.
-pub(super) struct Lent {
+pub(super) struct CoverageWorkspaces {
     pub(super) tracks: Lanes,
     left: Lanes,
     build: tracks::Workspace<VERTICES>,
@@ -62,8 +65,8 @@ pub(super) struct Lent {
     pub(super) plan: Plan<VEHICLES>,
 }
 
-impl Lent {
-    /// All zeros.
+impl CoverageWorkspaces {
+    /// Creates it empty: all zeros.
     pub(super) const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
@@ -79,25 +82,26 @@ fn is_good(number: f32) -> bool {
     number > 0.0 && number.is_finite()
 }
 
-/// Makes all of them. Lent are afterwards the lanes and the routes of [`area`].
-pub(super) fn coverage(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) {
-    cameras(to);
-    areas(to);
-    let area = area();
-    let mut transit = to.call("transit::Transit::empty", Ways::empty);
-    ways(to, &mut transit);
-    lanes(to, &area, &transit, lent);
-    divisions(to, &transit, lent);
-    packs(to, &transit, lent);
-    searches(to, &transit, lent);
+/// Makes all of them. Lent are afterwards the lanes and the routes of [`test_area`].
+pub(super) fn call_coverage(to: &mut ResultChecksum<'_, impl CallListener>, lent: &mut CoverageWorkspaces) {
+    call_waypoint_sets(to);
+    call_cameras(to);
+    call_areas(to);
+    let area = test_area();
+    let mut transit = to.call("transit::Transit::empty", ZoneTransit::empty);
+    call_transits(to, &mut transit);
+    call_lanes(to, &area, &transit, lent);
+    call_divisions(to, &transit, lent);
+    call_packing(to, &transit, lent);
+    call_share_searches(to, &transit, lent);
 }
 
 /// 40 by 30 m, around a no-fly zone.
-pub(super) fn area() -> Area<'static> {
+pub(super) fn test_area() -> Area<'static> {
     Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
 }
 
-fn cameras(to: &mut Answers<'_, impl Listener>) {
+fn call_cameras(to: &mut ResultChecksum<'_, impl CallListener>) {
     let pixels = [6000, 4000];
     for hard in HARD_NUMBERS {
         for camera in [
@@ -119,33 +123,36 @@ fn cameras(to: &mut Answers<'_, impl Listener>) {
             to.add(footprint.across_m);
             to.add(height_m.unwrap_or(0.0));
             let spacing = Spacing { footprint, lane_m: hard, waypoint_m: 1.0 };
-            let checked = to_check(to, &spacing).is_ok();
-            to.is(checked);
+            let checked = check_spacing(to, &spacing).is_ok();
+            to.add_bool(checked);
         }
         for spacing in [
             Spacing { lane_m: hard, ..SPACING },
             Spacing { waypoint_m: hard, ..SPACING },
             Spacing { footprint: Footprint { along_m: hard, across_m: hard }, ..SPACING },
         ] {
-            assert!(is_good(hard) || to_check(to, &spacing).is_err());
+            assert!(is_good(hard) || check_spacing(to, &spacing).is_err());
         }
     }
 }
 
-fn to_check(to: &mut Answers<'_, impl Listener>, spacing: &Spacing) -> Result<(), CoverageError> {
+fn check_spacing(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    spacing: &Spacing,
+) -> Result<(), CoverageError> {
     to.call("footprint::Spacing::check", || spacing.check())
 }
 
-fn areas(to: &mut Answers<'_, impl Listener>) {
+fn call_areas(to: &mut ResultChecksum<'_, impl CallListener>) {
     for x in HARD_NUMBERS {
         for y in HARD_NUMBERS {
             let mut vertices = CORNERS_OF_ALL;
             vertices[2] = Flat::new(x, y);
             let found = to.call("area::Area::new", || Area::new(&vertices, &RINGS));
-            to.is(found.is_ok());
+            to.add_bool(found.is_ok());
             let place = Flat::new(x, y);
-            let holds = to.call("area::Area::holds", || area().holds(&place));
-            let forbids = to.call("area::Area::forbids", || area().forbids(&place));
+            let holds = to.call("area::Area::contains", || test_area().contains(&place));
+            let forbids = to.call("area::Area::is_in_no_fly_zone", || test_area().is_in_no_fly_zone(&place));
             assert!(holds || !forbids, "the zone lies in the area");
             let Ok(area) = found else { continue };
             let mut hull: Vec<Flat, VERTICES> = Vec::new();
@@ -153,7 +160,7 @@ fn areas(to: &mut Answers<'_, impl Listener>) {
             assert!(direction.is_ok_and(|found| (found.along.norm() - 1.0).abs() < 1e-3));
             to.add(direction.map_or(0.0, |found| found.across.x));
         }
-        let direction = to.call("sweep::Direction::at_deg", || sweep::Direction::at_deg(x));
+        let direction = to.call("sweep::LaneDirection::at_deg", || sweep::LaneDirection::at_deg(x));
         to.add(direction.along.x);
     }
     let rings = |ends: [u16; 2], kind: RingKind| ends.map(|end| Ring { end, kind });
@@ -166,7 +173,7 @@ fn areas(to: &mut Answers<'_, impl Listener>) {
         }
     }
     assert!(Area::new(&[], &[]).is_err());
-    let area = area();
+    let area = test_area();
     for index in [0, 1, 2, usize::MAX] {
         let ring = to.call("area::Area::ring", || area.ring(index));
         assert_eq!(ring.len(), if index < 2 { 4 } else { 0 });
@@ -178,53 +185,66 @@ fn areas(to: &mut Answers<'_, impl Listener>) {
     assert!(sweep::least_width(&area, &mut none).is_err(), "no room for the hull");
 }
 
-fn ways(to: &mut Answers<'_, impl Listener>, transit: &mut Ways<'static>) {
+fn call_transits(to: &mut ResultChecksum<'_, impl CallListener>, transit: &mut ZoneTransit<'static>) {
     let mut small = Transit::<3>::empty();
-    let full = to.call("transit::Transit::learn", || small.learn(area()));
+    let full = to.call("transit::Transit::set_area", || small.set_area(test_area()));
     assert_eq!(full, Err(CoverageError::NoFlyFull));
     for known in [false, true] {
         if known {
-            assert_eq!(to.call("transit::Transit::learn", || transit.learn(area())), Ok(()));
+            assert_eq!(to.call("transit::Transit::set_area", || transit.set_area(test_area())), Ok(()));
         }
         let corners = to.call("transit::Transit::corners", || transit.corners().len());
         assert_eq!(corners, if known { CORNERS } else { 0 });
         for x in HARD_NUMBERS {
             for y in HARD_NUMBERS {
                 let (from, there) = (Flat::new(x, y), Flat::new(15.0, 40.0));
-                let forbids = to.call("transit::Transit::forbids", || transit.forbids(&from));
+                let forbids =
+                    to.call("transit::Transit::is_in_no_fly_zone", || transit.is_in_no_fly_zone(&from));
                 assert!(known || !forbids);
-                let clear = to.call("transit::Transit::is_clear", || transit.is_clear(&from, &there));
-                to.is(clear);
+                let clear =
+                    to.call("transit::Transit::is_line_clear", || transit.is_line_clear(&from, &there));
+                to.add_bool(clear);
                 let far_m = to.call("transit::Transit::distance_m", || transit.distance_m(&from, &there));
                 to.add(far_m);
                 let mut corners: Vec<Flat, CORNERS> = Vec::new();
-                let way = to.call("transit::Transit::way", || transit.way(&from, &there, &mut corners));
-                to.is(way.is_ok());
-                to.count(corners.len());
-                let back = transit.way(&there, &from, &mut corners);
-                to.is(back.is_ok());
+                let way = to.call("transit::Transit::shortest_path", || {
+                    transit.shortest_path(&from, &there, &mut corners)
+                });
+                to.add_bool(way.is_ok());
+                to.add_count(corners.len());
+                let back = transit.shortest_path(&there, &from, &mut corners);
+                to.add_bool(back.is_ok());
             }
         }
     }
 }
 
-fn lanes(to: &mut Answers<'_, impl Listener>, area: &Area<'_>, transit: &Ways<'_>, lent: &mut Lent) {
-    let Lent { tracks, build, .. } = lent;
+fn call_lanes(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    area: &Area<'_>,
+    transit: &ZoneTransit<'_>,
+    lent: &mut CoverageWorkspaces,
+) {
+    let CoverageWorkspaces { tracks, build, .. } = lent;
     *build = to.call("strips::Workspace::new", tracks::Workspace::new);
     *tracks = to.call("lanes::Tracks::new", Tracks::new);
-    numbers(to, tracks);
+    call_waypoint_numbers(to, tracks);
     for hard in HARD_NUMBERS {
         for pattern in [
-            Pattern { angle_deg: Some(hard), ..PATTERN },
-            Pattern { margin_m: hard, ..PATTERN },
-            Pattern { spacing: Spacing { lane_m: hard, ..SPACING }, ..PATTERN },
-            Pattern { spacing: Spacing { waypoint_m: hard, ..SPACING }, looks: u32::MAX, ..PATTERN },
-            Pattern { looks: 0, ..PATTERN },
+            LanePattern { angle_deg: Some(hard), ..PATTERN },
+            LanePattern { margin_m: hard, ..PATTERN },
+            LanePattern { spacing: Spacing { lane_m: hard, ..SPACING }, ..PATTERN },
+            LanePattern {
+                spacing: Spacing { waypoint_m: hard, ..SPACING },
+                search_steps: u32::MAX,
+                ..PATTERN
+            },
+            LanePattern { search_steps: 0, ..PATTERN },
         ] {
             let built = to.call("tracks::build", || tracks::build(area, &pattern, transit, build, tracks));
-            to.is(built.is_ok());
+            to.add_bool(built.is_ok());
             if built.is_ok() {
-                numbers(to, tracks);
+                call_waypoint_numbers(to, tracks);
             }
         }
         for end in HARD_NUMBERS {
@@ -238,54 +258,62 @@ fn lanes(to: &mut Answers<'_, impl Listener>, area: &Area<'_>, transit: &Ways<'_
             }
         }
     }
-    let many = Pattern { spacing: Spacing { lane_m: 1.0, ..SPACING }, ..PATTERN };
+    let many = LanePattern { spacing: Spacing { lane_m: 1.0, ..SPACING }, ..PATTERN };
     assert_eq!(tracks::build(area, &many, transit, build, tracks), Err(CoverageError::LanesFull));
     assert_eq!(tracks::build(area, &PATTERN, transit, build, tracks), Ok(()));
-    numbers(to, tracks);
+    call_waypoint_numbers(to, tracks);
 }
 
 /// Waypoints that there are and that there are not.
-fn numbers(to: &mut Answers<'_, impl Listener>, tracks: &Lanes) {
+fn call_waypoint_numbers(to: &mut ResultChecksum<'_, impl CallListener>, tracks: &Lanes) {
     let count = to.call("lanes::Tracks::waypoint_count", || tracks.waypoint_count());
     let lanes = to.call("lanes::Tracks::lanes", || tracks.lanes().len());
-    let along = to.call("lanes::Tracks::along", || tracks.along());
+    let along = to.call("lanes::Tracks::lane_direction", || tracks.lane_direction());
     let length_m = to.call("lanes::Tracks::length_m", || tracks.length_m());
     for number in NUMBERS.into_iter().chain([count, count.saturating_sub(1)]) {
         let lane = to.call("lanes::Tracks::lane_of", || tracks.lane_of(number));
         assert!(lane < lanes.max(1));
         let place = to.call("lanes::Tracks::waypoint", || tracks.waypoint(number));
         assert_eq!(place.is_some(), number < count);
-        let along_m = to.call("lanes::Tracks::along_m", || tracks.along_m(number));
+        let along_m =
+            to.call("lanes::Tracks::distance_to_waypoint_m", || tracks.distance_to_waypoint_m(number));
         assert!(along_m <= length_m * 1.001);
         to.add(along_m + along.x);
     }
 }
 
-fn divisions(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Lent) {
-    let Lent { tracks, left, .. } = lent;
+fn call_divisions(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    transit: &ZoneTransit<'_>,
+    lent: &mut CoverageWorkspaces,
+) {
+    let CoverageWorkspaces { tracks, left, .. } = lent;
     for first in NUMBERS {
         for end in NUMBERS {
-            let done = [Range { first: 0, end: 2 }, Range { first, end }];
+            let done = [WaypointRange { first: 0, end: 2 }, WaypointRange { first, end }];
             for done in [&done[..], &done[1..]] {
-                let found = to.call("divide::left", || divide::left(tracks, done, transit, left));
+                let found = to
+                    .call("divide::remaining_lanes", || divide::remaining_lanes(tracks, done, transit, left));
                 assert!(found.is_err() || first <= end && end <= tracks.waypoint_count());
-                to.is(found.is_ok());
+                to.add_bool(found.is_ok());
                 for number in NUMBERS {
-                    let whole = to.call("divide::original", || divide::original(done, number));
+                    let whole = to.call("divide::original_waypoint_number", || {
+                        divide::original_waypoint_number(done, number)
+                    });
                     assert!(whole >= number);
-                    to.count(whole as usize);
+                    to.add_count(whole as usize);
                 }
             }
         }
     }
-    let all = [Range { first: 0, end: tracks.waypoint_count() }];
-    assert_eq!(divide::left(tracks, &all, transit, left), Err(CoverageError::NothingToCover));
+    let all = [WaypointRange { first: 0, end: tracks.waypoint_count() }];
+    assert_eq!(divide::remaining_lanes(tracks, &all, transit, left), Err(CoverageError::NothingToCover));
     let mut none = Tracks::<1>::new();
-    assert!(divide::left(&none.clone(), &[], transit, &mut none).is_err());
+    assert!(divide::remaining_lanes(&none.clone(), &[], transit, &mut none).is_err());
 }
 
 /// [`FLEET`], one of which has a hard number.
-fn fleets(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
+fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     let with = |vehicle: Vehicle| [FLEET[0], vehicle, FLEET[2]];
     [
         with(Vehicle { place: Flat::new(hard, 0.0), ..VEHICLE }),
@@ -297,45 +325,52 @@ fn fleets(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     ]
 }
 
-fn packs(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Lent) {
-    let Lent { tracks, powell, plan, .. } = lent;
+fn call_packing(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    transit: &ZoneTransit<'_>,
+    lent: &mut CoverageWorkspaces,
+) {
+    let CoverageWorkspaces { tracks, powell, plan, .. } = lent;
     *plan = to.call("pack::Plan::new", Plan::new);
     let ws = &mut powell.pack;
     *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
-    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: Unit::Waypoint };
-    let pack = |to: &mut Answers<'_, _>, work: &Work<'_, LANES, CORNERS>, ws: &mut _, plan: &mut Plan<_>| {
-        let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
-        let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
-        assert!(checked.is_ok() || packed == checked);
-        to.is(packed.is_ok());
-        let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
-        shares.iter().for_each(|share| to.add(*share));
-        for vehicle in work.vehicles {
-            let delay_s = to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
-            to.add(delay_s);
-        }
-        let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
-        to.add(max_s);
-        for route in &plan.routes {
-            let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
-            let ends = to.call("pack::Route::ends", || route.ends());
-            assert_eq!(waypoints.next(), Some(ends.0));
-            to.count((ends.0 ^ ends.1) as usize);
-        }
-    };
+    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let pack =
+        |to: &mut ResultChecksum<'_, _>, work: &Work<'_, LANES, CORNERS>, ws: &mut _, plan: &mut Plan<_>| {
+            let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
+            let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
+            assert!(checked.is_ok() || packed == checked);
+            to.add_bool(packed.is_ok());
+            let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
+            shares.iter().for_each(|share| to.add(*share));
+            for vehicle in work.vehicles {
+                let delay_s =
+                    to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
+                to.add(delay_s);
+            }
+            let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
+            to.add(max_s);
+            for route in &plan.routes {
+                let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
+                let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
+                assert_eq!(waypoints.next(), Some(ends.0));
+                to.add_count((ends.0 ^ ends.1) as usize);
+            }
+        };
     for hard in HARD_NUMBERS {
-        for unit in [Unit::Lane, Unit::Waypoint] {
+        for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
             for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
                 pack(to, &Work { unit, heights, ..good }, ws, plan);
             }
-            for vehicles in &fleets(hard) {
+            for vehicles in &fleets_with_hard_number(hard) {
                 pack(to, &Work { unit, vehicles, ..good }, ws, plan);
             }
             for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
                 let work = Work { unit, ..good };
-                let packed = to.call("pack::by_shares", || pack::by_shares(&work, shares, ws, plan));
+                let packed =
+                    to.call("pack::binpat_with_shares", || pack::binpat_with_shares(&work, shares, ws, plan));
                 assert!(shares.len() == VEHICLES || packed.is_err());
-                to.is(packed.is_ok());
+                to.add_bool(packed.is_ok());
                 let mut ends = [0; VEHICLES];
                 to.call("pack::cbinpack", || pack::cbinpack(tracks, unit, shares, &mut ends));
                 assert!(ends.iter().all(|end| *end <= tracks.waypoint_count()), "{shares:?}");
@@ -352,51 +387,78 @@ fn packs(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Len
         for heading in [Heading::Forward, Heading::Backward] {
             let whole = Route { vehicle: u8::MAX, first, end, heading, layer: 0, ..plan.routes[0] };
             for route in [whole, Route { first: end, ..whole }] {
-                let ends = to.call("pack::Route::ends", || route.ends());
+                let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
                 let waypoints = to.call("pack::Route::waypoints", || route.waypoints().take(3).count());
-                to.count((ends.0 ^ ends.1) as usize + waypoints);
+                to.add_count((ends.0 ^ ends.1) as usize + waypoints);
             }
         }
     }
 }
 
-fn searches(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Lent) {
-    let Lent { tracks, powell: ws, plan, .. } = lent;
+fn call_share_searches(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    transit: &ZoneTransit<'_>,
+    lent: &mut CoverageWorkspaces,
+) {
+    let CoverageWorkspaces { tracks, powell: ws, plan, .. } = lent;
     *ws = to.call("powell::Workspace::new", powell::Workspace::new);
-    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: Unit::Waypoint };
+    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
     let mut ways_m = [0.0; 512];
     let mut reaches = [0; 1024];
     let mut states = [(0, 0); 1 << (2 * VEHICLES)];
     for hard in HARD_NUMBERS {
-        for vehicles in &fleets(hard) {
+        for vehicles in &fleets_with_hard_number(hard) {
             let work = Work { vehicles, ..good };
             let checked = work.check::<VEHICLES>();
             let bound = to.call("bound::lower_bound_s", || bound::lower_bound_s(&work));
             assert_eq!(bound.is_ok(), checked.is_ok());
             to.add(bound.unwrap_or(0.0));
             for evaluations in [0, 20] {
-                let config = powell::Config { evaluations };
+                let config = powell::PowellConfig { evaluations };
                 let found = to.call("powell::powell", || powell(&work, &config, ws, plan));
                 assert!(checked.is_ok() || found == checked);
-                to.is(found.is_ok());
+                to.add_bool(found.is_ok());
                 to.add(plan.max_cost_s());
             }
             let mut memory =
                 exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
-            let found = to.call("exact::exact", || exact::exact(&work, &mut memory, &mut ws.pack, plan));
+            let found =
+                to.call("exact::plan_exact", || exact::plan_exact(&work, &mut memory, &mut ws.pack, plan));
             assert!(checked.is_ok() || found == checked);
-            to.is(found.is_ok());
+            to.add_bool(found.is_ok());
             to.add(plan.max_cost_s());
         }
     }
     for vehicles in [0, VEHICLES, exact::MAX_EXACT_VEHICLES, usize::MAX] {
         for waypoints in [0, 1, usize::MAX] {
-            let lengths =
-                to.call("exact::Workspace::lengths", || exact::Workspace::lengths(vehicles, waypoints));
+            let lengths = to.call("exact::Workspace::required_lengths", || {
+                exact::Workspace::required_lengths(vehicles, waypoints)
+            });
             assert!(lengths[2] <= 1 << (2 * exact::MAX_EXACT_VEHICLES));
         }
     }
     let mut small = exact::Workspace { ways_m: &mut [], reaches: &mut [], states: &mut [] };
-    assert_eq!(exact::exact(&good, &mut small, &mut ws.pack, plan), Err(CoverageError::WorkspaceTooSmall));
-    assert_eq!(powell(&good, &powell::Config { evaluations: 50 }, ws, plan), Ok(()));
+    assert_eq!(
+        exact::plan_exact(&good, &mut small, &mut ws.pack, plan),
+        Err(CoverageError::WorkspaceTooSmall)
+    );
+    assert_eq!(powell(&good, &powell::PowellConfig { evaluations: 50 }, ws, plan), Ok(()));
+}
+
+/// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
+fn call_waypoint_sets(to: &mut ResultChecksum<'_, impl CallListener>) {
+    let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
+    let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);
+    for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {
+        let before = to.call("done::WaypointSet::count", || done.count());
+        let inserted = to.call("done::WaypointSet::insert", || done.insert(WaypointRange { first, end }));
+        let after = done.count();
+        assert_eq!(inserted == Ok(true), after > before, "{first} to {end}: {before}, {after}");
+        let ranges = to.call("done::WaypointSet::ranges", || done.ranges().len());
+        assert_eq!(to.call("done::WaypointSet::is_empty", || done.is_empty()), ranges == 0);
+        to.add_count(after as usize);
+        if after == u32::MAX || inserted.is_err() {
+            to.call("done::WaypointSet::clear", || done.clear());
+        }
+    }
 }

@@ -2,10 +2,10 @@
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
-use planner_core::field::follow::Following;
+use planner_core::field::follow::TerrainFollowing;
 use planner_core::field::{self, FieldShape, FieldView, MAX_NODES};
 
-use super::limits::{Answers, HARD_NUMBERS, Listener};
+use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum};
 
 const COLUMNS: u16 = 3;
 const ROWS: u16 = 2;
@@ -17,13 +17,13 @@ const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
 /// with one slope.
 const FAR_COORDINATES: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
-pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
+pub(super) fn call_fields(to: &mut ResultChecksum<'_, impl CallListener>) {
     let good = FieldShape { low: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
     let mut file = [0; BYTES];
     for hard in HARD_NUMBERS {
         for shape in [FieldShape { cell_m: hard, ..good }, FieldShape { low: Flat::new(hard, 0.0), ..good }] {
             let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
-            to.is(written.is_ok());
+            to.add_bool(written.is_ok());
         }
     }
     for (columns, rows) in [(0, 0), (1, 2), (u16::MAX, u16::MAX), (2, 2), (3, 3)] {
@@ -47,7 +47,7 @@ pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
     let field = to.call("field::FieldView::parse", || FieldView::parse(&file[..length])).expect("a field");
     assert_eq!(to.call("field::FieldView::shape", || *field.shape()), good);
     let crc = to.call("field::FieldView::crc", || field.crc());
-    to.count(crc as usize);
+    to.add_count(crc as usize);
     let highest_m = to.call("field::FieldView::highest_m", || field.highest_m());
     to.add(highest_m);
     for x in HARD_NUMBERS {
@@ -56,27 +56,30 @@ pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
             to.add(height_m);
         }
     }
-    paths(to, field);
+    call_field_paths(to, field);
 }
 
-fn paths(to: &mut Answers<'_, impl Listener>, field: FieldView<'_>) {
+fn call_field_paths(to: &mut ResultChecksum<'_, impl CallListener>, field: FieldView<'_>) {
     for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
         for end in ENDS.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
-            let following = Following { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
+            let following = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
             let (here, there) = (Flat::new(0.0, 3.0), Flat::new(end, 4.0));
-            let lowest_m = to.call("follow::Following::lowest_m", || following.lowest_m(&there));
-            let top_m = to.call("follow::Following::top_m", || following.top_m());
-            let begin = to.call("follow::Following::begin", || following.begin(&here, &there));
+            let lowest_m = to.call("follow::TerrainFollowing::lowest_m", || following.lowest_m(&there));
+            let top_m = to.call("follow::TerrainFollowing::top_m", || following.top_m());
+            let begin =
+                to.call("follow::TerrainFollowing::start_point", || following.start_point(&here, &there));
             let mut corners = 0;
             let counted = |_: Point| -> Result<(), ()> {
                 corners += 1;
                 Ok(())
             };
-            let ended = to.call("follow::Following::to", || following.to(&begin, &there, counted));
+            let ended = to.call("follow::TerrainFollowing::corners_to", || {
+                following.corners_to(&begin, &there, counted)
+            });
             assert!(ended.is_ok());
             [lowest_m, top_m].iter().for_each(|answer| to.add(*answer));
-            to.point(&begin);
-            to.count(corners);
+            to.add_point(&begin);
+            to.add_count(corners);
         }
     }
 }

@@ -5,9 +5,9 @@ use planner_core::Point;
 use planner_core::assignment::{self, AssignmentError, AssignmentWorkspace};
 use planner_core::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
-use planner_core::search::{self, SearchError, SearchWorkspace, WithLengths};
+use planner_core::search::{self, RoadmapWithLengths, SearchError, SearchWorkspace};
 
-use super::limits::{Answers, HARD_NUMBERS, Listener, points};
+use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum, extreme_points};
 
 /// Most nodes that a workspace holds.
 pub(super) const MAX_NODES: usize = 8;
@@ -40,13 +40,13 @@ fn edges() -> Vec<Edge, 9> {
     pairs.iter().map(|&(a, b)| Edge { a, b, clearance_m: 1.0 }).collect()
 }
 
-pub(super) fn any(_: u16, _: &HalfEdge) -> bool {
+pub(super) fn any_edge_passable(_: u16, _: &HalfEdge) -> bool {
     true
 }
 
 /// Leaves a good file; returns its length.
-pub(super) fn files(
-    to: &mut Answers<'_, impl Listener>,
+pub(super) fn call_roadmap_files(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     ws: &mut SearchWorkspace<MAX_NODES>,
     file: &mut [u8; 512],
 ) -> usize {
@@ -70,18 +70,18 @@ pub(super) fn files(
             // A file that was written can be read.
             let read = written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
             assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
-            to.is(written.is_ok());
+            to.add_bool(written.is_ok());
         }
         let with = [Edge { clearance_m: hard, ..edges[0] }];
-        to.is(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok());
+        to.add_bool(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok());
     }
     for (a, b) in [(0, 0), (0, 6), (u16::MAX, 0)] {
         assert!(roadmap::write(&HEADER, &NODE_PLACES, &[Edge { a, b, clearance_m: 1.0 }], file).is_err());
     }
-    for p in points() {
+    for p in extreme_points() {
         let mut places = NODE_PLACES;
         places[5] = p;
-        to.is(roadmap::write(&HEADER, &places, &edges, file).is_ok());
+        to.add_bool(roadmap::write(&HEADER, &places, &edges, file).is_ok());
     }
     assert!(roadmap::write(&HEADER, &NODE_PLACES, &edges, &mut file[..100]).is_err());
     let mut small = SearchWorkspace::<2>::new();
@@ -117,17 +117,17 @@ pub(super) fn files(
 /// Indices of nodes: valid ones, and ones of which there is no node.
 pub(super) const NODE_INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
-pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>) {
+pub(super) fn call_roadmap_views(to: &mut ResultChecksum<'_, impl CallListener>, view: &RoadmapView<'_>) {
     let nodes = to.call("roadmap::RoadmapView::node_count", || view.node_count());
     let half_edges = to.call("roadmap::RoadmapView::half_edge_count", || view.half_edge_count());
     assert_eq!((nodes, half_edges), (6, 18));
     let bytes = to.call("roadmap::RoadmapView::byte_len", || view.byte_len());
-    to.count(bytes);
+    to.add_count(bytes);
     assert!(to.call("roadmap::RoadmapView::has_landmarks", || view.has_landmarks()));
     assert_eq!(to.call("roadmap::RoadmapView::header", || *view.header()), HEADER);
     assert_eq!(to.call("roadmap::RoadmapView::origin", || *view.origin()), HEADER.origin);
     let crc = to.call("roadmap::RoadmapView::crc", || view.crc());
-    to.count(crc as usize);
+    to.add_count(crc as usize);
     for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
         let (a, b) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let there = usize::from(a.max(b)) < nodes;
@@ -141,22 +141,22 @@ pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'
         assert_eq!(ground_m, (a < 5).then_some(0.0));
         let degree = to.call("roadmap::RoadmapView::half_edges", || view.half_edges(a).count());
         assert!(usize::from(a) < nodes || degree == 0);
-        to.count(degree);
+        to.add_count(degree);
     }
-    for p in points() {
-        let around = to.call("ground::RoadmapView::ground_around", || view.ground_around(&p));
+    for p in extreme_points() {
+        let around = to.call("ground::RoadmapView::ground_range_near", || view.ground_range_near(&p));
         assert!(around.is_none_or(|(low_m, high_m)| low_m == 0.0 && high_m == 0.0 && p.z >= 0.0));
-        to.is(around.is_some());
+        to.add_bool(around.is_some());
     }
     let edge = view.edge_between(0, 4).expect("an edge");
     for hard in HARD_NUMBERS {
-        let clears = to.call("roadmap::RoadmapView::clears", || view.clears(&edge, hard));
+        let clears = to.call("roadmap::RoadmapView::has_clearance", || view.has_clearance(&edge, hard));
         assert_eq!(clears, hard < 1.0, "{hard}");
     }
 }
 
-pub(super) fn searches(
-    to: &mut Answers<'_, impl Listener>,
+pub(super) fn call_searches(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     view: &RoadmapView<'_>,
     ws: &mut SearchWorkspace<MAX_NODES>,
 ) {
@@ -169,47 +169,51 @@ pub(super) fn searches(
     }
     let mut small = SearchWorkspace::<2>::new();
     let mut lengths = [0.0; 18];
-    assert!(WithLengths::new(*view, &mut lengths[..17]).is_err());
-    let with =
-        to.call("search::WithLengths::new", || WithLengths::new(*view, &mut lengths)).expect("18 half-edges");
+    assert!(RoadmapWithLengths::new(*view, &mut lengths[..17]).is_err());
+    let with = to
+        .call("search::RoadmapWithLengths::new", || RoadmapWithLengths::new(*view, &mut lengths))
+        .expect("18 half-edges");
     for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
         let (a, b) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let there = usize::from(a.max(b)) < view.node_count();
-        let found = to.call("search::astar", || search::astar(view, a, b, any, ws, &mut way));
+        let found = to.call("search::astar", || search::astar(view, a, b, any_edge_passable, ws, &mut way));
         assert_eq!(found.is_ok(), there);
-        assert_eq!(search::astar(&with, a, b, any, ws, &mut way), found);
+        assert_eq!(search::astar(&with, a, b, any_edge_passable, ws, &mut way), found);
         to.add(found.unwrap_or(-1.0));
         let closed = search::astar(view, a, b, |_, _| false, ws, &mut way);
         assert_eq!(closed.is_ok(), there && a == b);
         let mut short: Vec<u16, 1> = Vec::new();
-        assert!(a == b || search::astar(view, a, b, any, ws, &mut short).is_err());
-        assert!(search::astar(view, a, b, any, &mut small, &mut way).is_err());
-        let all = to.call("search::dijkstra_all", || search::dijkstra_all(view, a, any, ws));
+        assert!(a == b || search::astar(view, a, b, any_edge_passable, ws, &mut short).is_err());
+        assert!(search::astar(view, a, b, any_edge_passable, &mut small, &mut way).is_err());
+        let all = to.call("search::dijkstra_all", || search::dijkstra_all(view, a, any_edge_passable, ws));
         assert_eq!(all.is_ok(), usize::from(a) < view.node_count());
         let mut row = [0.0; 2];
-        let answer =
-            to.call("search::dijkstra_row", || search::dijkstra_row(view, a, &[b, 0], any, ws, &mut row));
+        let answer = to.call("search::dijkstra_row", || {
+            search::dijkstra_row(view, a, &[b, 0], any_edge_passable, ws, &mut row)
+        });
         assert_eq!(answer.is_ok(), there);
         assert_eq!(
-            search::dijkstra_row(view, a, &[b, 0], any, ws, &mut row[..1]),
+            search::dijkstra_row(view, a, &[b, 0], any_edge_passable, ws, &mut row[..1]),
             Err(SearchError::OutputLength)
         );
         let mut costs = [0.0; 4];
-        let answer = to
-            .call("search::cost_matrix", || search::cost_matrix(view, &[a, 0], &[b, 1], any, ws, &mut costs));
+        let answer = to.call("search::cost_matrix", || {
+            search::cost_matrix(view, &[a, 0], &[b, 1], any_edge_passable, ws, &mut costs)
+        });
         assert_eq!(answer.is_ok(), there);
-        assert!(search::cost_matrix(view, &[a, 0], &[b, 1], any, ws, &mut costs[..3]).is_err());
+        assert!(search::cost_matrix(view, &[a, 0], &[b, 1], any_edge_passable, ws, &mut costs[..3]).is_err());
     }
-    assert_eq!(search::cost_matrix(view, &[], &[1], any, ws, &mut []), Ok(()));
+    assert_eq!(search::cost_matrix(view, &[], &[1], any_edge_passable, ws, &mut []), Ok(()));
 }
 
-pub(super) fn assignments(to: &mut Answers<'_, impl Listener>) {
+pub(super) fn call_assignments(to: &mut ResultChecksum<'_, impl CallListener>) {
     let mut ws = to.call("assignment::AssignmentWorkspace::new", AssignmentWorkspace::<3>::new);
     let mut out = [None; 3];
     let mut both = |costs: &[f32], rows: usize, cols: usize, out: &mut [Option<u16>]| {
         let total = to.call("assignment::assign", || assignment::assign(costs, rows, cols, &mut ws, out));
-        let most =
-            to.call("assignment::bottleneck", || assignment::bottleneck(costs, rows, cols, &mut ws, out));
+        let most = to.call("assignment::assign_bottleneck", || {
+            assignment::assign_bottleneck(costs, rows, cols, &mut ws, out)
+        });
         assert_eq!(total.map(|a| a.pairs), most.map(|a| a.pairs));
         to.add(most.map_or(-1.0, |a| a.largest));
         total

@@ -2,20 +2,20 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::{Flight, Gate, Path, VehiclePlan};
 use planner_core::plan::{
     self, Goals, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::roadmap::RoadmapView;
-use planner_core::schedule::sipp::{self, Route, SippWorkspace};
+use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use planner_core::search::SearchWorkspace;
 
-use super::limits::{Answers, HARD_NUMBERS, Listener, points};
+use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum, extreme_points};
 use super::limits_area_flights as area_flights;
 use super::limits_field as field;
-use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any};
+use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any_edge_passable};
 
 /// Capacities: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;
@@ -27,28 +27,28 @@ type Workspace = PlanWorkspace<MAX_NODES, VEHICLES, PIECES>;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Memory lent to the calls.
-pub struct Lent {
+pub struct RouteWorkspaces {
     ws: Workspace,
     plan: Plan,
     own: VehiclePlan<WAYPOINTS, GATES>,
     file: [u8; 512],
-    coverage: area_flights::Lent,
+    coverage: area_flights::FlightWorkspaces,
 }
 
-impl Lent {
-    /// Empty.
+impl RouteWorkspaces {
+    /// Creates it empty.
     pub const fn new() -> Self {
         Self {
             ws: Workspace::new(),
             plan: Plan::new(),
             own: VehiclePlan::new(),
             file: [0; 512],
-            coverage: area_flights::Lent::new(),
+            coverage: area_flights::FlightWorkspaces::new(),
         }
     }
 }
 
-impl Default for Lent {
+impl Default for RouteWorkspaces {
     fn default() -> Self {
         Self::new()
     }
@@ -56,26 +56,26 @@ impl Default for Lent {
 
 /// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches, assignments, plans, schedules,
 /// detours, coverage.
-pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 8] {
-    field::fields(to);
-    let len = graph::files(to, &mut lent.ws.search, &mut lent.file);
+pub fn call_all(to: &mut ResultChecksum<'_, impl CallListener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
+    field::call_fields(to);
+    let len = graph::call_roadmap_files(to, &mut lent.ws.search, &mut lent.file);
     let mut sums = [to.sum(); 8];
     let view = to
         .call("roadmap::RoadmapView::parse", || RoadmapView::parse(&lent.file[..len]))
         .expect("just written");
-    graph::roadmaps(to, &view);
+    graph::call_roadmap_views(to, &view);
     sums[1] = to.sum();
-    graph::searches(to, &view, &mut lent.ws.search);
+    graph::call_searches(to, &view, &mut lent.ws.search);
     sums[2] = to.sum();
-    graph::assignments(to);
+    graph::call_assignments(to);
     sums[3] = to.sum();
-    plans(to, &view, &mut lent.ws, &mut lent.plan);
+    call_plans(to, &view, &mut lent.ws, &mut lent.plan);
     sums[4] = to.sum();
-    schedules(to, &view, &mut lent.ws, &mut lent.plan, &mut lent.own);
+    call_schedules(to, &view, &mut lent.ws, &mut lent.plan, &mut lent.own);
     sums[5] = to.sum();
-    detours(to, &view, &mut lent.ws.search, &mut lent.own);
+    call_detours(to, &view, &mut lent.ws.search, &mut lent.own);
     sums[6] = to.sum();
-    area_flights::coverage(to, &mut lent.ws.schedule, &mut lent.coverage);
+    area_flights::call_area_flights(to, &mut lent.ws.schedule, &mut lent.coverage);
     sums[7] = to.sum();
     sums
 }
@@ -86,10 +86,15 @@ const TASK: VehicleTask = VehicleTask { id: 1, required_clearance_m: 0.8, climb_
 const TASKS: [VehicleTask; 2] = [TASK, VehicleTask { id: 2, goal: Some(1), ..TASK }];
 
 fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
-    PlanRequest { vehicles, descents_m, mode: Mode::Labelled, schedule: SCHEDULE, gates_most: GATES }
+    PlanRequest { vehicles, descents_m, mode: Mode::Labelled, schedule: SCHEDULE, max_gates: GATES }
 }
 
-fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut Workspace, out: &mut Plan) {
+fn call_plans(
+    to: &mut ResultChecksum<'_, impl CallListener>,
+    view: &RoadmapView<'_>,
+    ws: &mut Workspace,
+    out: &mut Plan,
+) {
     *out = to.call("workspace::SwarmPlan::new", Plan::new);
     to.call("workspace::PlanWorkspace::new", || size_of_val(&PlanWorkspace::<1, 1, 1>::new()));
     let heights = [1.5, 1.5];
@@ -99,10 +104,10 @@ fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut W
     for mode in modes {
         let request = PlanRequest { mode, ..good };
         assert_eq!(to.call("plan::plan_swarm", || plan::plan_swarm(view, &request, ws, out)), Ok(()));
-        assert!(out.flights.iter().all(|flight| flight.task.flies()));
+        assert!(out.flights.iter().all(|flight| flight.task.leaves_pad()));
         let total_m = to.call("workspace::SwarmPlan::total_m", || out.total_m());
         to.add(total_m as f32);
-        to.count(out.crc as usize);
+        to.add_count(out.crc as usize);
     }
     let mut refused = |request: &PlanRequest<'_>, error: PlanError| {
         assert_eq!(to.call("request::PlanRequest::check", || request.check()), Err(error));
@@ -142,31 +147,35 @@ fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut W
     {
         let heights = [1.5; 4];
         let request = request(vehicles, &heights[..goals]);
-        assert_eq!(to.call("plan::costs", || plan::costs(view, &request, ws)), Err(PlanError::Terminals));
+        assert_eq!(
+            to.call("plan::compute_costs", || plan::compute_costs(view, &request, ws)),
+            Err(PlanError::Terminals)
+        );
         let mut assigned = Goals::<VEHICLES>::new();
-        let many = to.call("plan::assign", || plan::assign(&request, ws, &mut assigned));
+        let many = to.call("plan::assign_goals", || plan::assign_goals(&request, ws, &mut assigned));
         assert!(vehicles.len() <= VEHICLES || many == Err(PlanError::SwarmFull));
-        let planned = to.call("plan::schedule", || plan::schedule(view, &request, &assigned, ws, out));
+        let planned =
+            to.call("plan::schedule_flights", || plan::schedule_flights(view, &request, &assigned, ws, out));
         assert_eq!(planned, Err(PlanError::Terminals));
     }
     for (first, second) in [(Some(2), None), (None, Some(u16::MAX)), (Some(1), Some(1)), (None, None)] {
         let mut assigned = Goals::<VEHICLES>::new();
         assigned.extend([first, second]);
-        let planned = plan::schedule(view, &good, &assigned, ws, out);
+        let planned = plan::schedule_flights(view, &good, &assigned, ws, out);
         assert_eq!(planned.is_ok(), first.is_none() && second.is_none(), "{first:?} {second:?}");
     }
     let mut short = SwarmPlan::<VEHICLES, 2>::new();
     assert!(plan::plan_swarm(view, &good, ws, &mut short).is_err(), "paths have three nodes");
     for (climb_m, gates_most) in [(0.0, GATES), (1e7, GATES), (1.5, 0)] {
         let tasks = TASKS.map(|task| VehicleTask { climb_m, ..task });
-        let request = PlanRequest { gates_most, ..request(&tasks, &heights) };
-        to.is(plan::plan_swarm(view, &request, ws, out).is_ok());
+        let request = PlanRequest { max_gates: gates_most, ..request(&tasks, &heights) };
+        to.add_bool(plan::plan_swarm(view, &request, ws, out).is_ok());
     }
     assert_eq!(plan::plan_swarm(view, &good, ws, out), Ok(()));
 }
 
-fn schedules(
-    to: &mut Answers<'_, impl Listener>,
+fn call_schedules(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     view: &RoadmapView<'_>,
     ws: &mut Workspace,
     plan: &mut Plan,
@@ -196,7 +205,7 @@ fn schedules(
             Flight { climb_m: hard, ..flights[0].clone() },
             Flight { descent_m: hard, ..flights[0].clone() },
             Flight { depart_s: hard, ..flights[0].clone() },
-            Flight { piece_m: hard, ..flights[0].clone() },
+            Flight { segment_m: hard, ..flights[0].clone() },
             Flight { path: Path::new(), ..flights[0].clone() },
         ] {
             for cfg in [SCHEDULE, cfg] {
@@ -204,12 +213,12 @@ fn schedules(
                 let answer = to.call("schedule::earliest_departure", || {
                     schedule::earliest_departure(&cfg, &flight, hard, flights[1..].iter(), &mut ws.schedule)
                 });
-                to.is(answer.is_ok());
+                to.add_bool(answer.is_ok());
                 let pair = [flight.clone(), flights[1].clone()];
                 let answer = schedule::gates(&cfg, &pair, 1, &mut ws.schedule, &mut own.gates);
-                to.is(answer.is_ok());
+                to.add_bool(answer.is_ok());
                 let mut found = flight.clone();
-                let route = Route {
+                let route = RouteQuery {
                     cfg: &cfg,
                     from: 0,
                     to: 2,
@@ -217,28 +226,36 @@ fn schedules(
                     parked: &[Point::new(hard, 0.0, 0.0)],
                     handover_s: hard,
                 };
-                let answer = to.call("sipp::route", || {
-                    sipp::route(view, &route, any, flights[1..].iter(), &mut ws.sipp, &mut found)
+                let answer = to.call("sipp::find_route", || {
+                    sipp::find_route(
+                        view,
+                        &route,
+                        any_edge_passable,
+                        flights[1..].iter(),
+                        &mut ws.sipp,
+                        &mut found,
+                    )
                 });
-                to.is(answer.is_ok());
+                to.add_bool(answer.is_ok());
             }
         }
     }
     for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
         let (from, to_node) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let route =
-            Route { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
+            RouteQuery { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
         let mut flight = plan.flights[0].clone();
-        let answer =
-            to.call("sipp::route", || sipp::route(view, &route, any, [].iter(), &mut ws.sipp, &mut flight));
+        let answer = to.call("sipp::find_route", || {
+            sipp::find_route(view, &route, any_edge_passable, [].iter(), &mut ws.sipp, &mut flight)
+        });
         let there = usize::from(from.max(to_node)) < view.node_count();
         assert!(there || answer == Err(ScheduleError::BadIndex));
-        to.is(answer.is_ok());
+        to.add_bool(answer.is_ok());
     }
 }
 
-fn detours(
-    to: &mut Answers<'_, impl Listener>,
+fn call_detours(
+    to: &mut ResultChecksum<'_, impl CallListener>,
     view: &RoadmapView<'_>,
     ws: &mut SearchWorkspace<MAX_NODES>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
@@ -254,12 +271,12 @@ fn detours(
         required_clearance_m: 0.8,
         fence: None,
     };
-    let natures = [Nature::Solid, Nature::Landing, Nature::Lying];
+    let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
     let path = own.path.clone();
     let empty: Path<WAYPOINTS> = Path::new();
-    for (i, p) in points().enumerate() {
+    for (i, p) in extreme_points().enumerate() {
         let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
-        let thing = KeepOff { from: p, to: NODE_PLACES[5], radius_m: hard, nature: natures[i % 3] };
+        let thing = KeepOutZone { from: p, to: NODE_PLACES[5], radius_m: hard, kind: natures[i % 3] };
         for request in [
             good,
             DetourRequest { aside: true, ..good },
@@ -272,14 +289,14 @@ fn detours(
         ] {
             let bad = [
                 to.call("detour::DetourRequest::check", || request.check()).is_err(),
-                to.call("detour::KeepOff::check", || thing.check()).is_err(),
+                to.call("detour::KeepOutZone::check", || thing.check()).is_err(),
             ];
             let finite = |places: &[Point]| places.iter().flatten().all(|c| c.is_finite());
             let over = if let Goal::Home { over, .. } = request.goal { over } else { request.here };
             assert!(finite(&[request.here, request.leg[0], request.leg[1], over]) || bad[0]);
             assert!((finite(&[thing.from, thing.to]) && hard >= 0.0 && hard.is_finite()) != bad[1]);
-            let answer = to.call("detour::plan", || {
-                detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
+            let answer = to.call("detour::plan_detour", || {
+                detour::plan_detour(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
             });
             assert_eq!(
                 bad.contains(&true),
@@ -290,25 +307,29 @@ fn detours(
                 answer.is_err()
                     || own.path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()))
             );
-            to.is(answer.is_ok());
-            let again = to.call("detour::plan_vehicle", || {
-                detour::plan_vehicle(view, &request, &mut [thing], ws, &mut nodes, own)
+            to.add_bool(answer.is_ok());
+            let again = to.call("detour::plan_vehicle_detour", || {
+                detour::plan_vehicle_detour(view, &request, &mut [thing], ws, &mut nodes, own)
             });
             assert_eq!(again, answer);
         }
         for goal in [2, 4, u16::MAX - 1, u16::MAX] {
             let request = DetourRequest { goal: Goal::Node(goal), ..good };
-            assert!(detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path).is_err());
+            assert!(
+                detour::plan_detour(view, &request, &mut [thing], ws, &mut nodes, &mut own.path).is_err()
+            );
         }
-        let holds = to.call("detour::KeepOff::holds", || thing.holds(&NODE_PLACES[5]));
+        let holds = to.call("detour::KeepOutZone::contains", || thing.contains(&NODE_PLACES[5]));
         assert!(!holds || hard > 0.0 || hard.is_nan());
         for path in [&path, &empty] {
-            let blocked = to.call("detour::is_blocked", || {
-                detour::is_blocked(path, hard..f32::INFINITY, p.x, p.y, &p, &thing)
+            let blocked = to.call("detour::is_path_blocked", || {
+                detour::is_path_blocked(path, hard..f32::INFINITY, p.x, p.y, &p, &thing)
             });
-            to.call("detour::is_blocked", || detour::is_blocked(path, -1.0..hard, p.x, p.y, &p, &thing));
-            to.is(blocked);
-            let count = to.call("detour::stretches_ahead", || detour::stretches_ahead(path, hard));
+            to.call("detour::is_path_blocked", || {
+                detour::is_path_blocked(path, -1.0..hard, p.x, p.y, &p, &thing)
+            });
+            to.add_bool(blocked);
+            let count = to.call("detour::count_segments_ahead", || detour::count_segments_ahead(path, hard));
             assert!(count <= path.waypoints().len() + 2);
         }
     }

@@ -5,14 +5,14 @@ use std::fs;
 use std::path::Path;
 use std::string::{String, ToString};
 
-use super::limits::{Answers, Listener, places};
-use super::limits_routes::{Lent, routes};
+use super::limits::{CallListener, ResultChecksum, call_without_roadmap};
+use super::limits_routes::{RouteWorkspaces, call_all};
 use super::public_functions::public_functions;
 
 #[derive(Default)]
 struct Called(BTreeSet<&'static str>);
 
-impl Listener for Called {
+impl CallListener for Called {
     fn next(&mut self, name: &'static str) {
         self.0.insert(name);
     }
@@ -42,9 +42,9 @@ fn public(folder: &Path, names: &mut BTreeSet<String>) {
 #[test]
 fn every_public_call_of_planner_core_holds_at_its_limits() {
     let mut called = Called::default();
-    let mut answers = Answers::new(&mut called);
-    places(&mut answers);
-    routes(&mut answers, &mut Box::new(Lent::new()));
+    let mut answers = ResultChecksum::new(&mut called);
+    call_without_roadmap(&mut answers);
+    call_all(&mut answers, &mut Box::new(RouteWorkspaces::new()));
     let mut all = BTreeSet::new();
     public(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../planner-core/src"), &mut all);
     assert!(all.len() > 150, "{}", all.len());

@@ -17,7 +17,7 @@ mod limits_tests;
 #[cfg(test)]
 mod public_functions;
 
-/// Counts what calls cost: a board its instructions, the desk nothing.
+/// Measures calls: a board counts instructions, the desk measures nothing.
 pub trait Meter {
     /// Does the work and notes under a name what it cost; of several of one name the most counts. `bytes` is what the call
     /// needs to be lent: its state or workspace, without its inputs.

@@ -5,7 +5,7 @@ use std::string::String;
 use std::vec::Vec;
 
 /// The type whose functions an `impl` line begins, without its parameters.
-fn implemented(line: &str) -> Option<String> {
+fn impl_type_name(line: &str) -> Option<String> {
     let mut rest = line.strip_prefix("impl")?;
     if rest.starts_with('<') {
         let mut depth = 0;
@@ -28,7 +28,7 @@ pub fn public_functions(source: &str) -> Vec<(Option<String>, &str)> {
     let mut owner = None;
     for line in source[..tests.map_or(source.len(), |(at, _)| at)].lines() {
         if line.starts_with("impl") {
-            owner = implemented(line);
+            owner = impl_type_name(line);
         } else if line.starts_with('}') {
             owner = None;
         }

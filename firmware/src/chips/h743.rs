@@ -20,7 +20,7 @@ pub enum Revision {
 
 impl Revision {
     /// Revision by the register.
-    pub const fn of(idc: u32) -> Self {
+    pub const fn from_idcode(idc: u32) -> Self {
         if idc >> 16 >= 0x2000 { Self::New } else { Self::Old }
     }
 
@@ -36,7 +36,7 @@ impl Revision {
     /// Settings of PLL1 for the processor's clock: divider before it, factor. Twice that clock is
     /// halved behind it. The input is 8 or 16 MHz, the output at most 960 (RM0433, "PLL
     /// configuration").
-    pub const fn pll(self, has_hse: bool) -> (u32, u32) {
+    pub const fn pll_divider_and_factor(self, has_hse: bool) -> (u32, u32) {
         let (source, divider) = if has_hse { (HSE_MHZ, 1) } else { (HSI_MHZ, 4) };
         (divider, 2 * self.core_mhz() / (source / divider))
     }
@@ -57,7 +57,7 @@ pub const RCC_AHB2ENR: u32 = 0x5802_44DC;
 /// RCC_RSR's bit that clears the others.
 pub const RMVF: u32 = 1 << 16;
 
-/// Why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset sources). All
+/// Reason why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset sources). All
 /// causes but a wake-up press the reset pin too, and the power's coming is also a brown-out.
 pub const fn reset_cause(rsr: u32) -> ResetCause {
     const BOR: u32 = 1 << 21;
@@ -95,7 +95,7 @@ pub const EXTERNAL: Region = Region { base: 0, len_log2: 32, access: Access::Non
 
 /// The sectors of bank 2 that a roadmap lies in, cached; the MPU then holds them read only. `at`
 /// and `len` count from the bank's first byte. An eighth of the bank is a sector of 128 kB.
-pub const fn roadmap(at: u32, len: u32) -> Region {
+pub const fn roadmap_region(at: u32, len: u32) -> Region {
     const SECTOR: u32 = 128 << 10;
     let (first, end) = (at / SECTOR, (at + len).div_ceil(SECTOR));
     let mut region = Region { access: Access::CachedReadOnly, without: 0xFF, ..BANK2 };

@@ -7,7 +7,7 @@ pub mod h743;
 pub mod mpu;
 pub mod rp2350;
 
-/// Why a chip started, by its own registers.
+/// Reason why a chip started, by its own registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// The power came.

@@ -15,7 +15,7 @@ pub const STKOFHFNMIGN: u32 = 1 << 10;
 /// 4 of 32 bytes, 43 µs at 921 600 baud; 24 bytes are 260 µs.
 pub const RX_QUARTER: u8 = 0b001;
 
-/// Why it started: POWMAN_CHIP_RESET and WATCHDOG_REASON (data sheet, "Chip level resets" and
+/// Reason why it started: POWMAN_CHIP_RESET and WATCHDOG_REASON (data sheet, "Chip level resets" and
 /// "Watchdog", registers).
 pub const fn reset_cause(chip_reset: u32, watchdog_reason: u32) -> ResetCause {
     const POWER: u32 = 1 << 16;

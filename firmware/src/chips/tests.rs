@@ -16,24 +16,27 @@ fn regions_are_as_the_manual_has_them() {
 
 #[test]
 fn only_the_sectors_of_the_roadmap_are_cached_and_read_only() {
-    let slot = companion::storage::store::Layout::H743.slot_len;
+    let slot = companion::storage::store::FlashLayout::H743.slot_len;
     for (at, without) in [(0, 0b1111_1000), (slot, 0b1100_0111)] {
-        let region = h743::roadmap(at, slot);
+        let region = h743::roadmap_region(at, slot);
         // XN, AP 110, C.
         assert_eq!(region.rasr(), 0x1602_0027 | without << 8);
         assert_eq!(region.base, h743::BANK2.base);
         // A file does not begin with the slot, and may be short.
-        assert_eq!(h743::roadmap(at + 256, 1000).rasr(), 0x1602_0027 | (0xFF & !(1 << (at >> 17))) << 8);
+        assert_eq!(
+            h743::roadmap_region(at + 256, 1000).rasr(),
+            0x1602_0027 | (0xFF & !(1 << (at >> 17))) << 8
+        );
     }
 }
 
 #[test]
 fn every_revision_of_the_h743_has_a_clock_it_can_run_at() {
     for (idc, mhz) in [(0x1001_6450, 400), (0x1003_6450, 400), (0x2001_6450, 480), (0x2003_6450, 480)] {
-        let revision = h743::Revision::of(idc);
+        let revision = h743::Revision::from_idcode(idc);
         assert_eq!(revision.core_mhz(), mhz);
         for (has_hse, source) in [(true, 8), (false, 64)] {
-            let (divider, factor) = revision.pll(has_hse);
+            let (divider, factor) = revision.pll_divider_and_factor(has_hse);
             let input = source / divider;
             assert_eq!((input * factor, source % divider), (2 * mhz, 0));
             assert!((8..=16).contains(&input) && (192..=960).contains(&(input * factor)));

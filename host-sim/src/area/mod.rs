@@ -1,4 +1,4 @@
-//! Polygons from files: what is to be photographed, holes in it, and zones that nobody enters.
+//! Polygons from files: what is to be photographed, holes in it, and zones that no vehicle may enter.
 //!
 //! GeoJSON, WKT, KML and QGroundControl `.plan`. Points and lines in a file are passed over. Coordinates are as the file
 //! has them, x (east or longitude) first.
@@ -19,7 +19,7 @@ use crate::files;
 
 /// Format of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum AreaFormat {
     /// RFC 7946, or the same in metres.
     GeoJson,
     /// Well-known text.
@@ -30,9 +30,9 @@ pub enum Format {
     Plan,
 }
 
-impl Format {
+impl AreaFormat {
     /// The format of a file of this name.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn from_path(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
             "geojson" | "json" => Some(Self::GeoJson),
@@ -49,7 +49,7 @@ impl Format {
 /// # Errors
 /// It cannot be read, is not what its name says, or holds no polygon.
 pub fn read(path: &Path) -> Result<Polygons, AreaFileError> {
-    let format = Format::of(path).ok_or(AreaFileError::Format)?;
+    let format = AreaFormat::from_path(path).ok_or(AreaFileError::Format)?;
     parse(&files::read_text(path)?, format)
 }
 
@@ -57,29 +57,29 @@ pub fn read(path: &Path) -> Result<Polygons, AreaFileError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(text: &str, format: Format) -> Result<Polygons, AreaFileError> {
+pub fn parse(text: &str, format: AreaFormat) -> Result<Polygons, AreaFileError> {
     // Some programs begin every text with a byte order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut polygons = match format {
-        Format::GeoJson => geojson::parse(text)?,
-        Format::Wkt => wkt::parse(text)?,
-        Format::Kml => kml::parse(text)?,
-        Format::Plan => plan::parse(text)?,
+        AreaFormat::GeoJson => geojson::parse(text)?,
+        AreaFormat::Wkt => wkt::parse(text)?,
+        AreaFormat::Kml => kml::parse(text)?,
+        AreaFormat::Plan => plan::parse(text)?,
     };
     if polygons.outers.is_empty() {
         let hint = match format {
-            Format::Plan => ", no survey's and no inclusion fence",
+            AreaFormat::Plan => ", no survey's and no inclusion fence",
             _ => "",
         };
         return Err(AreaFileError::NoPolygon(hint));
     }
-    polygons.outers.iter_mut().chain(&mut polygons.holes).chain(&mut polygons.no_fly).for_each(open);
+    polygons.outers.iter_mut().chain(&mut polygons.holes).chain(&mut polygons.no_fly).for_each(open_ring);
     let count = polygons.vertex_count();
     if count > MAX_VERTICES { Err(AreaFileError::TooManyVertices(count)) } else { Ok(polygons) }
 }
 
 /// Drops vertices that repeat the one before, around the end too.
-pub fn open(ring: &mut RingXy) {
+pub fn open_ring(ring: &mut RingXy) {
     ring.dedup();
     while ring.len() > 1 && ring.first() == ring.last() {
         ring.pop();

@@ -24,40 +24,40 @@ pub enum Overlap {
 }
 
 /// Rings that overlap although no edges cross, or holes outside every outer ring.
-pub fn find(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
-    let (outers, holes) = (wide(outers), wide(holes));
-    if let Some((i, j)) = sharing(&outers) {
+pub fn find_overlap(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
+    let (outers, holes) = (rings_to_f64(outers), rings_to_f64(holes));
+    if let Some((i, j)) = first_overlapping_pair(&outers) {
         return Some(Overlap::Outers(i, j));
     }
-    if let Some((i, j)) = sharing(&holes) {
+    if let Some((i, j)) = first_overlapping_pair(&holes) {
         return Some(Overlap::Holes(i, j));
     }
-    let mut left_m2: Vec<f64> = outers.iter().map(Wide::area_m2).collect();
+    let mut left_m2: Vec<f64> = outers.iter().map(RingF64::area_m2).collect();
     for (index, hole) in holes.iter().enumerate() {
-        let around = |outer: &Wide| !hole.sides(outer).outside;
+        let around = |outer: &RingF64| !hole.relation_to(outer).outside;
         let Some(own) = outers.iter().position(around) else { return Some(Overlap::HoleOut(index)) };
         left_m2[own] -= hole.area_m2();
     }
-    let nothing = |(ring, left_m2): (&Wide, &f64)| *left_m2 < ON_BORDER_M * ring.perimeter_m();
+    let nothing = |(ring, left_m2): (&RingF64, &f64)| *left_m2 < ON_BORDER_M * ring.perimeter_m();
     outers.iter().zip(&left_m2).position(nothing).map(Overlap::NothingLeft)
 }
 
 /// The first two rings that share ground.
-fn sharing(rings: &[Wide]) -> Option<(usize, usize)> {
+fn first_overlapping_pair(rings: &[RingF64]) -> Option<(usize, usize)> {
     let pairs = (0..rings.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
     pairs.into_iter().find(|&(i, j)| {
         let (a, b) = (&rings[i], &rings[j]);
-        if !a.meets(b) {
+        if !a.boxes_intersect(b) {
             return false;
         }
-        let (a_of_b, b_of_a) = (a.sides(b), b.sides(a));
+        let (a_of_b, b_of_a) = (a.relation_to(b), b.relation_to(a));
         let same = !a_of_b.outside && !b_of_a.outside;
         a_of_b.inside || b_of_a.inside || same
     })
 }
 
 /// A ring in f64, and its box.
-struct Wide {
+struct RingF64 {
     ring: Vec<[f64; 2]>,
     low: [f64; 2],
     high: [f64; 2],
@@ -65,35 +65,35 @@ struct Wide {
 
 /// Places of the parts of a ring, as another ring sees them.
 #[derive(Default)]
-struct Sides {
+struct RingRelation {
     inside: bool,
     outside: bool,
 }
 
-fn wide(rings: &[&[Flat]]) -> Vec<Wide> {
+fn rings_to_f64(rings: &[&[Flat]]) -> Vec<RingF64> {
     let wide = |ring: &&[Flat]| {
         let ring: Vec<[f64; 2]> = ring.iter().map(|v| [f64::from(v.x), f64::from(v.y)]).collect();
         let side = |from: f64, pick: fn(f64, f64) -> f64| {
             [0, 1].map(|axis| ring.iter().map(|v| v[axis]).fold(from, pick))
         };
-        Wide { low: side(f64::INFINITY, f64::min), high: side(f64::NEG_INFINITY, f64::max), ring }
+        RingF64 { low: side(f64::INFINITY, f64::min), high: side(f64::NEG_INFINITY, f64::max), ring }
     };
     rings.iter().map(wide).collect()
 }
 
-impl Wide {
+impl RingF64 {
     fn edges(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
         self.ring.iter().copied().zip(self.ring.iter().copied().cycle().skip(1))
     }
 
-    fn meets(&self, other: &Self) -> bool {
+    fn boxes_intersect(&self, other: &Self) -> bool {
         (0..2).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
     }
 
     fn area_m2(&self) -> f64 {
         let base = self.ring[0];
         let at = |v: [f64; 2]| [v[0] - base[0], v[1] - base[1]];
-        let twice: f64 = self.edges().map(|(a, b)| cross(at(a), at(b))).sum();
+        let twice: f64 = self.edges().map(|(a, b)| cross_product(at(a), at(b))).sum();
         (twice / 2.0).abs()
     }
 
@@ -102,15 +102,15 @@ impl Wide {
     }
 
     /// Places of the pieces of this ring's edges.
-    fn sides(&self, other: &Self) -> Sides {
-        let mut sides = Sides::default();
+    fn relation_to(&self, other: &Self) -> RingRelation {
+        let mut sides = RingRelation::default();
         for (a, b) in self.edges() {
-            let cuts = other.cuts(a, b);
+            let cuts = other.intersection_shares(a, b);
             for pair in cuts.windows(2) {
                 let share = f64::midpoint(pair[0], pair[1]);
                 let middle = [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
                 if !other.has_on_border(middle) {
-                    let inside = other.holds(middle);
+                    let inside = other.contains(middle);
                     sides.inside |= inside;
                     sides.outside |= !inside;
                 }
@@ -123,7 +123,7 @@ impl Wide {
     }
 
     /// Places where this ring meets a segment, as shares of the segment, both ends among them.
-    fn cuts(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
+    fn intersection_shares(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
         let mut shares = vec![0.0, 1.0];
@@ -139,7 +139,7 @@ impl Wide {
             let edge = [d[0] - c[0], d[1] - c[1]];
             // The vertex, seen from the segment: where it lies on it, that is a cut.
             shares.push((to[0] * along[0] + to[1] * along[1]) / length2);
-            shares.push(cross(to, edge) / cross(along, edge));
+            shares.push(cross_product(to, edge) / cross_product(along, edge));
         }
         shares.retain(|share| (0.0..=1.0).contains(share));
         shares.sort_by(f64::total_cmp);
@@ -155,7 +155,7 @@ impl Wide {
         })
     }
 
-    fn holds(&self, place: [f64; 2]) -> bool {
+    fn contains(&self, place: [f64; 2]) -> bool {
         let crossed = |(a, b): &([f64; 2], [f64; 2])| {
             (a[1] <= place[1]) != (b[1] <= place[1])
                 && place[0] < a[0] + (place[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
@@ -164,7 +164,7 @@ impl Wide {
     }
 }
 
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+fn cross_product(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
@@ -217,7 +217,7 @@ mod tests {
                 [&outers, &holes].map(|all| all.iter().copied().map(rectangle).collect::<Vec<_>>());
             let [o, h] =
                 [&outer_rings, &hole_rings].map(|all| all.iter().map(Vec::as_slice).collect::<Vec<_>>());
-            let found = match find(&o, &h) {
+            let found = match find_overlap(&o, &h) {
                 None => 0,
                 Some(Overlap::Outers(..)) => 1,
                 Some(Overlap::Holes(..)) => 2,

@@ -75,7 +75,8 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     };
     let has_survey = !polygons.outers.is_empty();
     let fences = file.geo_fence.polygons.into_iter().map(|f| (f.inclusion, longitude_first(&f.polygon)));
-    let circles = file.geo_fence.circles.into_iter().map(|f| (f.inclusion, around(&f.circle, f.inclusion)));
+    let circles =
+        file.geo_fence.circles.into_iter().map(|f| (f.inclusion, circle_polygon(&f.circle, f.inclusion)));
     for (inclusion, ring) in fences.chain(circles) {
         match (inclusion, has_survey) {
             (false, _) => polygons.no_fly.push(ring),
@@ -91,7 +92,7 @@ fn longitude_first(ring: &[[f64; 2]]) -> RingXy {
 }
 
 /// A circle as a polygon: inside it where it is included, around it where it is excluded.
-fn around(circle: &Circle, inclusion: bool) -> RingXy {
+fn circle_polygon(circle: &Circle, inclusion: bool) -> RingXy {
     let [lat, lon] = circle.center;
     let half = std::f64::consts::PI / CIRCLE_CORNERS as f64;
     let radius = if inclusion { circle.radius } else { circle.radius / half.cos() };

@@ -21,7 +21,7 @@ pub struct Polygons {
     pub no_fly: Vec<RingXy>,
 }
 
-/// Why a file holds no area.
+/// Reason why a file holds no area.
 #[derive(Debug, Error)]
 pub enum AreaFileError {
     /// The file cannot be read.

@@ -2,8 +2,8 @@
 
 use anyhow::ensure;
 use companion::services::ftp::MAX_DATA;
-use companion::storage::store::window::Taken;
-use companion::storage::store::{Erasing, File, MAX_READ, Store, UploadState};
+use companion::storage::store::window::PieceOutcome;
+use companion::storage::store::{ErasePermission, File, MAX_READ, Store, UploadState};
 
 use planner_core::field;
 
@@ -25,14 +25,14 @@ pub const BANK_MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
 ///
 /// # Errors
 /// A file is refused.
-pub fn bank(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
+pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
     let mut flash = DeskFlash::open(None)?;
     let mut store = Store::mount(LAYOUT, &mut flash);
     let mut settle = |store: &mut Store| {
         let mut read = [0; MAX_READ];
-        while let Some(request) = store.poll(Erasing::Allowed) {
-            let outcome = flash.obey(request, &mut read);
-            store.handle(outcome);
+        while let Some(request) = store.poll_request(ErasePermission::Allowed) {
+            let outcome = flash.execute_request(request, &mut read);
+            store.handle_outcome(outcome);
         }
     };
     settle(&mut store);
@@ -40,17 +40,17 @@ pub fn bank(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
     let files = [(map, roadmap), (File::Mission, mission)];
     // A coverage mission has no roadmap, over level ground no field.
     for (file, bytes) in files.into_iter().filter(|(_, bytes)| !bytes.is_empty()) {
-        let opened = store.open(file, Erasing::Allowed);
+        let opened = store.open_upload(file, ErasePermission::Allowed);
         ensure!(opened.is_ok(), "a board's store takes no {}: {opened:?}", file.name());
         settle(&mut store);
         for (i, piece) in bytes.chunks(MAX_DATA).enumerate() {
-            let taken = store.take((i * MAX_DATA) as u32, piece);
-            ensure!(taken == Taken::Yes, "a board's store refuses {}: {taken:?}", file.name());
+            let taken = store.take_piece((i * MAX_DATA) as u32, piece);
+            ensure!(taken == PieceOutcome::Yes, "a board's store refuses {}: {taken:?}", file.name());
             settle(&mut store);
         }
-        store.close();
+        store.finish_upload();
         settle(&mut store);
-        let ended = store.upload();
+        let ended = store.upload_state();
         ensure!(ended == Some(UploadState::Ended(Ok(()))), "a board refuses {}: {ended:?}", file.name());
     }
     Ok(flash.into_bytes())

@@ -18,7 +18,7 @@ use anyhow::{Context, bail, ensure};
 use companion::Link as Port;
 use lock_step::{COMMAND_LINE, FromBoard, HEAD, LONGEST, ToBoard};
 
-pub use self::bank::bank;
+pub use self::bank::flash_bank_image;
 pub use self::probe::STACK_LEN;
 use crate::quote::quoted_path;
 
@@ -31,7 +31,7 @@ const START_COMMAND: &str = r#"exec qemu-system-arm "$@" 3>&1 >"$LOG""#;
 
 /// Bytes that a port of a board receives or sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Piece {
+pub struct PortBytes {
     /// The port.
     pub port: Port,
     /// When, microseconds of the board's time.
@@ -42,27 +42,27 @@ pub struct Piece {
 
 /// Result of a grant to a board.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub struct Answer {
+pub struct GrantResult {
     /// The board's time, microseconds since its start.
     pub now_us: u64,
     /// Whether it started again instead: its time begins at zero.
     pub restarted: bool,
     /// Bytes that the board sent, in order.
-    pub sent: Vec<Piece>,
+    pub sent: Vec<PortBytes>,
     /// Bytes that were read of the board's memory.
     memory: Vec<u8>,
 }
 
 /// A board that waits for the desk or runs on a grant; it ends with us.
 #[derive(Debug)]
-pub struct Emulated {
+pub struct EmulatedBoard {
     qemu: Child,
     input: ChildStdin,
-    answers: Receiver<anyhow::Result<Answer>>,
+    answers: Receiver<anyhow::Result<GrantResult>>,
     now_us: u64,
 }
 
-impl Emulated {
+impl EmulatedBoard {
     /// Switches a board on, its flash empty. It logs to `log`, in defmt's encoding.
     ///
     /// # Errors
@@ -95,7 +95,11 @@ impl Emulated {
             }
         });
         let mut board = Self { qemu, input, answers, now_us: 0 };
-        ensure!(board.finish()?.restarted, "the firmware is none for lock step: {}", quoted_path(program));
+        ensure!(
+            board.finish_grant()?.restarted,
+            "the firmware is none for lock step: {}",
+            quoted_path(program)
+        );
         Ok(board)
     }
 
@@ -105,13 +109,13 @@ impl Emulated {
     }
 
     /// Grants it time until `until_us`, with what its ports receive meanwhile, in order of time.
-    /// [`finish`](Self::finish) has to follow.
+    /// [`finish_grant`](Self::finish_grant) has to follow.
     ///
     /// # Errors
     /// The board is gone.
-    pub fn begin(&mut self, until_us: u64, pieces: &[Piece]) -> anyhow::Result<()> {
+    pub fn begin_grant(&mut self, until_us: u64, pieces: &[PortBytes]) -> anyhow::Result<()> {
         let mut message = Vec::new();
-        for Piece { port, at_us, bytes } in pieces {
+        for PortBytes { port, at_us, bytes } in pieces {
             let (port, due_us) = (*port as u8, *at_us);
             for bytes in bytes.chunks(u16::MAX.into()) {
                 let len = bytes.len() as u16;
@@ -127,15 +131,15 @@ impl Emulated {
     ///
     /// # Errors
     /// The board hangs, or is gone.
-    pub fn finish(&mut self) -> anyhow::Result<Answer> {
-        self.finish_within(ANSWER_TIMEOUT)
+    pub fn finish_grant(&mut self) -> anyhow::Result<GrantResult> {
+        self.finish_grant_within(ANSWER_TIMEOUT)
     }
 
     /// The same with another patience: a board that goes nowhere until its watchdog resets it takes this machine seconds.
     ///
     /// # Errors
-    /// As [`finish`](Self::finish).
-    pub fn finish_within(&mut self, patience: Duration) -> anyhow::Result<Answer> {
+    /// As [`finish_grant`](Self::finish_grant).
+    pub fn finish_grant_within(&mut self, patience: Duration) -> anyhow::Result<GrantResult> {
         let answer = match self.answers.recv_timeout(patience) {
             Ok(answer) => answer?,
             Err(RecvTimeoutError::Timeout) => {
@@ -147,13 +151,13 @@ impl Emulated {
         Ok(answer)
     }
 
-    /// Both, one after the other.
+    /// Begins a grant and waits for its end.
     ///
     /// # Errors
-    /// As [`begin`](Self::begin) and [`finish`](Self::finish).
-    pub fn run(&mut self, until_us: u64, pieces: &[Piece]) -> anyhow::Result<Answer> {
-        self.begin(until_us, pieces)?;
-        self.finish()
+    /// As [`begin_grant`](Self::begin_grant) and [`finish_grant`](Self::finish_grant).
+    pub fn run_grant(&mut self, until_us: u64, pieces: &[PortBytes]) -> anyhow::Result<GrantResult> {
+        self.begin_grant(until_us, pieces)?;
+        self.finish_grant()
     }
 
     fn send(&mut self, message: &[u8]) -> anyhow::Result<()> {
@@ -163,7 +167,7 @@ impl Emulated {
     }
 }
 
-impl Drop for Emulated {
+impl Drop for EmulatedBoard {
     fn drop(&mut self) {
         // The process may have ended by itself.
         let _ = self.qemu.kill();
@@ -172,22 +176,22 @@ impl Drop for Emulated {
 }
 
 /// Reads up to the end of an answer, or the board's start.
-fn read_answer(output: &mut BufReader<ChildStdout>) -> anyhow::Result<Answer> {
-    let mut answer = Answer::default();
+fn read_answer(output: &mut BufReader<ChildStdout>) -> anyhow::Result<GrantResult> {
+    let mut answer = GrantResult::default();
     loop {
         let mut head = [0; HEAD];
         output.read_exact(&mut head).context("the board is gone")?;
         let record = FromBoard::from_bytes(&head).context("the board says what is no record")?;
-        let mut bytes = vec![0; record.follows()];
+        let mut bytes = vec![0; record.payload_len()];
         output.read_exact(&mut bytes).context("the board is gone")?;
         match record {
-            FromBoard::Started => return Ok(Answer { restarted: true, ..Answer::default() }),
+            FromBoard::Started => return Ok(GrantResult { restarted: true, ..GrantResult::default() }),
             FromBoard::Sent { port, at_us, .. } => {
                 let port = if port == Port::Autopilot as u8 { Port::Autopilot } else { Port::Swarm };
-                answer.sent.push(Piece { port, at_us, bytes });
+                answer.sent.push(PortBytes { port, at_us, bytes });
             }
             FromBoard::Memory { .. } => answer.memory.extend(bytes),
-            FromBoard::Waits { now_us } => return Ok(Answer { now_us, ..answer }),
+            FromBoard::Waits { now_us } => return Ok(GrantResult { now_us, ..answer }),
         }
     }
 }

@@ -6,7 +6,7 @@ use anyhow::ensure;
 use lock_step::ToBoard;
 
 use super::bank::{BANK_MADE, BANK2, ERASED, TORN, WHOLE, WORD_MARKS};
-use super::{Answer, Emulated};
+use super::{EmulatedBoard, GrantResult};
 use crate::flash::LAYOUT;
 use companion::storage::store::WORD;
 
@@ -19,17 +19,17 @@ pub const STACK_LEN: usize = 88 << 10;
 /// Value of a byte that no stack has touched since the start.
 const STACK_PAINT: u8 = 0xcc;
 
-impl Emulated {
+impl EmulatedBoard {
     /// Reads the board's memory from an address on.
     ///
     /// # Errors
     /// The board is gone.
-    pub fn peek(&mut self, address: u32, length: usize) -> anyhow::Result<Vec<u8>> {
+    pub fn read_memory(&mut self, address: u32, length: usize) -> anyhow::Result<Vec<u8>> {
         let mut memory = Vec::new();
         while memory.len() < length {
             let len = (length - memory.len()).min(MEMORY_CHUNK) as u16;
             self.send(&ToBoard::Peek { address: address + memory.len() as u32, len }.to_bytes())?;
-            memory.extend(self.finish()?.memory);
+            memory.extend(self.finish_grant()?.memory);
         }
         Ok(memory)
     }
@@ -38,12 +38,12 @@ impl Emulated {
     ///
     /// # Errors
     /// The board is gone.
-    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> anyhow::Result<()> {
+    pub fn write_memory(&mut self, address: u32, bytes: &[u8]) -> anyhow::Result<()> {
         for (i, bytes) in bytes.chunks(MEMORY_CHUNK).enumerate() {
             let head =
                 ToBoard::Poke { address: address + (i * MEMORY_CHUNK) as u32, len: bytes.len() as u16 };
             self.send(&[&head.to_bytes(), bytes].concat())?;
-            self.finish()?;
+            self.finish_grant()?;
         }
         Ok(())
     }
@@ -53,30 +53,35 @@ impl Emulated {
     ///
     /// # Errors
     /// The board is gone, or hangs for longer than `patience`.
-    pub fn call(&mut self, address: u32, argument: u32, patience: Duration) -> anyhow::Result<Answer> {
+    pub fn call_function(
+        &mut self,
+        address: u32,
+        argument: u32,
+        patience: Duration,
+    ) -> anyhow::Result<GrantResult> {
         self.send(&ToBoard::Call { address, argument }.to_bytes())?;
-        self.finish_within(patience)
+        self.finish_grant_within(patience)
     }
 
     /// Writes `bank` into the board's flash.
     ///
     /// # Errors
     /// The board is gone, or its flash has no such bank.
-    pub fn load(&mut self, bank: &[u8]) -> anyhow::Result<()> {
+    pub fn load_flash(&mut self, bank: &[u8]) -> anyhow::Result<()> {
         ensure!(bank.len() == LAYOUT.len() as usize, "a bank has {} bytes", LAYOUT.len());
         let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
         let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
-        self.poke(BANK2, bank)?;
-        self.poke(WORD_MARKS, &marks)?;
-        self.poke(BANK_MADE.0, &BANK_MADE.1.to_le_bytes())
+        self.write_memory(BANK2, bank)?;
+        self.write_memory(WORD_MARKS, &marks)?;
+        self.write_memory(BANK_MADE.0, &BANK_MADE.1.to_le_bytes())
     }
 
     /// Words of its flash that are being programmed or erased, in its order.
     ///
     /// # Errors
     /// The board is gone.
-    pub fn torn(&mut self) -> anyhow::Result<Vec<usize>> {
-        let marks = self.peek(WORD_MARKS, LAYOUT.len() as usize / WORD)?;
+    pub fn torn_flash_words(&mut self) -> anyhow::Result<Vec<usize>> {
+        let marks = self.read_memory(WORD_MARKS, LAYOUT.len() as usize / WORD)?;
         Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
     }
 
@@ -85,7 +90,7 @@ impl Emulated {
     /// # Errors
     /// The board is gone.
     pub fn stack_used(&mut self) -> anyhow::Result<usize> {
-        let stack = self.peek(STACK_ADDRESS, STACK_LEN)?;
+        let stack = self.read_memory(STACK_ADDRESS, STACK_LEN)?;
         Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == STACK_PAINT).count())
     }
 }

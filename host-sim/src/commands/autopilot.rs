@@ -15,7 +15,7 @@ use planner_core::frames::Geodetic;
 use sim_autopilot::{Autopilot, AutopilotKind, Config};
 
 use crate::link::{Link, LinkUrl};
-use crate::progress::printed;
+use crate::progress::check_printed;
 use crate::say;
 
 const PHYSICS_STEP: Duration = Duration::from_millis(4);
@@ -31,13 +31,13 @@ pub struct AutopilotArgs {
     #[arg(long, value_name = "URL", required = true)]
     pub listen: Vec<LinkUrl>,
     /// Which autopilot to be
-    #[arg(long, value_name = "NAME", default_value = "px4", value_parser = personality())]
+    #[arg(long, value_name = "NAME", default_value = "px4", value_parser = autopilot_kind_parser())]
     pub personality: AutopilotKind,
     /// MAVLink system id
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub sysid: u8,
     /// Seconds from its start until ArduCopter's estimator has a position; PX4 has one at once
-    #[arg(long, value_name = "S", default_value_t = 40.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 40.0, value_parser = parse_seconds)]
     pub ready_after: f32,
     /// Where it stands: degrees, degrees, metres above the sea
     #[arg(
@@ -52,12 +52,12 @@ pub struct AutopilotArgs {
     pub origin: Option<Place>,
 }
 
-fn personality() -> impl TypedValueParser<Value = AutopilotKind> {
+fn autopilot_kind_parser() -> impl TypedValueParser<Value = AutopilotKind> {
     let names = PossibleValuesParser::new(["px4", "ardupilot"]);
     names.map(|name| if name == "px4" { AutopilotKind::Px4 } else { AutopilotKind::Ardupilot })
 }
 
-fn seconds(text: &str) -> Result<f32, String> {
+fn parse_seconds(text: &str) -> Result<f32, String> {
     let sound = text.parse().ok().filter(|s| (0.0..=3600.0).contains(s));
     sound.ok_or_else(|| "expected a number of seconds from 0 to 3600".to_owned())
 }
@@ -91,30 +91,30 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     let home = args.home.0;
     let config = Config {
         system_id: args.sysid,
-        personality: args.personality,
+        autopilot: args.personality,
         world_origin: home,
         ekf_origin: args.origin.map_or(home, |place| place.0),
         start: Point::zeros(),
         estimator_ready_s: args.ready_after,
         boot_unix_us: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_micros() as u64),
         ports: args.listen.len(),
-        routes: true,
+        forwards: true,
         ..Config::default()
     };
     let mut autopilot = Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
     let mut links = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
-        say!("listening {}", url.opened(&*link));
+        say!("listening {}", url.with_bound_port(&*link));
         links.push((url, link));
     }
     // Whoever waits for these lines would wait for ever.
-    printed()?;
+    check_printed()?;
     let ground_up_m = -config.vehicle.radius_m;
     let mut next = Instant::now();
     loop {
         for (port, (url, link)) in links.iter_mut().enumerate() {
-            exchange(&mut autopilot, port, &mut **link).with_context(|| format!("link lost: {url}"))?;
+            exchange_bytes(&mut autopilot, port, &mut **link).with_context(|| format!("link lost: {url}"))?;
         }
         autopilot.step(PHYSICS_STEP.as_secs_f32(), ground_up_m);
         next += PHYSICS_STEP;
@@ -127,7 +127,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Everything that came in, then everything that is to go out.
-fn exchange(autopilot: &mut Autopilot, port: usize, link: &mut dyn Link) -> std::io::Result<()> {
+fn exchange_bytes(autopilot: &mut Autopilot, port: usize, link: &mut dyn Link) -> std::io::Result<()> {
     let mut buffer = [0; 2048];
     loop {
         let len = link.receive(&mut buffer)?;

@@ -48,7 +48,7 @@ pub struct Args {
 
 /// Sleep between two polls of the links.
 const POLL_SLEEP: Duration = Duration::from_millis(1);
-/// Time for which a companion whose mission has ended goes on reporting that to the others and to
+/// Time for which a companion whose mission has ended continues reporting that to the others and to
 /// ground stations, as a board does for good.
 const REPORT_END_FOR: Duration = Duration::from_secs(2);
 /// Silence of its autopilot after which a vehicle cannot be helped.
@@ -65,11 +65,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
     let plan = mission.plan()?;
-    let left = mission.left(&plan);
+    let left = mission.unserved(&plan);
     // A goal is left, and this vehicle has none.
     let is_short = left.vehicles.contains(&args.id) && !left.goals.is_empty();
     if is_short {
-        shortage::lines(&mission, &plan).iter().for_each(|line| say!("left       {line}"));
+        shortage::shortage_lines(&mission, &plan).iter().for_each(|line| say!("left       {line}"));
     }
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
@@ -101,7 +101,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             companion.handle_timeout(now());
         }
         while let Some(request) = companion.poll_flash() {
-            let outcome = flash.obey(request, &mut read);
+            let outcome = flash.execute_request(request, &mut read);
             companion.handle_flash(now(), outcome);
         }
         let mut restarts = false;
@@ -115,7 +115,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     say!("{:9.3} s  flown around: {left} waypoints are left", began.elapsed().as_secs_f32());
                 }
                 Event::PlanRequested(wanted) => {
-                    let mut own = mission.answer(&plan, index, wanted, &companion);
+                    let mut own = mission.answer_plan_request(&plan, index, wanted, &companion);
                     if let (Ok(own), None) = (&mut own, &args.swarm) {
                         own.gates.clear();
                         own.depart_s = 0.0;
@@ -163,6 +163,6 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn start(config: &Config<VEHICLES>, flash: &mut DeskFlash) -> anyhow::Result<Box<DeskCompanion>> {
     let store = Store::mount(flash::LAYOUT, flash);
     let mut companion = new_companion(config.clone())?;
-    companion.mount(store);
+    companion.attach_store(store);
     Ok(companion)
 }

@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use crate::coverage::check::{self, Findings};
 use crate::coverage::sorties::Sortie;
-use crate::coverage::{self, Flight, Planned, export, page};
-use crate::files::Results;
+use crate::coverage::{self, CoveragePlan, Flight, export, page};
+use crate::files::ResultFiles;
 use crate::output;
 use crate::quote::quoted_path;
 use crate::report;
@@ -57,14 +57,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = scenario::load(&args.scenario)?;
     scenario.check_supported()?;
-    let files = files(&scenario);
+    let files = extra_file_names(&scenario);
     let names: Vec<&str> = output::RESULT_FILES.into_iter().chain(files.iter().map(String::as_str)).collect();
-    let mut results = Results::open(&args.out, &names)?;
+    let mut results = ResultFiles::open(&args.out, &names)?;
     let usual = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
-    let planned = Planned::new(&scenario, args.method.unwrap_or(usual))?;
+    let planned = CoveragePlan::new(&scenario, args.method.unwrap_or(usual))?;
     let flights = planned.flights();
-    let findings = check::check(&planned, &check::flown(&planned, &flights));
-    let result = described(&planned, &findings);
+    let findings = check::check_flights(&planned, &check::flights_to_check(&planned, &flights));
+    let result = cover_result(&planned, &findings);
     let written = add_flights(&planned, &flights, &mut results)?;
     results.add(output::RESULT_FILES[0], result::json(&result)?.as_bytes())?;
     let timing = Timing {
@@ -75,10 +75,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..Timing::default()
     };
     results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
-    let mut page = page::page(&planned, &flights, &findings, serde_json::to_value(&result)?);
+    let mut page = page::report_data(&planned, &flights, &findings, serde_json::to_value(&result)?);
     page.timing = Some(serde_json::to_value(&timing)?);
     results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
-    results.keep()?;
+    results.commit()?;
     remove_stale(&args.out, &written)?;
     print(&result, &findings, &args.out);
     print_batteries(&planned);
@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Names of the files beside the usual ones.
-fn files(scenario: &Scenario) -> Vec<String> {
+fn extra_file_names(scenario: &Scenario) -> Vec<String> {
     let own = |id: u8| [format!("vehicle-{id}.plan"), format!("vehicle-{id}.waypoints")];
     let shared = ["waypoints.csv", "area.geojson"].map(str::to_owned);
     scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
@@ -94,9 +94,9 @@ fn files(scenario: &Scenario) -> Vec<String> {
 
 /// Adds the plans of all flights and what is beside them; returns the names of the plans.
 fn add_flights(
-    planned: &Planned<'_>,
+    planned: &CoveragePlan<'_>,
     flights: &[Flight],
-    results: &mut Results,
+    results: &mut ResultFiles,
 ) -> anyhow::Result<Vec<String>> {
     let mut written = Vec::new();
     for (sortie, stops, _) in flights {
@@ -106,16 +106,16 @@ fn add_flights(
             1 => format!("vehicle-{id}"),
             _ => format!("vehicle-{id}-sortie-{}", sortie.number),
         };
-        let items = export::items(planned, sortie, stops);
-        let plan = result::json(&export::plan(planned, route, &items))?;
+        let items = export::flight_items(planned, sortie, stops);
+        let plan = result::json(&export::qgc_plan(planned, route, &items))?;
         let waypoints = export::waypoints(planned, route, &items);
         for (kind, text) in [("plan", plan), ("waypoints", waypoints)] {
             written.push(format!("{name}.{kind}"));
             results.add(&format!("{name}.{kind}"), text.as_bytes())?;
         }
     }
-    results.add("waypoints.csv", export::csv(planned, flights).as_bytes())?;
-    results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())?;
+    results.add("waypoints.csv", export::flights_csv(planned, flights).as_bytes())?;
+    results.add("area.geojson", result::json(&export::area_geojson(planned, flights))?.as_bytes())?;
     Ok(written)
 }
 
@@ -141,7 +141,7 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
 }
 
 /// Description of a plan for `result.json`.
-pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
+pub(crate) fn cover_result(planned: &CoveragePlan<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
     let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
@@ -165,12 +165,12 @@ pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResu
             deadlocks: 0,
         },
         roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
-        coverage: coverage::result::of(planned, findings),
+        coverage: coverage::result::coverage_result(planned, findings),
         vehicles: vehicle_results(planned),
     }
 }
 
-fn vehicle_results(planned: &Planned<'_>) -> Vec<VehicleResult> {
+fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
     let vehicles = planned.scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
         let route = planned.plan.routes.iter().find(|route| usize::from(route.vehicle) == index);
         VehicleResult {
@@ -249,7 +249,7 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
 }
 
 /// Without `endurance_s` nothing says whether a battery lasts.
-fn print_batteries(planned: &Planned<'_>) {
+fn print_batteries(planned: &CoveragePlan<'_>) {
     let unknown = planned
         .sorties
         .iter()

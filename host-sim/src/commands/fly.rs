@@ -8,9 +8,9 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 
 use super::load;
-use crate::coverage::kept::Kept;
-use crate::coverage::{Planned, flown, parts};
-use crate::files::Results;
+use crate::coverage::kept::PictureStore;
+use crate::coverage::{CoveragePlan, flown, parts};
+use crate::files::ResultFiles;
 use crate::link::LinkUrl;
 use crate::mission::Mission;
 use crate::output;
@@ -56,7 +56,7 @@ pub struct FlyArgs {
     #[arg(long, value_name = "FIRMWARE", conflicts_with = "companion")]
     emulate: Option<PathBuf>,
     /// Keep what each companion keeps in its flash in this directory, as boards do: parameters, and in a coverage mission
-    /// what is photographed. The next flight goes on there, and is judged by the pictures of all
+    /// what is photographed. The next flight continues there, and is judged by the pictures of all
     #[arg(long, value_name = "DIR", conflicts_with_all = ["companion", "emulate"])]
     flash: Option<PathBuf>,
     /// How many of the scenario's first vehicles have such a board, if not all
@@ -64,9 +64,9 @@ pub struct FlyArgs {
     boards: Option<usize>,
 }
 
-/// How a flight is looked at while it lasts.
+/// Display of a running flight: clock speed and ground station.
 #[derive(Default)]
-struct Shown<'a> {
+struct FlightDisplay<'a> {
     realtime: bool,
     qgc: Option<&'a LinkUrl>,
 }
@@ -85,19 +85,23 @@ pub struct DemoArgs {
 /// Bad input, by name and place.
 pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     let mut scenario = load(&args.scenario, args.seed)?;
-    put_on_boards(&mut scenario, &args.companion, &args.radio)?;
+    set_board_links(&mut scenario, &args.companion, &args.radio)?;
     if let Some(program) = &args.emulate {
-        emulate(&mut scenario, program, args.boards, &args.out)?;
+        set_emulated_boards(&mut scenario, program, args.boards, &args.out)?;
     }
     if let Some(dir) = &args.flash {
         keep_flashes(&mut scenario, dir)?;
     }
-    let shown = Shown { realtime: args.realtime, qgc: args.qgc.as_ref() };
+    let shown = FlightDisplay { realtime: args.realtime, qgc: args.qgc.as_ref() };
     plan_and_fly(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
 /// The first vehicles are decided for behind these links.
-fn put_on_boards(scenario: &mut Scenario, companions: &[LinkUrl], radios: &[LinkUrl]) -> anyhow::Result<()> {
+fn set_board_links(
+    scenario: &mut Scenario,
+    companions: &[LinkUrl],
+    radios: &[LinkUrl],
+) -> anyhow::Result<()> {
     let (boards, vehicles) = (companions.len(), scenario.vehicles.len());
     ensure!(boards <= vehicles, "too many --companion: {boards}: {} has {vehicles} vehicles", scenario.path);
     ensure!(
@@ -127,7 +131,12 @@ fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
 }
 
 /// The first vehicles have boards in QEMU.
-fn emulate(scenario: &mut Scenario, program: &Path, boards: Option<usize>, out: &Path) -> anyhow::Result<()> {
+fn set_emulated_boards(
+    scenario: &mut Scenario,
+    program: &Path,
+    boards: Option<usize>,
+    out: &Path,
+) -> anyhow::Result<()> {
     let vehicles = scenario.vehicles.len();
     let boards = boards.unwrap_or(vehicles);
     ensure!(boards <= vehicles, "too many --boards: {boards}: {} has {vehicles} vehicles", scenario.path);
@@ -144,26 +153,26 @@ fn emulate(scenario: &mut Scenario, program: &Path, boards: Option<usize>, out: 
 /// The output cannot be written.
 pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let scenario = scenario::parse(DEMO, "demo.toml").context("the demo's own scenario")?;
-    plan_and_fly(scenario, "demo", &args.out, &Shown::default(), None)
+    plan_and_fly(scenario, "demo", &args.out, &FlightDisplay::default(), None)
 }
 
 fn plan_and_fly(
     scenario: Scenario,
     command: &'static str,
     out: &Path,
-    shown: &Shown<'_>,
+    shown: &FlightDisplay<'_>,
     flashes: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
     faults::check(&scenario)?;
-    let kept = flashes.filter(|_| scenario.area.is_some()).map(Kept::open).transpose()?;
+    let kept = flashes.filter(|_| scenario.area.is_some()).map(PictureStore::open).transpose()?;
     let gateway = shown.qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
-    let mut results = Results::open(out, &output::RESULT_FILES)?;
+    let mut results = ResultFiles::open(out, &output::RESULT_FILES)?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
     let mut flight = match gateway {
-        Some(gateway) => swarm::fly_shown(&mission, &plan, command, gateway, &progress)?,
+        Some(gateway) => swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?,
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
     if let Some(kept) = &kept {
@@ -171,27 +180,27 @@ fn plan_and_fly(
     }
     let pictures = std::mem::take(&mut flight.pictures);
     let judged = match &mission.scenario.area {
-        Some(_) => Some(flown::judge(&mission.scenario, &plan, pictures.clone())?),
+        Some(_) => Some(flown::judge_pictures(&mission.scenario, &plan, pictures.clone())?),
         None => None,
     };
     if let Some(judged) = &judged {
         flight.result.complete &= judged.complete;
         flight.result.coverage = Some(judged.result.clone());
         if let Some(kept) = kept {
-            kept.keep(&pictures, judged.complete)?;
+            kept.store_pictures(&pictures, judged.complete)?;
         }
     }
     let mut page = output::flown_page(&mission, &plan, &flight)?;
     if let Some(judged) = judged {
         page.outlines = judged.outlines;
         page.plots.insert(0, judged.plot);
-        let planned = Planned::flown(&mission.scenario)?;
-        page.coverage = Some(parts::flown(&planned, &mission, &plan, &flight, pictures)?);
+        let planned = CoveragePlan::plan_as_companions(&mission.scenario)?;
+        page.coverage = Some(parts::flown_layers(&planned, &mission, &plan, &flight, pictures)?);
     }
     mission.timing.simulated_s = flight.simulated_s;
     mission.timing.wall_s = began.elapsed().as_secs_f64();
     output::add(&mut results, &flight.result, &mission.timing, page)?;
-    results.keep()?;
+    results.commit()?;
     output::print_summary(&flight.result, out);
     let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
     let limit_s = mission.scenario.simulation.time_limit_s;

@@ -7,13 +7,13 @@ use std::time::Instant;
 use anyhow::bail;
 
 use super::load;
-use crate::capacity::{BOARDS, Board, WAYPOINTS};
-use crate::files::Results;
+use crate::capacity::{BOARDS, BoardCapacity, WAYPOINTS};
+use crate::files::ResultFiles;
 use crate::mission::{Mission, SwarmPlan};
 use crate::output;
 use crate::progress::Progress;
 use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
-use crate::roadmap::Parts;
+use crate::roadmap::BuildTimes;
 use crate::say;
 use crate::shortage;
 
@@ -28,8 +28,8 @@ pub struct Args {
     out: PathBuf,
     /// Make files that this board holds: nucleo-h743, qemu or pico2. Of the roadmap's edges some are left out, paths lengthen
     /// little
-    #[arg(long, value_name = "BOARD", value_parser = Board::named)]
-    board: Option<&'static Board>,
+    #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
+    board: Option<&'static BoardCapacity>,
 }
 
 /// Runs the command.
@@ -40,18 +40,20 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = load(&args.scenario, None)?;
     let names = ["starts.txt", "goals.txt", "roadmap.bin", "field.bin", "mission.bin"];
-    let mut results = Results::open(&args.out, &[&output::RESULT_FILES[..], &names].concat())?;
+    let mut results = ResultFiles::open(&args.out, &[&output::RESULT_FILES[..], &names].concat())?;
     let mut mission = Mission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
-    if let Some((board, why)) = args.board.and_then(|board| Some((board, mission.excess(&plan, board)?))) {
+    if let Some((board, why)) =
+        args.board.and_then(|board| Some((board, mission.board_limit_exceeded(&plan, board)?)))
+    {
         bail!("the mission does not fit {}: {}: {why}", board.name, mission.scenario.path);
     }
-    let result = planned(&mission, &plan);
+    let result = planned_result(&mission, &plan);
     let page = output::planned_page(&mission, &plan, &result)?;
     mission.timing.wall_s = began.elapsed().as_secs_f64();
     output::add(&mut results, &result, &mission.timing, page)?;
-    let starts = output::points(mission.scenario.vehicles.iter().map(|v| v.start));
-    let goals = output::points(mission.goals.iter().copied());
+    let starts = output::points_to_text(mission.scenario.vehicles.iter().map(|v| v.start));
+    let goals = output::points_to_text(mission.goals.iter().copied());
     // A coverage mission has no roadmap, over level ground no field.
     let (roadmap, field) = match mission.scenario.area {
         None => (&mission.roadmap_file[..], &[][..]),
@@ -61,15 +63,15 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     for (name, bytes) in names.iter().zip(contents).filter(|(_, bytes)| !bytes.is_empty()) {
         results.add(name, bytes)?;
     }
-    results.keep()?;
+    results.commit()?;
     output::print_summary(&result, &args.out);
     for board in &BOARDS {
-        match mission.excess(&plan, board) {
+        match mission.board_limit_exceeded(&plan, board) {
             None => say!("board      {} holds the files", board.name),
             Some(why) => say!("board      {} does not hold the files: {why}", board.name),
         }
     }
-    let Parts { boxes_s, nodes_s, edges_s, passages_s, cap_s, file_s } = mission.timing.roadmap_parts;
+    let BuildTimes { boxes_s, nodes_s, edges_s, passages_s, cap_s, file_s } = mission.timing.roadmap_parts;
     say!(
         "times      map {:.1} ms, roadmap {:.1} ms: boxes {:.1}, nodes {:.1}, edges {:.1}, passages {:.1}, capping {:.1}, \
          file {:.1}",
@@ -84,18 +86,18 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     );
     say!("pads       where each stands, as `--home` of `host-sim autopilot`");
     for (i, task) in mission.tasks.iter().enumerate() {
-        let pad = mission.pad(i);
+        let pad = mission.pad_position(i);
         say!("{:>7}  {:.8},{:.8},{:.3}", task.id, pad.lat_deg, pad.lon_deg, pad.alt_m);
     }
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
+fn planned_result(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
     let schedule = mission.schedule();
     let nominal_s = |f: &planner_core::flight::Flight<WAYPOINTS>| {
         (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps
     };
-    let flying = || plan.flights.iter().filter(|f| f.task.flies());
+    let flying = || plan.flights.iter().filter(|f| f.task.leaves_pad());
     let clearances = flying().flat_map(|f| f.path.waypoints()).map(|w| w.clearance_m);
     let min_clearance_m = clearances.fold(f32::INFINITY, f32::min);
     let vehicles: Vec<_> = plan
@@ -108,8 +110,8 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
             landed: false,
             path_m: rounded(flight.path.length_m()),
             flown_m: 0.0,
-            flight_time_s: if flight.task.flies() { rounded(nominal_s(flight)) } else { 0.0 },
-            end: if flight.task.flies() { "planned" } else { "no goal" }.to_owned(),
+            flight_time_s: if flight.task.leaves_pad() { rounded(nominal_s(flight)) } else { 0.0 },
+            end: if flight.task.leaves_pad() { "planned" } else { "no goal" }.to_owned(),
         })
         .collect();
     let makespan_s = flying().map(|f| f.depart_s + nominal_s(f)).fold(0.0, f32::max);
@@ -131,7 +133,7 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
             deadlocks: 0,
         },
         roadmap: mission.roadmap_size(),
-        left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
+        left: Left { reasons: shortage::shortage_lines(mission, plan), ..mission.unserved(plan) },
         coverage: None,
     }
 }

@@ -10,7 +10,7 @@ use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use planner_core::Point;
 
 use crate::link::{Link, LinkUrl};
-use crate::progress::printed;
+use crate::progress::check_printed;
 use crate::say;
 use crate::swarm::radio::{Radio, RadioConfig};
 
@@ -22,10 +22,10 @@ pub struct Args {
     #[arg(long, value_name = "URL", required = true)]
     listen: Vec<LinkUrl>,
     /// Share of frames that a receiver misses
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share)]
     loss: f64,
     /// Time from sending to hearing, seconds
-    #[arg(long, value_name = "S", default_value_t = 0.05, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = 0.05, value_parser = parse_seconds)]
     delay: f64,
     /// Seed of the losses
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -34,17 +34,17 @@ pub struct Args {
 
 const POLL_SLEEP: Duration = Duration::from_millis(1);
 
-fn number(text: &str, most: f64) -> Result<f64, String> {
+fn parse_number(text: &str, most: f64) -> Result<f64, String> {
     let sound = text.parse().ok().filter(|value| (0.0..=most).contains(value));
     sound.ok_or_else(|| format!("expected a number from 0 to {most}"))
 }
 
-fn share(text: &str) -> Result<f64, String> {
-    number(text, 1.0)
+fn parse_share(text: &str) -> Result<f64, String> {
+    parse_number(text, 1.0)
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    number(text, 60.0)
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    parse_number(text, 60.0)
 }
 
 /// Passes every frame on to all other links until the process is ended. Prints `listening URL` for each.
@@ -58,10 +58,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut links: Vec<(&LinkUrl, Box<dyn Link>, Framer)> = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
-        say!("listening {}", url.opened(&*link));
+        say!("listening {}", url.with_bound_port(&*link));
         links.push((url, link, Framer::new()));
     }
-    printed()?;
+    check_printed()?;
     let began = Clock::now();
     let mut buffer = [0; 2048];
     loop {

@@ -8,8 +8,8 @@ use clap::Subcommand;
 use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 
 use super::load;
-use crate::capacity::Board;
-use crate::files::{self, Results};
+use crate::capacity::BoardCapacity;
+use crate::files::{self, ResultFiles};
 use crate::mission::Mission;
 use crate::progress::Progress;
 use crate::quote::quoted_path;
@@ -32,8 +32,8 @@ enum Action {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
         /// Make a file that this board holds: nucleo-h743, qemu or pico2
-        #[arg(long, value_name = "BOARD", value_parser = Board::named)]
-        board: Option<&'static Board>,
+        #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
+        board: Option<&'static BoardCapacity>,
     },
     /// Check a roadmap file and say what it holds
     Info {
@@ -50,10 +50,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Build { scenario, out, board } => {
             let scenario = load(scenario, None)?;
-            let mut results = Results::file(out)?;
+            let mut results = ResultFiles::single_file(out)?;
             let mission = Mission::prepare_for(scenario, *board, &Progress::on_terminal())?;
             results.add_file(out, &mission.roadmap_file)?;
-            results.keep()?;
+            results.commit()?;
             print(&mission.view());
         }
         Action::Info { file } => {
@@ -88,13 +88,13 @@ fn print(view: &RoadmapView<'_>) {
 
 /// A file that is a roadmap and nothing else.
 pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
-    let view = RoadmapView::parse(bytes).map_err(|error| anyhow!(why(&error)))?;
+    let view = RoadmapView::parse(bytes).map_err(|error| anyhow!(describe_error(&error)))?;
     ensure!(view.byte_len() == bytes.len(), "{} bytes follow its end", bytes.len() - view.byte_len());
     Ok(view)
 }
 
 /// Description of a file's fault.
-fn why(error: &RoadmapError) -> String {
+fn describe_error(error: &RoadmapError) -> String {
     match error {
         RoadmapError::File(error) => error.to_string(),
         other => format!("its contents are not sound: {other:?}"),

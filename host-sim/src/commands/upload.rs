@@ -9,13 +9,13 @@ use companion::storage::store::File;
 use planner_core::field::{self, FieldView};
 use planner_core::roadmap;
 
-use crate::capacity::{BOARDS, Board};
+use crate::capacity::{BOARDS, BoardCapacity};
 use crate::files;
 use crate::link::LinkUrl;
 use crate::progress::Progress;
 use crate::quote::quoted_path;
 use crate::say;
-use crate::upload::Client;
+use crate::upload::FtpClient;
 
 /// Arguments of `host-sim upload`.
 #[derive(Debug, clap::Args)]
@@ -34,8 +34,8 @@ pub struct Args {
     ground_station: u8,
     /// The vehicle's board: nucleo-h743, qemu or pico2. A file that it does not hold is not sent; without this option, one
     /// that no board holds
-    #[arg(long, value_name = "BOARD", value_parser = Board::named)]
-    board: Option<&'static Board>,
+    #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
+    board: Option<&'static BoardCapacity>,
 }
 
 /// Uploads, and compares the CRC-32 of what arrived. It is used from the companion's next start on.
@@ -47,11 +47,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let bytes =
         files::read(&args.file, files::BINARY_BYTES).with_context(|| format!("cannot read: {path}"))?;
     let board = args.board.unwrap_or(&BOARDS[0]);
-    let file = kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
-    let mut client = Client::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
-    let system = client.find()?;
-    let bar = Progress::on_terminal().steps("upload", bytes.len() as u64);
-    client.upload(file, &bytes, |done| bar.at(done)).with_context(|| format!("upload failed: {path}"))?;
+    let file = file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
+    let mut client = FtpClient::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
+    let system = client.wait_for_companion()?;
+    let bar = Progress::on_terminal().begin_counted_stage("upload", bytes.len() as u64);
+    client
+        .upload(file, &bytes, |done| bar.set_position(done))
+        .with_context(|| format!("upload failed: {path}"))?;
     drop(bar);
     say!(
         "{path} is vehicle {system}'s {} from its next start on: {} bytes, CRC-32 right",
@@ -62,7 +64,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Kind of the file, if the board holds it.
-fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
+fn file_kind(bytes: &[u8], board: &BoardCapacity) -> anyhow::Result<File> {
     let (file, excess) = if bytes.starts_with(&roadmap::MAGIC) {
         let view = super::roadmap::parse(bytes).context("no sound roadmap")?;
         (File::Roadmap, board.roadmap_excess(&view))

@@ -1,7 +1,7 @@
 //! The one checker of coverage plans: is everything photographed, every waypoint once, on routes without a break, outside
 //! no-fly zones?
 //!
-//! It looks at flights as they are written, or at pictures as they were taken, in f64, and shares no code with the planner. Cells are a tenth of the lane
+//! It compares flights as they are written, or at pictures as they were taken, in f64, and shares no code with the planner. Cells are a tenth of the lane
 //! spacing. A cell counts if its middle is in the area and outside no-fly zones; it is photographed if one picture shows
 //! all its corners. Where overlaps are less than a cell, pictures must show its middle and each corner that is in the
 //! area.
@@ -10,10 +10,10 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
-pub use super::flight::Flown;
-use super::flight::{Act, Stop};
+pub use super::flight::TimedFlight;
+use super::flight::{Stop, StopAction};
 use super::heights::{self, HeightFindings};
-use super::{Flight, Planned};
+use super::{CoveragePlan, Flight};
 
 /// Most cells of the area that are checked; a larger area is checked in larger cells.
 const MAX_CHECKED_CELLS: f64 = 4e7;
@@ -46,7 +46,7 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Whether nothing is wrong.
+    /// Whether the check found no fault.
     pub fn is_clean(&self) -> bool {
         self.covered_share >= 1.0
             && self.left + self.twice + self.broken + self.forbidden == 0
@@ -68,41 +68,46 @@ pub struct Picture {
 }
 
 /// Checks what a plan flies.
-pub fn check_plan(planned: &Planned<'_>) -> Findings {
+pub fn check_plan(planned: &CoveragePlan<'_>) -> Findings {
     let flights: Vec<_> = planned.flights();
-    check(planned, &flown(planned, &flights))
+    check_flights(planned, &flights_to_check(planned, &flights))
 }
 
 /// The flights as the checker takes them.
-pub fn flown<'f>(planned: &Planned<'_>, flights: &'f [Flight]) -> Vec<Flown<'f>> {
+pub fn flights_to_check<'f>(planned: &CoveragePlan<'_>, flights: &'f [Flight]) -> Vec<TimedFlight<'f>> {
     let flown = |(sortie, stops, times_s): &'f Flight| {
         let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
-        Flown { vehicle, stops, times_s }
+        TimedFlight { vehicle, stops, times_s }
     };
     flights.iter().map(flown).collect()
 }
 
 /// Checks flights against the area.
-pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Findings {
+pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Findings {
     let mut findings = Findings::default();
     count_waypoints(planned, flights, &mut findings);
     for flight in flights {
-        let enters = |pair: &&[Stop]| enters_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
+        let enters =
+            |pair: &&[Stop]| does_leg_enter_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
-    findings.heights = heights::check(planned, flights);
-    Cells::that_count(planned).judge(planned, pictures(planned, flights), &mut findings);
+    findings.heights = heights::check_heights(planned, flights);
+    CoverageCells::finest_needed(planned).judge_coverage(
+        planned,
+        planned_pictures(planned, flights),
+        &mut findings,
+    );
     findings
 }
 
 /// The pictures that a plan takes.
-pub fn pictures(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Vec<Picture> {
-    let along = planned.tracks.along();
+pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Vec<Picture> {
+    let along = planned.tracks.lane_direction();
     let heading = along.y.atan2(along.x);
-    let taken = |flight: &Flown<'_>| {
+    let taken = |flight: &TimedFlight<'_>| {
         let vehicle = Some(flight.vehicle);
         let stops = flight.stops.iter().zip(flight.times_s);
-        let photos = stops.filter(|(stop, _)| matches!(stop.act, Act::Photo(_)));
+        let photos = stops.filter(|(stop, _)| matches!(stop.act, StopAction::Photo(_)));
         let taken = photos.map(|(stop, &t_s)| Picture { vehicle, t_s, position: stop.position, heading });
         taken.collect::<Vec<_>>()
     };
@@ -111,7 +116,7 @@ pub fn pictures(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Vec<Picture> {
 
 /// Judges pictures that were taken in a flight, by where the camera truly was. A waypoint is left out if no picture was
 /// taken within half a spacing of it, and photographed twice if two were.
-pub fn check_pictures(planned: &Planned<'_>, pictures: Vec<Picture>) -> Findings {
+pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Findings {
     let spacing = planned.wanted.spacing;
     let near_m = spacing.waypoint_m.min(spacing.lane_m) / 2.0;
     let mut findings = Findings { photos: pictures.len() as u64, ..Findings::default() };
@@ -121,21 +126,21 @@ pub fn check_pictures(planned: &Planned<'_>, pictures: Vec<Picture>) -> Findings
         findings.left += u64::from(taken == 0);
         findings.twice += u64::from(taken > 1);
     }
-    Cells::that_count(planned).judge(planned, pictures, &mut findings);
+    CoverageCells::finest_needed(planned).judge_coverage(planned, pictures, &mut findings);
     findings
 }
 
 /// Corners of what each picture shows, in turn, metres east and north.
-pub fn footprints(planned: &Planned<'_>, pictures: &[Picture]) -> Vec<[[f32; 2]; 4]> {
-    let cells = Cells::new(planned);
-    pictures.iter().map(|picture| cells.corners(planned, picture)).collect()
+pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32; 2]; 4]> {
+    let cells = CoverageCells::new(planned);
+    pictures.iter().map(|picture| cells.footprint_corners(planned, picture)).collect()
 }
 
-fn count_waypoints(planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
+fn count_waypoints(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>], findings: &mut Findings) {
     let mut times = vec![0u32; planned.tracks.waypoint_count() as usize];
     for flight in flights {
         let photos = flight.stops.iter().filter_map(|stop| match stop.act {
-            Act::Photo(number) => Some(number),
+            StopAction::Photo(number) => Some(number),
             _ => None,
         });
         let numbers: Vec<u32> = photos.collect();
@@ -149,7 +154,7 @@ fn count_waypoints(planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut 
 }
 
 /// Whether a straight leg enters a no-fly zone: its middle between two edges that it crosses is inside, or an end is.
-fn enters_zone(planned: &Planned<'_>, from: &Flat, to: &Flat) -> bool {
+fn does_leg_enter_zone(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> bool {
     let wide = |place: &Flat| [f64::from(place.x), f64::from(place.y)];
     let (a, b) = (wide(from), wide(to));
     planned.wanted.rings_of(RingKind::NoFly).any(|ring| {
@@ -166,12 +171,12 @@ fn enters_zone(planned: &Planned<'_>, from: &Flat, to: &Flat) -> bool {
         shares.sort_by(f64::total_cmp);
         shares.windows(2).filter(|pair| pair[1] - pair[0] > 1e-9).any(|pair| {
             let share = (pair[0] + pair[1]) / 2.0;
-            holds(&ring, [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share])
+            ring_contains(&ring, [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share])
         })
     })
 }
 
-fn holds(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
+fn ring_contains(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
     let mut inside = false;
     for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
         if (a[1] <= place[1]) != (b[1] <= place[1]) {
@@ -182,21 +187,21 @@ fn holds(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
 }
 
 /// Cells along and across the lanes.
-struct Cells {
+struct CoverageCells {
     along: [f64; 2],
     low: [f64; 2],
     side: f64,
     size: [usize; 2],
 }
 
-impl Cells {
-    fn new(planned: &Planned<'_>) -> Self {
-        let along = planned.tracks.along();
+impl CoverageCells {
+    fn new(planned: &CoveragePlan<'_>) -> Self {
+        let along = planned.tracks.lane_direction();
         let along = [f64::from(along.x), f64::from(along.y)];
         let mut cells = Self { along, low: [f64::INFINITY; 2], side: 0.0, size: [0; 2] };
         let mut high = [f64::NEG_INFINITY; 2];
         for vertex in planned.wanted.rings_of(RingKind::Outer).flatten() {
-            let place = cells.rotated(vertex);
+            let place = cells.to_lane_frame(vertex);
             for axis in 0..2 {
                 cells.low[axis] = cells.low[axis].min(place[axis]);
                 high[axis] = high[axis].max(place[axis]);
@@ -210,27 +215,32 @@ impl Cells {
     }
 
     /// Cells of which some count, so that an area narrower than one is judged too.
-    fn that_count(planned: &Planned<'_>) -> Self {
+    fn finest_needed(planned: &CoveragePlan<'_>) -> Self {
         let mut cells = Self::new(planned);
         let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MAX_CHECKED_CELLS;
-        while !cells.held(planned, cells.size, 0.5).contains(&true) && most(cells.size) {
+        while !cells.cells_inside_area(planned, cells.size, 0.5).contains(&true) && most(cells.size) {
             cells.side /= 2.0;
             cells.size = cells.size.map(|count| 2 * count);
         }
         cells
     }
 
-    fn rotated(&self, place: &Flat) -> [f64; 2] {
+    fn to_lane_frame(&self, place: &Flat) -> [f64; 2] {
         let (x, y) = (f64::from(place.x), f64::from(place.y));
         [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
     }
 
     /// Whether the area holds each place of a grid, row by row: the middles of the cells, or their corners, half a cell
     /// before them and one more each way.
-    fn held(&self, planned: &Planned<'_>, [columns, rows]: [usize; 2], offset: f64) -> Vec<bool> {
+    fn cells_inside_area(
+        &self,
+        planned: &CoveragePlan<'_>,
+        [columns, rows]: [usize; 2],
+        offset: f64,
+    ) -> Vec<bool> {
         let area = planned.wanted;
         let rings = |kind| {
-            let turned = |ring: &[Flat]| ring.iter().map(|v| self.rotated(v)).collect::<Vec<_>>();
+            let turned = |ring: &[Flat]| ring.iter().map(|v| self.to_lane_frame(v)).collect::<Vec<_>>();
             area.rings_of(kind).map(turned).collect::<Vec<_>>()
         };
         let wanted: Vec<_> = rings(RingKind::Outer).into_iter().chain(rings(RingKind::Hole)).collect();
@@ -238,16 +248,22 @@ impl Cells {
         let mut held = vec![false; columns * rows];
         for (row, line) in held.chunks_mut(columns).enumerate() {
             let at = [self.low[0] + offset * self.side, self.low[1] + (row as f64 + offset) * self.side];
-            self.fill(line, &wanted, at, |place| *place = true);
+            self.for_row_inside_rings(line, &wanted, at, |place| *place = true);
             for zone in &zones {
-                self.fill(line, std::slice::from_ref(zone), at, |place| *place = false);
+                self.for_row_inside_rings(line, std::slice::from_ref(zone), at, |place| *place = false);
             }
         }
         held
     }
 
     /// Does something to the places of a row, which begins at `at`, that are inside rings.
-    fn fill(&self, row: &mut [bool], rings: &[Vec<[f64; 2]>], at: [f64; 2], mut to: impl FnMut(&mut bool)) {
+    fn for_row_inside_rings(
+        &self,
+        row: &mut [bool],
+        rings: &[Vec<[f64; 2]>],
+        at: [f64; 2],
+        mut to: impl FnMut(&mut bool),
+    ) {
         let v = at[1];
         let mut crossings = Vec::new();
         for ring in rings {
@@ -267,7 +283,7 @@ impl Cells {
 
     /// Half of what a picture shows along and across the lanes. Of one that is taken askew, as large a rectangle of the same
     /// sides' ratio as lies within it.
-    fn half(&self, planned: &Planned<'_>, picture: &Picture) -> [f64; 2] {
+    fn half_footprint(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [f64; 2] {
         let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.height_m);
         let above_m = picture.position.z - planned.wanted.ground_m(&picture.position.xy());
         let half = [f64::from(footprint.along_m) / 2.0, f64::from(footprint.across_m) / 2.0];
@@ -279,8 +295,9 @@ impl Cells {
     }
 
     /// Corners of what a picture is judged to show, in turn, metres east and north.
-    fn corners(&self, planned: &Planned<'_>, picture: &Picture) -> [[f32; 2]; 4] {
-        let ([u, v], [along, across]) = (self.rotated(&picture.position.xy()), self.half(planned, picture));
+    fn footprint_corners(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [[f32; 2]; 4] {
+        let ([u, v], [along, across]) =
+            (self.to_lane_frame(&picture.position.xy()), self.half_footprint(planned, picture));
         [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[i, j]| {
             let (u, v) = (u + i * along, v + j * across);
             let [x, y] = self.along;
@@ -288,9 +305,14 @@ impl Cells {
         })
     }
 
-    fn judge(&self, planned: &Planned<'_>, mut pictures: Vec<Picture>, findings: &mut Findings) {
+    fn judge_coverage(
+        &self,
+        planned: &CoveragePlan<'_>,
+        mut pictures: Vec<Picture>,
+        findings: &mut Findings,
+    ) {
         let spacing = planned.wanted.spacing;
-        let counted = self.held(planned, self.size, 0.5);
+        let counted = self.cells_inside_area(planned, self.size, 0.5);
         // Where pictures overlap by a cell, one of them must show all corners of the cell.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
@@ -301,13 +323,17 @@ impl Cells {
         // middle.
         let mut corners: Vec<bool> = match whole {
             true => vec![false; (columns + 1) * (rows + 1)],
-            false => self.held(planned, [columns + 1, rows + 1], 0.0).iter().map(|held| !held).collect(),
+            false => self
+                .cells_inside_area(planned, [columns + 1, rows + 1], 0.0)
+                .iter()
+                .map(|held| !held)
+                .collect(),
         };
         let mut middles = vec![whole; counted.len()];
         let mut shown = vec![false; counted.len()];
         for picture in pictures {
-            let (time, place) = (picture.t_s, self.rotated(&picture.position.xy()));
-            let half = self.half(planned, &picture);
+            let (time, place) = (picture.t_s, self.to_lane_frame(&picture.position.xy()));
+            let half = self.half_footprint(planned, &picture);
             // Corners in the picture; a rounding beyond it is in it.
             let range = |axis: usize, most: usize| {
                 let from = (place[axis] - half[axis] - self.low[axis]) / self.side;

@@ -10,11 +10,11 @@ use planner_core::coverage::pack::Route;
 use planner_core::frames::Geodetic;
 use serde_json::{Value, json};
 
-use super::flight::{Act, Stop, heading_deg};
+use super::flight::{Stop, StopAction, heading_deg};
 use super::sorties::Sortie;
-use super::{Flight, Planned};
+use super::{CoveragePlan, Flight};
 use crate::scenario::AutopilotKind;
-use crate::scenario::coverage::{Heading, Trigger};
+use crate::scenario::coverage::{HeadingRule, Trigger};
 
 const NAV_WAYPOINT: u16 = 16;
 const NAV_RETURN_TO_LAUNCH: u16 = 20;
@@ -42,20 +42,20 @@ pub struct Item {
 }
 
 impl Item {
-    fn command(command: u16, params: [f64; 4]) -> Self {
+    fn from_command(command: u16, params: [f64; 4]) -> Self {
         Self { command, frame: FRAME_MISSION, params: params.map(Some), place: [0.0; 3] }
     }
 }
 
 /// The place where a vehicle stands.
-fn home(planned: &Planned<'_>, route: &Route) -> Geodetic {
+fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
     Geodetic { alt_m: planned.wanted.origin.alt_m + f64::from(start.z), ..planned.geodetic(&start) }
 }
 
 /// Which lane is flown at a stop and which way a vehicle looks there, degrees from north.
-fn yaw_deg(planned: &Planned<'_>, stops: &[Stop], index: usize) -> f64 {
-    let along = planned.tracks.along();
+fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
+    let along = planned.tracks.lane_direction();
     let sweep = heading_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
     let own = stops[index].lane;
     let neighbours = [index.checked_sub(1).map(|i| (i, index)), Some((index, index + 1))];
@@ -66,20 +66,24 @@ fn yaw_deg(planned: &Planned<'_>, stops: &[Stop], index: usize) -> f64 {
             .then(|| heading_deg(&from.position, &to.position))
     });
     let yaw = match planned.wanted.heading {
-        Heading::Sweep => sweep,
-        Heading::Lane => step.unwrap_or(sweep),
+        HeadingRule::Sweep => sweep,
+        HeadingRule::Lane => step.unwrap_or(sweep),
     };
     f64::from((yaw * 100.0).round() / 100.0)
 }
 
 /// All items of a flight.
-pub fn items(planned: &Planned<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item> {
+pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item> {
     let (scenario, route) = (planned.scenario, &sortie.route);
-    let home = home(planned, route);
+    let home = home_position(planned, route);
     let start = scenario.vehicles[usize::from(route.vehicle)].start;
     let place = |position: &Point| {
         let place = planned.geodetic(position);
-        [round(place.lat_deg, 1e9), round(place.lon_deg, 1e9), round(f64::from(position.z - start.z), 1e3)]
+        [
+            round_to(place.lat_deg, 1e9),
+            round_to(place.lon_deg, 1e9),
+            round_to(f64::from(position.z - start.z), 1e3),
+        ]
     };
     let waypoint = |index: usize| Item {
         command: NAV_WAYPOINT,
@@ -91,64 +95,64 @@ pub fn items(planned: &Planned<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item
     let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
     let mut items = Vec::new();
     if sortie.depart_s > 0.0 {
-        items.push(Item::command(NAV_DELAY, [f64::from(sortie.depart_s), -1.0, -1.0, -1.0]));
+        items.push(Item::from_command(NAV_DELAY, [f64::from(sortie.depart_s), -1.0, -1.0, -1.0]));
     }
     items.extend([
         Item {
             command: NAV_TAKEOFF,
             frame: FRAME_RELATIVE,
             params: [Some(0.0), Some(0.0), Some(0.0), None],
-            place: [round(home.lat_deg, 1e9), round(home.lon_deg, 1e9), round(top, 1e3)],
+            place: [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(top, 1e3)],
         },
-        Item::command(DO_CHANGE_SPEED, [1.0, round(speed, 1e3), -1.0, 0.0]),
+        Item::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
     ]);
     for (index, stop) in stops.iter().enumerate().skip(2) {
         let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
         let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;
         let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
         match (stop.act, planned.wanted.trigger) {
-            (Act::Pad, _) => items.push(Item::command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
-            (Act::Photo(_), Trigger::Waypoint) => {
+            (StopAction::Pad, _) => items.push(Item::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
+            (StopAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
-                items.push(Item::command(DO_DIGICAM_CONTROL, [0.0; 4]));
+                items.push(Item::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 asks for a picture.
                 if let Some(last) = items.last_mut() {
                     last.place[0] = 1.0;
                 }
             }
-            (Act::Photo(_), trigger) => {
+            (StopAction::Photo(_), trigger) => {
                 if begins || ends {
                     items.push(waypoint(index));
                 }
                 if trigger == Trigger::Distance && begins && !ends {
                     let mut later = stops[index + 1..].iter().take_while(|next| next.lane == stop.lane);
-                    let next = later.find(|next| matches!(next.act, Act::Photo(_)));
+                    let next = later.find(|next| matches!(next.act, StopAction::Photo(_)));
                     let step = next.map_or(planned.wanted.spacing.waypoint_m, |next| {
                         (next.position - stop.position).xy().norm()
                     });
                     // The first picture at once, the others each so far from the last.
-                    let trigger = [round(f64::from(step), 1e3), 0.0, 1.0, 0.0];
-                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, trigger));
+                    let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
+                    items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
                     // The last one at once too: autopilots look some times a second, and by then are past the distance, so
                     // that pictures are a little further apart than asked for, and the last would be behind the end.
-                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
+                    items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
                 }
             }
-            (Act::Transit | Act::Lane, _) => items.push(waypoint(index)),
+            (StopAction::Transit | StopAction::Lane, _) => items.push(waypoint(index)),
         }
     }
     items
 }
 
-fn round(value: f64, by: f64) -> f64 {
+fn round_to(value: f64, by: f64) -> f64 {
     (value * by).round() / by
 }
 
 /// A QGroundControl plan.
-pub fn plan(planned: &Planned<'_>, route: &Route, items: &[Item]) -> Value {
-    let home = home(planned, route);
+pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Value {
+    let home = home_position(planned, route);
     let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
     let item = |(index, item): (usize, &Item)| {
         let mut params: Vec<Value> = item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
@@ -183,7 +187,7 @@ pub fn plan(planned: &Planned<'_>, route: &Route, items: &[Item]) -> Value {
             "globalPlanAltitudeMode": 1,
             "hoverSpeed": speed,
             "items": items.iter().enumerate().map(item).collect::<Vec<_>>(),
-            "plannedHomePosition": [round(home.lat_deg, 1e9), round(home.lon_deg, 1e9), round(home.alt_m, 1e3)],
+            "plannedHomePosition": [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(home.alt_m, 1e3)],
             "vehicleType": 2,
             "version": 2,
         },
@@ -193,8 +197,8 @@ pub fn plan(planned: &Planned<'_>, route: &Route, items: &[Item]) -> Value {
 }
 
 /// The mission as `.waypoints`: one item a line, the home first.
-pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String {
-    let home = home(planned, route);
+pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> String {
+    let home = home_position(planned, route);
     let mut text = "QGC WPL 110\n".to_owned();
     let mut line = |index: usize, current: u8, frame: u8, command: u16, params: [f64; 4], place: [f64; 3]| {
         let numbers: Vec<String> = params.iter().map(|p| format!("{p:.8}")).collect();
@@ -213,17 +217,17 @@ pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String
 
 /// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames, sortie,
 /// the ground there.
-pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
+pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
     let mut text =
         "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n".to_owned();
     for (sortie, stops, times) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
             let (act, number) = match stop.act {
-                Act::Pad => ("pad", String::new()),
-                Act::Transit => ("transit", String::new()),
-                Act::Lane => ("lane", String::new()),
-                Act::Photo(number) => ("photo", number.to_string()),
+                StopAction::Pad => ("pad", String::new()),
+                StopAction::Transit => ("transit", String::new()),
+                StopAction::Lane => ("lane", String::new()),
+                StopAction::Photo(number) => ("photo", number.to_string()),
             };
             let p = stop.position;
             let place = planned.geodetic(&p);
@@ -243,10 +247,10 @@ pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
 }
 
 /// The area, its zones and every vehicle's lanes, for maps.
-pub fn geojson(planned: &Planned<'_>, flights: &[Flight]) -> Value {
+pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
     let place = |x: f32, y: f32| {
         let place = planned.geodetic(&Point::new(x, y, 0.0));
-        json!([round(place.lon_deg, 1e9), round(place.lat_deg, 1e9)])
+        json!([round_to(place.lon_deg, 1e9), round_to(place.lat_deg, 1e9)])
     };
     let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];
     let mut features = Vec::new();
@@ -262,7 +266,7 @@ pub fn geojson(planned: &Planned<'_>, flights: &[Flight]) -> Value {
         }
     }
     for (sortie, stops, _) in flights {
-        let photos = stops.iter().filter(|stop| matches!(stop.act, Act::Photo(_) | Act::Lane));
+        let photos = stops.iter().filter(|stop| matches!(stop.act, StopAction::Photo(_) | StopAction::Lane));
         let places: Vec<Value> = photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
         let geometry = match places.as_slice() {
             [one] => json!({ "type": "Point", "coordinates": one }),

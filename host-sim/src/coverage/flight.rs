@@ -10,15 +10,15 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::pack::Route;
 
-use super::{MAX_CORNERS, Planned};
+use super::{CoveragePlan, MAX_CORNERS};
 use crate::scenario::coverage::Trigger;
 
 /// A corner within this distance of a picture is at the picture's place, metres.
 const SAME_PLACE_M: f32 = 0.01;
 
-/// Action of a vehicle at a point of its flight.
+/// Action of a vehicle at a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Act {
+pub enum StopAction {
     /// The vehicle stands on its pad.
     Pad,
     /// The vehicle passes in its layer.
@@ -35,13 +35,13 @@ pub struct Stop {
     /// Where.
     pub position: Point,
     /// Action at the stop.
-    pub act: Act,
+    pub act: StopAction,
     /// The lane it lies on, where it does.
     pub lane: Option<u16>,
 }
 
 /// One vehicle's flight: its stops, and when it passes each.
-pub struct Flown<'a> {
+pub struct TimedFlight<'a> {
     /// MAVLink system id.
     pub vehicle: u8,
     /// The stops.
@@ -51,7 +51,7 @@ pub struct Flown<'a> {
 }
 
 /// The whole flight of a route, from pad to pad.
-pub fn stops(planned: &Planned<'_>, route: &Route) -> Vec<Stop> {
+pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
     let (vehicle, pad) = {
         let index = usize::from(route.vehicle);
         (&planned.vehicles[index], planned.scenario.vehicles[index].start)
@@ -59,25 +59,30 @@ pub fn stops(planned: &Planned<'_>, route: &Route) -> Vec<Stop> {
     let heights = planned.wanted.heights;
     let layer_m = heights.mission_m + f32::from(route.layer) * heights.layer_m;
     let at = |place: &Flat, height_m: f32| Point::new(place.x, place.y, height_m);
-    let stop = |position: Point, act: Act| Stop { position, act, lane: None };
-    let (first, last) = route.ends();
+    let stop = |position: Point, act: StopAction| Stop { position, act, lane: None };
+    let (first, last) = route.end_waypoints();
     let ends = [first, last].map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.place));
-    let mut stops = vec![stop(pad, Act::Pad), stop(at(&vehicle.place, layer_m), Act::Transit)];
+    let mut stops = vec![stop(pad, StopAction::Pad), stop(at(&vehicle.place, layer_m), StopAction::Transit)];
     stops.extend(
-        corners(planned, &vehicle.place, &ends[0]).iter().map(|c| stop(at(c, layer_m), Act::Transit)),
+        corners_between(planned, &vehicle.place, &ends[0])
+            .iter()
+            .map(|c| stop(at(c, layer_m), StopAction::Transit)),
     );
-    stops.push(stop(at(&ends[0], layer_m), Act::Transit));
-    low(planned, route, &mut stops);
-    stops.push(stop(at(&ends[1], layer_m), Act::Transit));
-    stops
-        .extend(corners(planned, &ends[1], &vehicle.home).iter().map(|c| stop(at(c, layer_m), Act::Transit)));
-    stops.push(stop(at(&vehicle.home, layer_m), Act::Transit));
-    stops.push(stop(Point::new(vehicle.home.x, vehicle.home.y, pad.z), Act::Pad));
+    stops.push(stop(at(&ends[0], layer_m), StopAction::Transit));
+    add_lane_stops(planned, route, &mut stops);
+    stops.push(stop(at(&ends[1], layer_m), StopAction::Transit));
+    stops.extend(
+        corners_between(planned, &ends[1], &vehicle.home)
+            .iter()
+            .map(|c| stop(at(c, layer_m), StopAction::Transit)),
+    );
+    stops.push(stop(at(&vehicle.home, layer_m), StopAction::Transit));
+    stops.push(stop(Point::new(vehicle.home.x, vehicle.home.y, pad.z), StopAction::Pad));
     stops
 }
 
 /// The lanes of a route and the ways between them.
-fn low(planned: &Planned<'_>, route: &Route, stops: &mut Vec<Stop>) {
+fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Stop>) {
     let numbers: Vec<u32> = route.waypoints().collect();
     let mut here: Option<Point> = None;
     for own in numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b)) {
@@ -86,38 +91,38 @@ fn low(planned: &Planned<'_>, route: &Route, stops: &mut Vec<Stop>) {
             own.iter().filter_map(|number| Some((*number, planned.tracks.waypoint(*number)?))).collect();
         let (Some((_, begin)), Some((_, end))) = (places.first(), places.last()) else { continue };
         let from = match here {
-            None => begins(planned, begin, end),
+            None => first_lane_start(planned, begin, end),
             Some(mut from) => {
                 let mut between = Vec::new();
-                for corner in corners(planned, &from.xy(), begin).iter().chain([begin]) {
-                    between.extend(legs(planned, &from, corner));
+                for corner in corners_between(planned, &from.xy(), begin).iter().chain([begin]) {
+                    between.extend(leg_corners(planned, &from, corner));
                     from = between.last().copied().unwrap_or(from);
                 }
                 between.pop();
-                let stop = |position: Point| Stop { position, act: Act::Lane, lane: None };
+                let stop = |position: Point| Stop { position, act: StopAction::Lane, lane: None };
                 stops.extend(between.into_iter().map(stop));
                 from
             }
         };
-        let path: Vec<Point> = std::iter::once(from).chain(legs(planned, &from, end)).collect();
-        photographed(planned, &path, &places, lane, stops);
+        let path: Vec<Point> = std::iter::once(from).chain(leg_corners(planned, &from, end)).collect();
+        add_picture_stops(planned, &path, &places, lane, stops);
         here = path.last().copied();
     }
 }
 
-/// Begin of the first lane.
-fn begins(planned: &Planned<'_>, begin: &Flat, end: &Flat) -> Point {
+/// Start of the first lane.
+fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Point {
     match &planned.following {
-        Some(following) => following.begin(begin, end),
+        Some(following) => following.start_point(begin, end),
         None => Point::new(begin.x, begin.y, planned.wanted.heights.mission_m),
     }
 }
 
 /// The corners of a straight way from a point above the ground, the last of them its end.
-fn legs(planned: &Planned<'_>, from: &Point, to: &Flat) -> Vec<Point> {
+fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point> {
     let mut corners = Vec::new();
     let Some(following) = &planned.following else { return vec![Point::new(to.x, to.y, from.z)] };
-    let followed: Result<(), Infallible> = following.to(from, to, |corner| {
+    let followed: Result<(), Infallible> = following.corners_to(from, to, |corner| {
         corners.push(corner);
         Ok(())
     });
@@ -128,8 +133,8 @@ fn legs(planned: &Planned<'_>, from: &Point, to: &Flat) -> Vec<Point> {
 }
 
 /// Pictures along a lane's path, and its corners between them.
-fn photographed(
-    planned: &Planned<'_>,
+fn add_picture_stops(
+    planned: &CoveragePlan<'_>,
     path: &[Point],
     places: &[(u32, Flat)],
     lane: Option<u16>,
@@ -145,7 +150,7 @@ fn photographed(
             let corner = path[leg];
             // Where each picture is a waypoint, the corner is one already.
             if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
-                stops.push(Stop { position: corner, act: Act::Lane, lane });
+                stops.push(Stop { position: corner, act: StopAction::Lane, lane });
             }
         }
         let end = path[(leg + 1).min(path.len() - 1)];
@@ -154,15 +159,15 @@ fn photographed(
             if length_m > 0.0 { ((at_m - along_m(&path[leg].xy())) / length_m).clamp(0.0, 1.0) } else { 0.0 };
         let height_m = path[leg].z + (end.z - path[leg].z) * share;
         let position = Point::new(place.x, place.y, height_m);
-        stops.push(Stop { position, act: Act::Photo(*number), lane });
+        stops.push(Stop { position, act: StopAction::Photo(*number), lane });
     }
 }
 
 /// The corners of the way between two places.
-fn corners(planned: &Planned<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, MAX_CORNERS> {
+fn corners_between(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, MAX_CORNERS> {
     let mut corners = Fixed::new();
     // The plan has a finite length, so there is a way between all that it joins.
-    if planned.transit.way(from, to, &mut corners).is_err() {
+    if planned.transit.shortest_path(from, to, &mut corners).is_err() {
         corners.clear();
     }
     corners
@@ -175,7 +180,7 @@ pub fn heading_deg(from: &Point, to: &Point) -> f32 {
 }
 
 /// Times at which each stop is passed, seconds from the start: at cruise speed, without turns.
-pub fn times_s(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<f32> {
+pub fn stop_times_s(planned: &CoveragePlan<'_>, route: &Route, stops: &[Stop]) -> Vec<f32> {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
     let mut time_s = 0.0;
     let mut times = vec![time_s];

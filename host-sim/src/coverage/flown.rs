@@ -3,13 +3,13 @@
 use planner_core::plan::SwarmPlan;
 
 use super::check::{self, Findings, Picture};
-use super::{Planned, page, result};
+use super::{CoveragePlan, page, result};
 use crate::report::{Outline, Plot};
 use crate::result::CoverageResult;
 use crate::scenario::Scenario;
 
 /// Findings about a flight.
-pub struct Judged {
+pub struct FlightFindings {
     /// The part of `result.json` about the coverage.
     pub result: CoverageResult,
     /// Borders of the area.
@@ -23,21 +23,21 @@ pub struct Judged {
 /// Judges the pictures of a flight of this scenario by this plan.
 ///
 /// # Errors
-/// As [`Planned::new`].
-pub fn judge<const V: usize, const W: usize>(
+/// As [`CoveragePlan::new`].
+pub fn judge_pictures<const V: usize, const W: usize>(
     scenario: &Scenario,
     plan: &SwarmPlan<V, W>,
     pictures: Vec<Picture>,
-) -> anyhow::Result<Judged> {
-    let mut planned = Planned::flown(scenario)?;
+) -> anyhow::Result<FlightFindings> {
+    let mut planned = CoveragePlan::plan_as_companions(scenario)?;
     for sortie in &mut planned.sorties {
         sortie.depart_s = plan.flights[usize::from(sortie.route.vehicle)].depart_s;
     }
     let findings: Findings = check::check_pictures(&planned, pictures);
-    Ok(Judged {
-        result: result::of(&planned, &findings),
-        outlines: page::outlines(&planned),
-        plot: page::photographed(&findings),
+    Ok(FlightFindings {
+        result: result::coverage_result(&planned, &findings),
+        outlines: page::area_outlines(&planned),
+        plot: page::photographed_share_plot(&findings),
         complete: findings.covered_share >= 1.0,
     })
 }

@@ -2,8 +2,8 @@
 
 use planner_core::Point;
 
-use super::Planned;
-use super::flight::{Act, Flown, Stop};
+use super::CoveragePlan;
+use super::flight::{Stop, StopAction, TimedFlight};
 
 /// Greatest distance between the height samples of a leg, metres; over fine maps a quarter of a
 /// cell.
@@ -27,14 +27,14 @@ pub struct HeightFindings {
 }
 
 impl HeightFindings {
-    /// Whether nothing is wrong.
+    /// Whether the check found no fault.
     pub fn is_clean(&self) -> bool {
         self.too_low + self.too_steep == 0
     }
 }
 
 /// Checks flights against the ground; none where it is level.
-pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindings> {
+pub fn check_heights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Option<HeightFindings> {
     let terrain = planned.wanted.terrain.as_ref()?;
     let sample_m = (terrain.grid.cell_m() / 4.0).min(MAX_SAMPLE_SPACING_M);
     let mut findings =
@@ -43,13 +43,13 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindi
         let index = planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
         let vehicle = &planned.vehicles[index];
         for leg in flight.stops.windows(2) {
-            if leg.iter().any(|stop| stop.act == Act::Pad) {
+            if leg.iter().any(|stop| stop.act == StopAction::Pad) {
                 continue;
             }
             let (from, to) = (leg[0].position, leg[1].position);
-            let [least_m, most_m] = above_ground(planned, &from, &to, sample_m);
+            let [least_m, most_m] = height_range_above_ground(planned, &from, &to, sample_m);
             findings.too_low += u64::from(least_m < planned.wanted.height_m - HEIGHT_ROUNDING_M);
-            if leg.iter().any(|stop| stop.act == Act::Transit) {
+            if leg.iter().any(|stop| stop.act == StopAction::Transit) {
                 continue;
             }
             findings.least_m = findings.least_m.min(least_m);
@@ -67,7 +67,12 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindi
 }
 
 /// The least and the greatest height of a leg above the ground.
-fn above_ground(planned: &Planned<'_>, from: &Point, to: &Point, sample_m: f32) -> [f32; 2] {
+fn height_range_above_ground(
+    planned: &CoveragePlan<'_>,
+    from: &Point,
+    to: &Point,
+    sample_m: f32,
+) -> [f32; 2] {
     let step = to - from;
     let parts = (step.xy().norm() / sample_m).ceil().max(1.0) as usize;
     let heights = (0..=parts).map(|part| {
@@ -78,6 +83,6 @@ fn above_ground(planned: &Planned<'_>, from: &Point, to: &Point, sample_m: f32) 
 }
 
 /// Whether a stop lies on a lane or on a way between two.
-pub fn is_low(stop: &Stop) -> bool {
-    matches!(stop.act, Act::Photo(_) | Act::Lane)
+pub fn is_on_lane_or_transit(stop: &Stop) -> bool {
+    matches!(stop.act, StopAction::Photo(_) | StopAction::Lane)
 }

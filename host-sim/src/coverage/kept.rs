@@ -6,22 +6,22 @@ use anyhow::Context as _;
 use planner_core::Point;
 
 use super::check::Picture;
-use crate::files::{self, Results};
+use crate::files::{self, ResultFiles};
 use crate::quote::quoted_path;
 
 /// File that keeps the pictures taken.
 const NAME: &str = "pictures.json";
 
 /// Time, place and heading of a picture.
-type Row = [f32; 5];
+type PictureRow = [f32; 5];
 
 /// Store of the pictures.
-pub struct Kept {
+pub struct PictureStore {
     path: PathBuf,
     before: Vec<Picture>,
 }
 
-impl Kept {
+impl PictureStore {
     /// Reads those of earlier flights from a directory, if there were any.
     ///
     /// # Errors
@@ -32,9 +32,9 @@ impl Kept {
         if path.exists() {
             let bad = || format!("no pictures of earlier flights: {}", quoted_path(&path));
             let text = files::read(&path, files::BINARY_BYTES).with_context(bad)?;
-            let rows: Vec<Row> = serde_json::from_slice(&text).with_context(bad)?;
+            let rows: Vec<PictureRow> = serde_json::from_slice(&text).with_context(bad)?;
             // Before this flight began.
-            let picture = |[_, x, y, z, heading]: Row| Picture {
+            let picture = |[_, x, y, z, heading]: PictureRow| Picture {
                 vehicle: None,
                 t_s: 0.0,
                 position: Point::new(x, y, z),
@@ -54,13 +54,14 @@ impl Kept {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn keep(&self, pictures: &[Picture], whole: bool) -> anyhow::Result<()> {
+    pub fn store_pictures(&self, pictures: &[Picture], whole: bool) -> anyhow::Result<()> {
         let pictures = if whole { &[] } else { pictures };
-        let row = |p: &Picture| -> Row { [p.t_s, p.position.x, p.position.y, p.position.z, p.heading] };
-        let rows: Vec<Row> = pictures.iter().map(row).collect();
-        let mut results = Results::file(&self.path)?;
+        let row =
+            |p: &Picture| -> PictureRow { [p.t_s, p.position.x, p.position.y, p.position.z, p.heading] };
+        let rows: Vec<PictureRow> = pictures.iter().map(row).collect();
+        let mut results = ResultFiles::single_file(&self.path)?;
         results.add_file(&self.path, &serde_json::to_vec(&rows)?)?;
-        results.keep()
+        results.commit()
     }
 }
 
@@ -72,14 +73,14 @@ mod tests {
     fn pictures_come_back_until_the_area_is_whole() {
         let dir = tempfile::tempdir().unwrap();
         let picture = Picture { vehicle: None, t_s: 7.0, position: Point::new(1.0, 2.0, 3.0), heading: 0.5 };
-        Kept::open(dir.path()).unwrap().keep(&[picture], false).unwrap();
+        PictureStore::open(dir.path()).unwrap().store_pictures(&[picture], false).unwrap();
         let mut pictures = vec![Picture { t_s: 1.0, ..picture }];
-        let kept = Kept::open(dir.path()).unwrap();
+        let kept = PictureStore::open(dir.path()).unwrap();
         kept.add_to(&mut pictures);
         assert_eq!(pictures, [Picture { t_s: 0.0, ..picture }, Picture { t_s: 1.0, ..picture }]);
-        kept.keep(&pictures, true).unwrap();
-        assert!(Kept::open(dir.path()).unwrap().before.is_empty());
+        kept.store_pictures(&pictures, true).unwrap();
+        assert!(PictureStore::open(dir.path()).unwrap().before.is_empty());
         std::fs::write(dir.path().join(NAME), "[[1, 2]]").unwrap();
-        assert!(Kept::open(dir.path()).is_err());
+        assert!(PictureStore::open(dir.path()).is_err());
     }
 }

@@ -22,13 +22,15 @@ use anyhow::bail;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::bound::lower_bound_s;
-use planner_core::coverage::pack::{PackWorkspace, Plan, Route, Unit, Vehicle, Work, binpat, by_shares};
-use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::pack::{
+    PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work, binpat, binpat_with_shares,
+};
+use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, exact, powell};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 
-pub use self::planned::{MAX_CORNERS, MAX_LANES, MAX_VEHICLES, Planned};
+pub use self::planned::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES};
 use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
 use crate::area::MAX_VERTICES;
 use crate::scenario::Scenario;
@@ -43,25 +45,25 @@ const MAX_OFF_GROUND_M: f32 = 1.5;
 /// A sortie, its stops, and when each is passed, seconds.
 pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
 
-impl<'a> Planned<'a> {
+impl<'a> CoveragePlan<'a> {
     /// Plans a mission.
     ///
     /// # Errors
     /// There is no plan: why, and where in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
-        Self::searched(scenario, method, MAX_ORDER_CHANGES)
+        Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
     }
 
     /// The plan as companions make it: they compare no more orders of the lanes than a board can.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn flown(scenario: &'a Scenario) -> anyhow::Result<Self> {
+    pub fn plan_as_companions(scenario: &'a Scenario) -> anyhow::Result<Self> {
         let method = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
-        Self::searched(scenario, method, companion::planner::coverage::MAX_ORDER_CHANGES)
+        Self::plan_with_search(scenario, method, companion::planner::coverage::MAX_ORDER_CHANGES)
     }
 
-    fn searched(scenario: &'a Scenario, method: Method, looks: u32) -> anyhow::Result<Self> {
+    fn plan_with_search(scenario: &'a Scenario, method: Method, looks: u32) -> anyhow::Result<Self> {
         let Some(wanted) = &scenario.area else {
             bail!(
                 "area is missing: {}\nhint: add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`",
@@ -70,16 +72,20 @@ impl<'a> Planned<'a> {
         };
         let area = Area::new(&wanted.vertices, &wanted.rings)
             .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
-        let vehicles: Vec<Vehicle> = scenario.vehicles.iter().map(|v| vehicle(v, scenario)).collect();
+        let vehicles: Vec<Vehicle> = scenario.vehicles.iter().map(|v| planner_vehicle(v, scenario)).collect();
         check_places(scenario, &area, &vehicles)?;
-        let failed = |error: CoverageError| explained(error, wanted, scenario.vehicles.len());
+        let failed = |error: CoverageError| explain_error(error, wanted, scenario.vehicles.len());
         let began = Instant::now();
         let mut transit = Box::new(Transit::empty());
-        transit.learn(area).map_err(failed)?;
+        transit.set_area(area).map_err(failed)?;
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
-        let pattern =
-            Pattern { spacing: wanted.usable, angle_deg: wanted.angle_deg, margin_m: wanted.margin_m, looks };
+        let pattern = LanePattern {
+            spacing: wanted.usable,
+            angle_deg: wanted.angle_deg,
+            margin_m: wanted.margin_m,
+            search_steps: looks,
+        };
         let mut tracks = Box::new(Tracks::new());
         let mut workspace = Box::new(tracks::Workspace::<MAX_VERTICES>::new());
         tracks::build(&area, &pattern, &transit, &mut workspace, &mut tracks).map_err(failed)?;
@@ -90,10 +96,10 @@ impl<'a> Planned<'a> {
             transit: &transit,
             vehicles: &vehicles,
             heights: wanted.heights,
-            unit: if method == Method::SimpleBinpat { Unit::Lane } else { Unit::Waypoint },
+            unit: if method == Method::SimpleBinpat { TrackUnit::Lane } else { TrackUnit::Waypoint },
         };
         let mut plan = Plan::new();
-        let shares = divide(&work, method, &mut plan).map_err(failed)?;
+        let shares = divide_by_method(&work, method, &mut plan).map_err(failed)?;
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
@@ -116,8 +122,8 @@ impl<'a> Planned<'a> {
             seconds,
         };
         planned.sorties = match wanted.batteries {
-            true => planned.cut()?,
-            false => planned.one_each()?,
+            true => planned.cut_into_sorties()?,
+            false => planned.one_sortie_per_route()?,
         };
         planned.check_fence()?;
         planned.set_departures()?;
@@ -140,8 +146,8 @@ impl<'a> Planned<'a> {
     /// Each sortie with its stops, and when they are passed.
     pub fn flights(&self) -> Vec<Flight> {
         let flight = |sortie: &Sortie| {
-            let stops = flight::stops(self, &sortie.route);
-            let mut times_s = flight::times_s(self, &sortie.route, &stops);
+            let stops = flight::route_stops(self, &sortie.route);
+            let mut times_s = flight::stop_times_s(self, &sortie.route, &stops);
             times_s.iter_mut().for_each(|time| *time += sortie.begin_s + sortie.depart_s);
             (*sortie, stops, times_s)
         };
@@ -170,12 +176,12 @@ impl<'a> Planned<'a> {
     }
 
     /// All sorties, by round.
-    fn cut(&self) -> anyhow::Result<Vec<Sortie>> {
+    fn cut_into_sorties(&self) -> anyhow::Result<Vec<Sortie>> {
         let mut sorties = Vec::new();
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
             let vehicle = &self.scenario.vehicles[index];
-            let lasts_s = sorties::lasts_s(vehicle);
+            let lasts_s = sorties::battery_duration_s(vehicle);
             let too_long = |error: LaneTooLong| {
                 anyhow::anyhow!(
                     "battery too small: {}: vehicle {} would fly {:.0} s for lane {} alone; its battery lasts {lasts_s:.0} s, \
@@ -188,13 +194,13 @@ impl<'a> Planned<'a> {
                     100.0 * (1.0 - USABLE_CHARGE)
                 )
             };
-            let parts = sorties::cut(self, route, USABLE_CHARGE * lasts_s).map_err(too_long)?;
+            let parts = sorties::cut_route(self, route, USABLE_CHARGE * lasts_s).map_err(too_long)?;
             let of = parts.len() as u16;
             let numbered = parts.into_iter().zip(1..);
             sorties.extend(numbered.map(|(route, number)| Sortie {
                 number,
                 of,
-                ..sorties::whole(self, route)
+                ..sorties::whole_route_sortie(self, route)
             }));
         }
         sorties.sort_by_key(|sortie| sortie.number);
@@ -207,9 +213,11 @@ impl<'a> Planned<'a> {
         let separation_m = self.scenario.deconfliction.separation_m;
         let mut begin_s = 0.0;
         for round in flights.chunk_by(|a, b| a.0.number == b.0.number) {
-            let timed: Vec<_> =
-                round.iter().map(|(_, stops, times_s)| separation::Timed { stops, times_s }).collect();
-            let Some((departures_s, least_m)) = separation::departures(&timed, separation_m) else {
+            let timed: Vec<_> = round
+                .iter()
+                .map(|(_, stops, times_s)| separation::DepartureFlight { stops, times_s })
+                .collect();
+            let Some((departures_s, least_m)) = separation::plan_departures(&timed, separation_m) else {
                 bail!(
                     "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: \
                      fewer vehicles, or places further apart",
@@ -233,8 +241,8 @@ impl<'a> Planned<'a> {
     fn check_fence(&self) -> anyhow::Result<()> {
         let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
         for sortie in &self.sorties {
-            let stops = flight::stops(self, &sortie.route);
-            let Some(stop) = stops.iter().find(|stop| !fence.holds(&stop.position)) else { continue };
+            let stops = flight::route_stops(self, &sortie.route);
+            let Some(stop) = stops.iter().find(|stop| !fence.contains(&stop.position)) else { continue };
             let (place, index) = (stop.position, usize::from(sortie.route.vehicle));
             bail!(
                 "outside mission.geofence: {}: vehicle {} would fly to [{:.1}, {:.1}, {:.1}]\nhint: a geofence around area \
@@ -250,11 +258,11 @@ impl<'a> Planned<'a> {
     }
 
     /// A sortie for each route. Nobody is sent out for longer than its battery lasts, where that is known.
-    fn one_each(&self) -> anyhow::Result<Vec<Sortie>> {
+    fn one_sortie_per_route(&self) -> anyhow::Result<Vec<Sortie>> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
             let vehicle = &self.scenario.vehicles[index];
-            let takes_s = sorties::flown_s(self, route);
+            let takes_s = sorties::route_duration_s(self, route);
             let too_long = |endurance_s: &f32| takes_s > USABLE_CHARGE * endurance_s;
             let Some(endurance_s) = vehicle.endurance_s.filter(too_long) else { continue };
             bail!(
@@ -266,7 +274,7 @@ impl<'a> Planned<'a> {
                 100.0 * (1.0 - USABLE_CHARGE)
             );
         }
-        Ok(self.plan.routes.iter().map(|route| sorties::whole(self, *route)).collect())
+        Ok(self.plan.routes.iter().map(|route| sorties::whole_route_sortie(self, *route)).collect())
     }
 }
 
@@ -292,7 +300,7 @@ pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
 
 /// No vehicle starts inside a no-fly zone.
 fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> anyhow::Result<()> {
-    if let Some(index) = vehicles.iter().position(|vehicle| area.forbids(&vehicle.place)) {
+    if let Some(index) = vehicles.iter().position(|vehicle| area.is_in_no_fly_zone(&vehicle.place)) {
         let place = &scenario.vehicle_places[index];
         bail!("bad vehicle: {place}: vehicle {} starts inside a no-fly zone", scenario.vehicles[index].id);
     }
@@ -300,7 +308,7 @@ fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> a
 }
 
 /// A vehicle as the planner sees it.
-fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
+fn planner_vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
     let [climb_mps, descend_mps] = vehicle.climbs_mps();
     Vehicle {
@@ -320,7 +328,7 @@ const MIN_SHARE_M: f32 = 1e-3;
 ///
 /// # Errors
 /// As the method.
-pub fn divide<const L: usize, const N: usize, const K: usize>(
+pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     method: Method,
     plan: &mut Plan<K>,
@@ -332,37 +340,37 @@ pub fn divide<const L: usize, const N: usize, const K: usize>(
         }
         Method::PowellBinpat => {
             let mut ws = powell::Workspace::<K>::new();
-            powell::powell(work, &powell::Config::USUAL, &mut ws, plan)?;
+            powell::powell(work, &powell::PowellConfig::USUAL, &mut ws, plan)?;
             Ok(Some(ws.pack.shares()[..work.vehicles.len()].to_vec()))
         }
         Method::Exact => {
             let count = work.tracks.waypoint_count() as usize;
-            let [ways, reaches, states] = exact::Workspace::lengths(work.vehicles.len(), count);
+            let [ways, reaches, states] = exact::Workspace::required_lengths(work.vehicles.len(), count);
             let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
             let mut states = vec![(0, 0); states];
             let mut ws = exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
-            exact::exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
-            as_shares(work, plan)
+            exact::plan_exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
+            shares_of_exact_plan(work, plan)
         }
     }
 }
 
 /// Shares by which BINPAT cuts the path as the exact division does, where the vehicles that it then gives the parts to take no
 /// longer: that plan is the exact one from then on. Companions plan by shares alone, so none means that they cannot plan it.
-fn as_shares<const L: usize, const N: usize, const K: usize>(
+fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     exact: &mut Plan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
     let mut shares = vec![0.0; work.vehicles.len()];
     let mut packed_m = 0.0;
     for (share, route) in shares.iter_mut().zip(&exact.routes) {
-        let end_m = work.tracks.along_m(route.end - 1);
+        let end_m = work.tracks.distance_to_waypoint_m(route.end - 1);
         // A bin without length would hold nothing: the first waypoint alone has none.
         *share = (end_m - packed_m).max(MIN_SHARE_M);
         packed_m = end_m;
     }
     let mut plan = Plan::new();
-    by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
+    binpat_with_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
     let alike =
         plan.routes.iter().map(|r| (r.first, r.end)).eq(exact.routes.iter().map(|r| (r.first, r.end)));
     if !alike || plan.max_cost_s() > exact.max_cost_s() {
@@ -372,8 +380,8 @@ fn as_shares<const L: usize, const N: usize, const K: usize>(
     Ok(Some(shares))
 }
 
-/// Why there is no plan, for a person.
-fn explained(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> anyhow::Error {
+/// Reason why there is no plan, for a person.
+fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> anyhow::Error {
     let place = &wanted.place;
     let why = match error {
         CoverageError::Area(area) => format!("{area:?}"),

@@ -6,15 +6,15 @@ use planner_core::coverage::area::RingKind;
 
 use super::check::Findings;
 use super::flight::Stop;
-use super::{Flight, Planned, parts};
+use super::{CoveragePlan, Flight, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
 /// Spacing of the points of a height profile, metres.
 const PROFILE_SPACING_M: f32 = 5.0;
 
 /// Data of the report page.
-pub fn page(
-    planned: &Planned<'_>,
+pub fn report_data(
+    planned: &CoveragePlan<'_>,
     flights: &[Flight],
     findings: &Findings,
     result: serde_json::Value,
@@ -42,25 +42,25 @@ pub fn page(
         generated_by: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
         scenario_toml: scenario.text.clone(),
         vehicles: vehicles.collect(),
-        outlines: outlines(planned),
-        coverage: Some(parts::planned(planned, flights)),
-        plots: plots(planned, flights, findings),
+        outlines: area_outlines(planned),
+        coverage: Some(parts::planned_layers(planned, flights)),
+        plots: coverage_plots(planned, flights, findings),
         result,
         ..ReportData::default()
     }
 }
 
 /// The share photographed, and above terrain the heights.
-fn plots(planned: &Planned<'_>, flights: &[Flight], findings: &Findings) -> Vec<Plot> {
-    let mut plots = vec![photographed(findings)];
+fn coverage_plots(planned: &CoveragePlan<'_>, flights: &[Flight], findings: &Findings) -> Vec<Plot> {
+    let mut plots = vec![photographed_share_plot(findings)];
     if planned.following.is_some() {
-        plots.push(profile(planned, flights));
+        plots.push(height_profile_plot(planned, flights));
     }
     plots
 }
 
 /// Heights along each path, and of the ground below it.
-fn profile(planned: &Planned<'_>, flights: &[Flight]) -> Plot {
+fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Plot {
     let mut curves = Vec::new();
     for (sortie, stops, times_s) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
@@ -84,7 +84,7 @@ fn profile(planned: &Planned<'_>, flights: &[Flight]) -> Plot {
 }
 
 /// Borders of the area.
-pub(super) fn outlines(planned: &Planned<'_>) -> Vec<Outline> {
+pub(super) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
     let kinds = [
         (RingKind::Outer, OutlineKind::Area),
         (RingKind::Hole, OutlineKind::Hole),
@@ -99,7 +99,7 @@ pub(super) fn outlines(planned: &Planned<'_>) -> Vec<Outline> {
 }
 
 /// Share of the area that pictures show, over time.
-pub(super) fn photographed(findings: &Findings) -> Plot {
+pub(super) fn photographed_share_plot(findings: &Findings) -> Plot {
     let mut cells = 0;
     let mut curve = Curve { name: "photographed".to_owned(), ..Curve::default() };
     for (time, new) in &findings.over_time {

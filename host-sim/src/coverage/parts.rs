@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use companion::swarm::fleet::Lot;
+use companion::swarm::fleet::DivisionInput;
 use planner_core::Point;
-use planner_core::flight::{Flight as PathFlight, Range, Task};
+use planner_core::flight::{Flight as PathFlight, Task, WaypointRange};
 
+use super::CoveragePlan;
 use super::Flight;
-use super::Planned;
 use super::check::{self, Picture};
-use super::flight::{Act, Stop};
+use super::flight::{Stop, StopAction};
 use crate::capacity::WAYPOINTS;
 use crate::mission::{Mission, SwarmPlan};
 use crate::report::{CoverageLayers, Division, Footprint, Part, Taken};
@@ -17,13 +17,13 @@ use crate::swarm::Flight as Flown;
 use crate::swarm::divisions::Division as Begun;
 
 /// Vehicle of each waypoint.
-type Owners = BTreeMap<u32, u8>;
+type WaypointOwners = BTreeMap<u32, u8>;
 
 /// Data of the report page about a plan.
-pub fn planned(planned: &Planned<'_>, flights: &[Flight]) -> CoverageLayers {
+pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[Flight]) -> CoverageLayers {
     let mut parts: Vec<Part> = Vec::new();
     for (sortie, stops, _) in flights {
-        let photos = |stop: &&Stop| matches!(stop.act, Act::Photo(_));
+        let photos = |stop: &&Stop| matches!(stop.act, StopAction::Photo(_));
         let photos: Vec<&Stop> = stops.iter().filter(photos).collect();
         let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
         let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);
@@ -39,16 +39,16 @@ pub fn planned(planned: &Planned<'_>, flights: &[Flight]) -> CoverageLayers {
     }
     parts.sort_by_key(|part| part.vehicle);
     let divisions = vec![Division { parts, ..Division::default() }];
-    let pictures = check::pictures(planned, &check::flown(planned, flights));
-    layers(planned, divisions, pictures)
+    let pictures = check::planned_pictures(planned, &check::flights_to_check(planned, flights));
+    coverage_layers(planned, divisions, pictures)
 }
 
 /// Data of the report page about a flight: its plan and the plan's fate, and its pictures.
 ///
 /// # Errors
 /// A division that cannot be planned here, though companions did.
-pub fn flown(
-    planned: &Planned<'_>,
+pub fn flown_layers(
+    planned: &CoveragePlan<'_>,
     mission: &Mission,
     plan: &SwarmPlan,
     flight: &Flown,
@@ -57,7 +57,8 @@ pub fn flown(
     let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
     ids.sort_unstable();
     let mut shown: Vec<Division> = Vec::new();
-    let (mut before, mut gone, mut losses) = (Owners::new(), Vec::new(), Vec::<&[Lot]>::new());
+    let (mut before, mut gone, mut losses) =
+        (WaypointOwners::new(), Vec::new(), Vec::<&[DivisionInput]>::new());
     let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, lots: Vec::new(), plan_crc: 0 };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
         // Other vehicles fly the same later; a division whose inputs no vehicle reported cannot be
@@ -71,22 +72,26 @@ pub fn flown(
             false => Some(mission.plan_rest(&flight.done, losses.iter().copied())?),
         };
         let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
-        let own = owners(flights);
-        let lost = ids.iter().zip(&division.lots).filter(|(_, lot)| !lot.lives).map(|(id, _)| *id);
+        let own = waypoint_owners(flights);
+        let lost = ids.iter().zip(&division.lots).filter(|(_, lot)| !lot.alive).map(|(id, _)| *id);
         let lost: Vec<u8> = lost.filter(|id| !gone.contains(id)).collect();
         gone.extend(&lost);
         shown.push(Division {
             t_s: division.t_s,
             lost,
-            parts: flights.iter().filter(|flight| flight.task.flies()).map(part).collect(),
-            taken: taken(&before, &own),
+            parts: flights.iter().filter(|flight| flight.task.leaves_pad()).map(flight_part).collect(),
+            taken: reassigned_waypoints(&before, &own),
         });
         before = own;
     }
-    Ok(layers(planned, shown, pictures))
+    Ok(coverage_layers(planned, shown, pictures))
 }
 
-fn layers(planned: &Planned<'_>, divisions: Vec<Division>, mut pictures: Vec<Picture>) -> CoverageLayers {
+fn coverage_layers(
+    planned: &CoveragePlan<'_>,
+    divisions: Vec<Division>,
+    mut pictures: Vec<Picture>,
+) -> CoverageLayers {
     pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     let corners = check::footprints(planned, &pictures);
     let footprint = |(picture, corners): (&Picture, [[f32; 2]; 4])| Footprint {
@@ -98,7 +103,7 @@ fn layers(planned: &Planned<'_>, divisions: Vec<Division>, mut pictures: Vec<Pic
     CoverageLayers { lane_m: planned.wanted.spacing.lane_m, divisions, footprints }
 }
 
-fn part(flight: &PathFlight<WAYPOINTS>) -> Part {
+fn flight_part(flight: &PathFlight<WAYPOINTS>) -> Part {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
     if let Task::Photograph(photographs) = &flight.task {
@@ -111,11 +116,11 @@ fn part(flight: &PathFlight<WAYPOINTS>) -> Part {
     Part { vehicle: flight.id, waypoints, path: places.collect(), lanes }
 }
 
-fn owners(flights: &[PathFlight<WAYPOINTS>]) -> Owners {
-    let mut owners = Owners::new();
+fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
+    let mut owners = WaypointOwners::new();
     for flight in flights {
         let Task::Photograph(photographs) = &flight.task else { continue };
-        for range in photographs.shown(&flight.path, Range { first: 0, end: u32::MAX }) {
+        for range in photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: u32::MAX }) {
             owners.extend((range.first..range.end).map(|number| (number, flight.id)));
         }
     }
@@ -123,7 +128,7 @@ fn owners(flights: &[PathFlight<WAYPOINTS>]) -> Owners {
 }
 
 /// Waypoints that changed hands.
-fn taken(before: &Owners, now: &Owners) -> Vec<Taken> {
+fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<Taken> {
     let mut counts = BTreeMap::<(u8, u8), u32>::new();
     for (number, to) in now {
         if let Some(from) = before.get(number).filter(|from| *from != to) {

@@ -4,7 +4,7 @@ use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::{Plan, Route, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
-use planner_core::field::follow::Following;
+use planner_core::field::follow::TerrainFollowing;
 
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method};
@@ -41,13 +41,13 @@ impl Sortie {
 }
 
 /// A planned coverage mission.
-pub struct Planned<'a> {
+pub struct CoveragePlan<'a> {
     /// Scenario of the plan.
     pub scenario: &'a Scenario,
     /// Section `[area]` of the scenario.
     pub wanted: &'a coverage::Area,
     /// Surface that vehicles follow above terrain.
-    pub following: Option<Following<'a>>,
+    pub following: Option<TerrainFollowing<'a>>,
     /// Area of the plan.
     pub area: Area<'a>,
     /// How work was divided.

@@ -2,18 +2,18 @@
 
 use planner_core::coverage::pack::Route;
 
-use super::Planned;
+use super::CoveragePlan;
 use super::check::Findings;
 use super::sorties::Sortie;
 use crate::result::{CoverageResult, RouteResult, SortieResult, TerrainResult, rounded};
 
 /// The plan, and what was found of its pictures.
-pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
+pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &Findings) -> CoverageResult {
     let routes = &planned.plan.routes;
     let max_cost_s = planned.max_cost_s();
     let costs: Vec<f64> = routes.iter().map(|route| f64::from(planned.cost_s(route))).collect();
     let (mean, sd) = mean_and_sd(&costs);
-    let along = planned.tracks.along();
+    let along = planned.tracks.lane_direction();
     CoverageResult {
         covered_share: findings.covered_share,
         waypoints: planned.tracks.waypoint_count(),
@@ -41,7 +41,7 @@ pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
     }
 }
 
-fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
+fn route_results(planned: &CoveragePlan<'_>) -> Vec<RouteResult> {
     let heights = planned.wanted.heights;
     let sortie = |sortie: &Sortie| SortieResult {
         first: sortie.route.first,
@@ -57,7 +57,7 @@ fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
         vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
         first: route.first,
         last: route.end - 1,
-        backward: route.ends().0 != route.first,
+        backward: route.end_waypoints().0 != route.first,
         layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
         cost_s: rounded(planned.cost_s(route)),
         cost_m: rounded(planned.cost_m(route)),

@@ -1,8 +1,8 @@
 //! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. The vehicle that flies longest
 //! leaves first; each other one leaves as soon as it keeps the separation to all before it, as planned.
 //!
-//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights stray from that: on board the safety
-//! filter is what keeps vehicles apart, and this only keeps it from having to.
+//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights deviate from that: on
+//! board the safety filter is what keeps vehicles apart, and this only keeps it from having to.
 
 use planner_core::Point;
 
@@ -18,7 +18,7 @@ const OVER_PAD_M: f32 = 0.01;
 const MAX_GROUND_WAIT_S: f32 = 900.0;
 
 /// A flight as planned, from its own departure on.
-pub struct Timed<'a> {
+pub struct DepartureFlight<'a> {
     /// The stops.
     pub stops: &'a [Stop],
     /// When each is passed after the departure, seconds.
@@ -27,8 +27,8 @@ pub struct Timed<'a> {
 
 /// Departures of all flights, seconds, and the least distance between any two vehicles, one of them in the air; infinite
 /// for one vehicle. None where no departure within [`MAX_GROUND_WAIT_S`] keeps the separation.
-pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>, f32)> {
-    let tracks: Vec<Vec<Point>> = flights.iter().map(sampled).collect();
+pub fn plan_departures(flights: &[DepartureFlight<'_>], separation_m: f32) -> Option<(Vec<f32>, f32)> {
+    let tracks: Vec<Vec<Point>> = flights.iter().map(sample_positions).collect();
     let mut order: Vec<usize> = (0..flights.len()).collect();
     order.sort_by_key(|i| std::cmp::Reverse(tracks[*i].len()));
     let mut delays: Vec<Option<usize>> = vec![None; flights.len()];
@@ -39,7 +39,7 @@ pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>,
             let others = order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
             let mut least_m = f32::INFINITY;
             for other in others {
-                least_m = least_m.min(nearest_m((&tracks[own][..], delay), other, separation_m)?);
+                least_m = least_m.min(min_distance_m((&tracks[own][..], delay), other, separation_m)?);
             }
             Some(least_m)
         };
@@ -52,7 +52,7 @@ pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>,
 }
 
 /// Place of a vehicle at each step of its flight.
-fn sampled(flight: &Timed<'_>) -> Vec<Point> {
+fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
     let end_s = flight.times_s.last().copied().unwrap_or(0.0);
     let mut next = 1;
     let place = |step: usize| {
@@ -70,7 +70,7 @@ fn sampled(flight: &Timed<'_>) -> Vec<Point> {
 /// The least distance between two flights that begin with these delays, while one of them is in the air. None where it is less
 /// than the separation. Pads may be nearer than that, which nothing here can change: it is all that is kept while both
 /// vehicles are over theirs, or one stands on its own.
-fn nearest_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
+fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
     let at = |(track, delay): (&[Point], usize), step: usize| {
         track[step.saturating_sub(delay).min(track.len() - 1)]
     };
@@ -96,10 +96,10 @@ fn nearest_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coverage::flight::Act;
+    use crate::coverage::flight::StopAction;
 
     fn flight(places: &[[f32; 3]]) -> (Vec<Stop>, Vec<f32>) {
-        let stop = |p: &[f32; 3]| Stop { position: Point::from(*p), act: Act::Lane, lane: None };
+        let stop = |p: &[f32; 3]| Stop { position: Point::from(*p), act: StopAction::Lane, lane: None };
         let stops: Vec<Stop> = places.iter().map(stop).collect();
         let mut times = vec![0.0];
         for pair in stops.windows(2) {
@@ -112,16 +112,19 @@ mod tests {
     fn lanes_side_by_side_are_not_flown_at_once() {
         let long = flight(&[[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [100.0, 0.0, 30.0], [0.0, 9.0, 30.0]]);
         let beside = flight(&[[0.0, 3.0, 0.0], [0.0, 1.0, 30.0], [100.0, 1.0, 30.0]]);
-        let timed = |f: &'static (Vec<Stop>, Vec<f32>)| Timed { stops: &f.0, times_s: &f.1 };
+        let timed = |f: &'static (Vec<Stop>, Vec<f32>)| DepartureFlight { stops: &f.0, times_s: &f.1 };
         let (long, beside) = (&*Box::leak(Box::new(long)), &*Box::leak(Box::new(beside)));
-        let (departures_s, least_m) = departures(&[timed(beside), timed(long)], 2.0).expect("they can wait");
+        let (departures_s, least_m) =
+            plan_departures(&[timed(beside), timed(long)], 2.0).expect("they can wait");
         assert!(departures_s[1] == 0.0 && departures_s[0] > 0.0, "{departures_s:?}");
         assert!((2.0 * 0.999..3.1).contains(&least_m), "{least_m}");
         // Pads 2 m apart are no reason to come as near over the lanes.
-        let (departures_s, least_m) = departures(&[timed(beside), timed(long)], 8.0).expect("they can wait");
+        let (departures_s, least_m) =
+            plan_departures(&[timed(beside), timed(long)], 8.0).expect("they can wait");
         assert!(departures_s[0] > 0.0 && least_m < 3.1, "{departures_s:?}, {least_m}");
-        let places =
-            |flight: &Timed<'_>, delay_s: f32| (sampled(flight), (delay_s / COMPARISON_STEP_S) as usize);
+        let places = |flight: &DepartureFlight<'_>, delay_s: f32| {
+            (sample_positions(flight), (delay_s / COMPARISON_STEP_S) as usize)
+        };
         let (long_places, beside_places) =
             (places(&timed(long), 0.0), places(&timed(beside), departures_s[0]));
         for step in 0..long_places.0.len() {
@@ -132,6 +135,6 @@ mod tests {
         }
         let apart = flight(&[[0.0, 30.0, 0.0], [0.0, 30.0, 30.0], [90.0, 30.0, 30.0]]);
         let apart = &*Box::leak(Box::new(apart));
-        assert_eq!(departures(&[timed(long), timed(apart)], 2.0).expect("apart").0, [0.0, 0.0]);
+        assert_eq!(plan_departures(&[timed(long), timed(apart)], 2.0).expect("apart").0, [0.0, 0.0]);
     }
 }

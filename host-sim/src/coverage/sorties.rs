@@ -15,8 +15,8 @@ use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
 use sim_autopilot::VehicleLimits;
 
-use super::Planned;
-use super::flight::Act;
+use super::CoveragePlan;
+use super::flight::StopAction;
 pub use super::planned::Sortie;
 use crate::scenario;
 
@@ -26,45 +26,52 @@ pub const USABLE_CHARGE: f32 = 0.85;
 pub const BATTERY_SWAP_S: f32 = 120.0;
 
 /// The whole of a route.
-pub(super) fn whole(planned: &Planned<'_>, route: Route) -> Sortie {
-    Sortie { route, number: 1, of: 1, begin_s: 0.0, depart_s: 0.0, flown_s: flown_s(planned, &route) }
+pub(super) fn whole_route_sortie(planned: &CoveragePlan<'_>, route: Route) -> Sortie {
+    Sortie {
+        route,
+        number: 1,
+        of: 1,
+        begin_s: 0.0,
+        depart_s: 0.0,
+        flown_s: route_duration_s(planned, &route),
+    }
 }
 
 /// How long a vehicle's battery lasts, seconds.
-pub fn lasts_s(vehicle: &scenario::Vehicle) -> f32 {
+pub fn battery_duration_s(vehicle: &scenario::Vehicle) -> f32 {
     vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
 }
 
 /// Time of a route from pad to pad, seconds: at cruise speed, from rest to rest on each leg across.
-pub fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
+pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let index = usize::from(route.vehicle);
     let (vehicle, heights) = (&planned.vehicles[index], planned.wanted.heights);
     let over_lanes_m = f32::from(route.layer) * heights.layer_m;
     let top_m = heights.mission_m + over_lanes_m;
     let up_m = (top_m - planned.scenario.vehicles[index].start.z).abs() + over_lanes_m;
-    let level_s = route.ground_m / vehicle.cruise_mps + turns_s(planned, route);
+    let level_s = route.ground_m / vehicle.cruise_mps + turns_extra_s(planned, route);
     if planned.following.is_some() {
-        return level_s + over_terrain_s(planned, route);
+        return level_s + terrain_extra_s(planned, route);
     }
     level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
 }
 
 /// Time of all climbs and descents where the ground rises and falls, as if each were flown alone,
 /// and of stops at the corners that follow the ground, seconds.
-fn over_terrain_s(planned: &Planned<'_>, route: &Route) -> f32 {
+fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
-    let stops = super::flight::stops(planned, route);
+    let stops = super::flight::route_stops(planned, route);
     let ups = stops.windows(2).map(|pair| match pair[1].position.z - pair[0].position.z {
         up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
         down_m => -down_m / vehicle.descend_mps,
     });
-    let corners = stops.iter().filter(|stop| stop.act == Act::Lane).count() as f32;
+    let corners = stops.iter().filter(|stop| stop.act == StopAction::Lane).count() as f32;
     ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 
 /// Further time of stops at both ends of each lane, and over the pad, seconds: a lane, and a
 /// transit from or to the pad, is taken to be long enough for the cruise speed.
-fn turns_s(planned: &Planned<'_>, route: &Route) -> f32 {
+fn turns_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let cruise_mps = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
     let [from, to] = [route.first, route.end - 1].map(|number| planned.tracks.lane_of(number));
     let lanes = (to - from + 1) as f32;
@@ -88,40 +95,41 @@ pub struct LaneTooLong {
 ///
 /// # Errors
 /// A lane that takes longer alone.
-pub fn cut(planned: &Planned<'_>, route: &Route, most_s: f32) -> Result<Vec<Route>, LaneTooLong> {
-    if flown_s(planned, route) <= most_s {
+pub fn cut_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Result<Vec<Route>, LaneTooLong> {
+    if route_duration_s(planned, route) <= most_s {
         return Ok(vec![*route]);
     }
-    let lanes = Lanes::new(planned, route);
+    let lanes = RouteLanes::new(planned, route);
     let count = lanes.ways_m.len();
     // Sorties and seconds up to a lane, and where the last of these sorties begins.
     let mut best = vec![(0u32, 0.0f64, 0usize)];
     for end in 1..=count {
-        let parts = (0..end).rev().map(|first| (first, flown_s(planned, &lanes.part(first, end))));
+        let parts =
+            (0..end).rev().map(|first| (first, route_duration_s(planned, &lanes.sub_route(first, end))));
         let fitting = parts.take_while(|(_, own_s)| *own_s <= most_s);
         let all = fitting.map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
         let found = all.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         best.push(found.ok_or_else(|| LaneTooLong {
             lane: planned.tracks.lane_of(lanes.bounds[end - 1]),
-            takes_s: flown_s(planned, &lanes.part(end - 1, end)),
+            takes_s: route_duration_s(planned, &lanes.sub_route(end - 1, end)),
         })?);
     }
     let (mut parts, mut end) = (Vec::new(), count);
     while end > 0 {
         let first = best[end].2;
-        parts.push(lanes.part(first, end));
+        parts.push(lanes.sub_route(first, end));
         end = first;
     }
     // Now the last of the path comes first.
-    if route.ends().0 == route.first {
+    if route.end_waypoints().0 == route.first {
         parts.reverse();
     }
     Ok(parts)
 }
 
 /// The lanes of a route, each as far as it belongs to it.
-struct Lanes<'a> {
-    planned: &'a Planned<'a>,
+struct RouteLanes<'a> {
+    planned: &'a CoveragePlan<'a>,
     route: &'a Route,
     /// The first waypoint of each, and what follows the last one.
     bounds: Vec<u32>,
@@ -129,8 +137,8 @@ struct Lanes<'a> {
     ways_m: Vec<[f32; 2]>,
 }
 
-impl<'a> Lanes<'a> {
-    fn new(planned: &'a Planned<'a>, route: &'a Route) -> Self {
+impl<'a> RouteLanes<'a> {
+    fn new(planned: &'a CoveragePlan<'a>, route: &'a Route) -> Self {
         let tracks = &planned.tracks;
         let [from, to] = [route.first, route.end - 1].map(|number| tracks.lane_of(number));
         let inner = tracks.lanes()[from + 1..=to].iter().map(|lane| lane.first);
@@ -144,11 +152,12 @@ impl<'a> Lanes<'a> {
     }
 
     /// Lanes `first` up to before `end` as a route of their own.
-    fn part(&self, first: usize, end: usize) -> Route {
+    fn sub_route(&self, first: usize, end: usize) -> Route {
         let (planned, heights) = (self.planned, self.planned.wanted.heights);
         let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];
         let (from, to) = (self.bounds[first], self.bounds[end]);
-        let inside_m = planned.tracks.along_m(to - 1) - planned.tracks.along_m(from);
+        let inside_m =
+            planned.tracks.distance_to_waypoint_m(to - 1) - planned.tracks.distance_to_waypoint_m(from);
         let ground_m = self.ways_m[first][0] + inside_m + self.ways_m[end - 1][1];
         let top_m = heights.mission_m + f32::from(self.route.layer) * heights.layer_m;
         let delay_s = top_m / vehicle.climb_mps + top_m / vehicle.descend_mps;

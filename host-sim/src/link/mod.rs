@@ -50,7 +50,7 @@ pub enum LinkUrl {
     },
 }
 
-/// Why a link URL or link is no good. Displays as `WHAT: WHERE: WHY`.
+/// Reason why a link URL or link is no good. Displays as `WHAT: WHERE: WHY`.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// The text is no link URL.
@@ -128,7 +128,7 @@ impl LinkUrl {
     }
 
     /// This URL with the actual port where port 0 was requested.
-    pub fn opened(&self, link: &dyn Link) -> Self {
+    pub fn with_bound_port(&self, link: &dyn Link) -> Self {
         match (self, link.local_address()) {
             (Self::TcpListen(_), Some(at)) => Self::TcpListen(at.to_string()),
             (Self::UdpListen(_), Some(at)) => Self::UdpListen(at.to_string()),
@@ -145,9 +145,9 @@ impl LinkUrl {
             Self::TcpListen(at) => {
                 Ok(Box::new(tcp::Server::bind(resolve(at).map_err(failed)?).map_err(failed)?))
             }
-            Self::Udp(at) => Ok(Box::new(udp::Peer::new(resolve(at).map_err(failed)?).map_err(failed)?)),
+            Self::Udp(at) => Ok(Box::new(udp::UdpPeer::new(resolve(at).map_err(failed)?).map_err(failed)?)),
             Self::UdpListen(at) => {
-                Ok(Box::new(udp::Hub::bind(resolve(at).map_err(failed)?).map_err(failed)?))
+                Ok(Box::new(udp::UdpHub::bind(resolve(at).map_err(failed)?).map_err(failed)?))
             }
             Self::Serial { path, baud } => Ok(Box::new(serial::Port::open(path, *baud).map_err(failed)?)),
         }

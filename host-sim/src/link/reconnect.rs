@@ -10,20 +10,20 @@ use super::transport::Link;
 pub(super) const RECONNECT_EVERY: Duration = Duration::from_secs(1);
 
 /// Opens the link again, if it can be opened now.
-type Open = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
+type OpenLink = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
 
 /// A link that connects again: while it is lost it receives nothing and drops what is sent.
 pub struct ReconnectingLink {
     /// URL of the link.
     name: String,
-    open: Open,
+    open: OpenLink,
     link: Option<Box<dyn Link>>,
     retry_at: Instant,
 }
 
 impl ReconnectingLink {
     /// Keeps an open link, and what opens it again.
-    pub fn new(name: String, link: Box<dyn Link>, open: Open) -> Self {
+    pub fn new(name: String, link: Box<dyn Link>, open: OpenLink) -> Self {
         Self { name, open, link: Some(link), retry_at: Instant::now() }
     }
 
@@ -38,7 +38,7 @@ impl ReconnectingLink {
         self.link.as_mut()
     }
 
-    fn lose(&mut self, why: &io::Error) {
+    fn handle_loss(&mut self, why: &io::Error) {
         eprintln!("link lost: {}: {why}; trying again every second", self.name);
         self.link = None;
         self.retry_at = Instant::now() + RECONNECT_EVERY;
@@ -49,7 +49,7 @@ impl Link for ReconnectingLink {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.reopen().map_or(Ok(0), |link| link.receive(buffer)) {
             Err(why) => {
-                self.lose(&why);
+                self.handle_loss(&why);
                 Ok(0)
             }
             received => received,
@@ -58,7 +58,7 @@ impl Link for ReconnectingLink {
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         if let Err(why) = self.reopen().map_or(Ok(()), |link| link.send(bytes)) {
-            self.lose(&why);
+            self.handle_loss(&why);
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serialport::SerialPort;
 
-use super::transport::{Link, is_quiet};
+use super::transport::{Link, is_would_block};
 
 /// Most bytes that wait for a line slower than its sender: at 57600 baud less than a second. Beyond
 /// it frames are dropped, since old setpoints are worse than none.
@@ -30,7 +30,7 @@ impl Port {
 
 /// Whether nothing is there, or nothing is taken, now.
 fn is_idle(error: &io::Error) -> bool {
-    error.kind() == io::ErrorKind::TimedOut || is_quiet(error)
+    error.kind() == io::ErrorKind::TimedOut || is_would_block(error)
 }
 
 impl Link for Port {

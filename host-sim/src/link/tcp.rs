@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-use super::transport::{Link, is_quiet};
+use super::transport::{Link, is_would_block};
 
 /// Most bytes that wait for a client: about ten seconds of PX4's flood.
 const MAX_QUEUED_BYTES: usize = 256 * 1024;
@@ -27,7 +27,7 @@ impl Connection {
             Ok(0) => {
                 Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the other side closed the connection"))
             }
-            Err(error) if is_quiet(&error) => Ok(0),
+            Err(error) if is_would_block(&error) => Ok(0),
             result => result,
         }
     }
@@ -39,7 +39,7 @@ impl Connection {
             match self.stream.write(&self.queue[sent..]) {
                 Ok(0) => break,
                 Ok(count) => sent += count,
-                Err(error) if is_quiet(&error) => break,
+                Err(error) if is_would_block(&error) => break,
                 Err(error) => return Err(error),
             }
         }

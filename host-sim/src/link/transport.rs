@@ -13,7 +13,7 @@ pub trait Link: Send {
     /// lost for now are no errors.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// Sends whole frames. What nobody takes in time is dropped.
+    /// Sends whole frames. Frames that the receiver does not take in time are dropped.
     ///
     /// # Errors
     /// When the link is gone for good.
@@ -34,7 +34,7 @@ pub trait Link: Send {
 }
 
 /// Whether an error only means that nothing is there now.
-pub(super) fn is_quiet(error: &io::Error) -> bool {
+pub(super) fn is_would_block(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, Interrupted, WouldBlock};
     matches!(error.kind(), WouldBlock | Interrupted | ConnectionRefused)
 }

@@ -4,7 +4,7 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use super::transport::{Link, is_quiet};
+use super::transport::{Link, is_would_block};
 
 /// Silence after which a client gets nothing more.
 const CLIENT_LIFETIME: Duration = Duration::from_secs(60);
@@ -13,18 +13,18 @@ const MAX_CLIENTS: usize = 16;
 
 fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {
     match socket.send_to(bytes, to) {
-        Err(error) if !is_quiet(&error) => Err(error),
+        Err(error) if !is_would_block(&error) => Err(error),
         _ => Ok(()),
     }
 }
 
 /// One peer, known from the start.
-pub struct Peer {
+pub struct UdpPeer {
     socket: UdpSocket,
     peer: SocketAddr,
 }
 
-impl Peer {
+impl UdpPeer {
     /// Binds any free port, on the loopback for a peer there.
     pub fn new(peer: SocketAddr) -> io::Result<Self> {
         let local: SocketAddr = match (peer, peer.ip().is_loopback()) {
@@ -39,13 +39,13 @@ impl Peer {
     }
 }
 
-impl Link for Peer {
+impl Link for UdpPeer {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             match self.socket.recv_from(buffer) {
                 Ok((len, from)) if from == self.peer => return Ok(len),
                 Ok(_) => {}
-                Err(error) if is_quiet(&error) => return Ok(0),
+                Err(error) if is_would_block(&error) => return Ok(0),
                 Err(error) => return Err(error),
             }
         }
@@ -61,12 +61,12 @@ impl Link for Peer {
 }
 
 /// A bound socket and the peers that sent to it.
-pub struct Hub {
+pub struct UdpHub {
     socket: UdpSocket,
     clients: Vec<(SocketAddr, Instant)>,
 }
 
-impl Hub {
+impl UdpHub {
     /// Binds.
     pub fn bind(at: SocketAddr) -> io::Result<Self> {
         let socket = UdpSocket::bind(at)?;
@@ -74,7 +74,7 @@ impl Hub {
         Ok(Self { socket, clients: Vec::new() })
     }
 
-    fn remember(&mut self, from: SocketAddr) {
+    fn remember_peer(&mut self, from: SocketAddr) {
         let now = Instant::now();
         if let Some(client) = self.clients.iter_mut().find(|client| client.0 == from) {
             client.1 = now;
@@ -88,14 +88,14 @@ impl Hub {
     }
 }
 
-impl Link for Hub {
+impl Link for UdpHub {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.socket.recv_from(buffer) {
             Ok((len, from)) => {
-                self.remember(from);
+                self.remember_peer(from);
                 Ok(len)
             }
-            Err(error) if is_quiet(&error) => Ok(0),
+            Err(error) if is_would_block(&error) => Ok(0),
             Err(error) => Err(error),
         }
     }

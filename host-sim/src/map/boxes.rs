@@ -37,7 +37,7 @@ impl CellBox {
         u32::from(self.low[axis]) + u32::from(self.high[axis])
     }
 
-    fn join(&self, other: &Self) -> Self {
+    fn union(&self, other: &Self) -> Self {
         Self {
             low: [0, 1, 2].map(|a| self.low[a].min(other.low[a])),
             high: [0, 1, 2].map(|a| self.high[a].max(other.high[a])),
@@ -45,7 +45,7 @@ impl CellBox {
     }
 
     /// The sides across an axis, one number.
-    fn across(&self, axis: usize) -> u64 {
+    fn cross_section_key(&self, axis: usize) -> u64 {
         let (v, w) = ((axis + 1) % 3, (axis + 2) % 3);
         let sides = [self.low[v], self.high[v], self.low[w], self.high[w]];
         sides.into_iter().fold(0, |all, side| all << 16 | u64::from(side))
@@ -53,14 +53,14 @@ impl CellBox {
 
     /// A measure of how many segments pass it within a distance, in cells: half the surface of all places that near, but
     /// for a constant.
-    fn passed_by(&self, near: f32) -> f32 {
+    fn split_cost(&self, near: f32) -> f32 {
         let [x, y, z] = [0, 1, 2].map(|a| f32::from(self.high[a] - self.low[a]));
         x * y + y * z + z * x + core::f32::consts::PI * near * (x + y + z)
     }
 }
 
 /// Takes the obstacles of a brick apart into boxes.
-fn take_apart(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
+fn brick_to_boxes(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
     while word != 0 {
         let bit = word.trailing_zeros();
         let first = [bit & 3, bit >> 2 & 3, bit >> 4];
@@ -85,9 +85,10 @@ fn take_apart(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
 
 /// Joins boxes that touch along an axis and have equal sides across it.
 fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
-    boxes.sort_by_cached_key(|b| (b.across(axis), b.low[axis]));
+    boxes.sort_by_cached_key(|b| (b.cross_section_key(axis), b.low[axis]));
     boxes.dedup_by(|next, last| {
-        let joins = last.across(axis) == next.across(axis) && last.high[axis] == next.low[axis];
+        let joins =
+            last.cross_section_key(axis) == next.cross_section_key(axis) && last.high[axis] == next.low[axis];
         if joins {
             last.high[axis] = next.high[axis];
         }
@@ -96,7 +97,7 @@ fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
 }
 
 /// Boxes that hold all obstacles of a map, and nothing else.
-fn boxes(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
+fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
     let [bx, by, _] = grid.shape().bricks().map(|n| n as usize);
     let layers: Vec<Vec<CellBox>> = grid
         .words()
@@ -105,7 +106,7 @@ fn boxes(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
         .map(|(k, layer)| {
             let mut boxes = Vec::new();
             for (at, &word) in layer.iter().enumerate() {
-                take_apart(word, [at % bx, at / bx, k], &mut boxes);
+                brick_to_boxes(word, [at % bx, at / bx, k], &mut boxes);
             }
             join_along(0, &mut boxes);
             join_along(1, &mut boxes);
@@ -131,7 +132,7 @@ pub struct BoxTree {
 impl BoxTree {
     /// The tree over a map. O(bricks + boxes · log boxes).
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
-        let nodes = nodes_over(&mut boxes(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
+        let nodes = build_nodes(&mut boxes_of_map(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
         Self { shape: *grid.shape(), outside: grid.outside(), nodes, arch: Arch::new() }
     }
 
@@ -147,7 +148,7 @@ impl BoxTree {
         }
         let mut limit = max_m / resolution_m;
         if self.outside == Outside::Blocked {
-            limit = limit.min(segment.to_outside(self.shape.dims)).max(0.0);
+            limit = limit.min(segment.distance_to_faces(self.shape.dims)).max(0.0);
         }
         let enough = (enough_m / resolution_m).max(0.0);
         let search =
@@ -159,20 +160,20 @@ impl BoxTree {
 }
 
 /// Puts the box that is around some others into a node.
-fn put(node: &mut Node, lane: usize, part: &[CellBox]) {
+fn put_bounding_box(node: &mut Node, lane: usize, part: &[CellBox]) {
     let Some((first, others)) = part.split_first() else { return };
-    let whole = others.iter().fold(*first, |whole, b| whole.join(b));
+    let whole = others.iter().fold(*first, |whole, b| whole.union(b));
     for axis in 0..3 {
         node.low[axis][lane] = f32::from(whole.low[axis]);
         node.high[axis][lane] = f32::from(whole.high[axis]);
     }
 }
 
-/// The nodes over some boxes and below; the first is over all. `near` as [`in_two`] has it.
-fn nodes_over(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
+/// The nodes over some boxes and below; the first is over all. `near` as [`split_boxes`] has it.
+fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     let mut node = Node::EMPTY;
     if boxes.len() <= BOXES_PER_NODE {
-        boxes.chunks(1).enumerate().for_each(|(lane, one)| put(&mut node, lane, one));
+        boxes.chunks(1).enumerate().for_each(|(lane, one)| put_bounding_box(&mut node, lane, one));
         return vec![node];
     }
     let is_large = boxes.len() > MAX_BOXES_PER_THREAD;
@@ -182,14 +183,14 @@ fn nodes_over(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
         else {
             break;
         };
-        let (left, right) = in_two(parts.swap_remove(largest), near);
+        let (left, right) = split_boxes(parts.swap_remove(largest), near);
         parts.extend([left, right]);
     }
-    parts.iter().enumerate().for_each(|(lane, part)| put(&mut node, lane, part));
+    parts.iter().enumerate().for_each(|(lane, part)| put_bounding_box(&mut node, lane, part));
     let below: Vec<Vec<Node>> = if is_large {
-        parts.into_par_iter().map(|part| nodes_over(part, near)).collect()
+        parts.into_par_iter().map(|part| build_nodes(part, near)).collect()
     } else {
-        parts.into_iter().map(|part| nodes_over(part, near)).collect()
+        parts.into_iter().map(|part| build_nodes(part, near)).collect()
     };
     let mut next = 1;
     for (child, nodes) in node.child.iter_mut().zip(&below) {
@@ -201,21 +202,21 @@ fn nodes_over(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
 
 /// Parts two boxes or more so that few segments have to open both halves, of which neither has less than a third: the surface
 /// area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for segments that pass within `near` cells. O(boxes).
-fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
+fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
-        let Some(bin) = bins(boxes, axis) else { continue };
+        let Some(bin) = bin_of_box(boxes, axis) else { continue };
         let mut all: [Option<(CellBox, usize)>; SPLIT_BINS] = [None; SPLIT_BINS];
         for b in boxes.iter() {
             let one = &mut all[bin(b)];
-            *one = one.map_or(Some((*b, 1)), |(whole, count)| Some((whole.join(b), count + 1)));
+            *one = one.map_or(Some((*b, 1)), |(whole, count)| Some((whole.union(b), count + 1)));
         }
         let add = |sum: &mut Option<(CellBox, usize)>, next: Option<(CellBox, usize)>| {
             *sum = match (*sum, next) {
-                (Some((a, n)), Some((b, m))) => Some((a.join(&b), n + m)),
+                (Some((a, n)), Some((b, m))) => Some((a.union(&b), n + m)),
                 (sum, next) => sum.or(next),
             };
-            sum.map_or(0.0, |(whole, count)| whole.passed_by(near) * count as f32)
+            sum.map_or(0.0, |(whole, count)| whole.split_cost(near) * count as f32)
         };
         let (mut above, mut below) = (None, None);
         let mut costs = [0.0; SPLIT_BINS];
@@ -233,7 +234,7 @@ fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) 
     }
     let (cost, axis, first_above) = best;
     let mut middle = 0;
-    if let Some(bin) = bins(boxes, axis).filter(|_| cost.is_finite()) {
+    if let Some(bin) = bin_of_box(boxes, axis).filter(|_| cost.is_finite()) {
         for i in 0..boxes.len() {
             if bin(&boxes[i]) < first_above {
                 boxes.swap(i, middle);
@@ -242,7 +243,7 @@ fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) 
         }
     } else {
         // Most are in one bin of each axis.
-        let spread = |axis: usize| extent(boxes, axis).map_or(0, |(low, high)| high - low);
+        let spread = |axis: usize| centre_extent(boxes, axis).map_or(0, |(low, high)| high - low);
         let axis = (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0);
         middle = boxes.len() / 2;
         boxes.select_nth_unstable_by_key(middle, |b| b.center(axis));
@@ -251,14 +252,14 @@ fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) 
 }
 
 /// Least and greatest of the boxes' centres along an axis, twice.
-fn extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
+fn centre_extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
     let centers = || boxes.iter().map(|b| b.center(axis));
     Some((centers().min()?, centers().max()?))
 }
 
 /// Which of [`SPLIT_BINS`] bins along an axis a box is in; `None` where the centres of all are at one place.
-fn bins(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
-    let (low, high) = extent(boxes, axis)?;
+fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
+    let (low, high) = centre_extent(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {
         (b.center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize
     })

@@ -23,7 +23,7 @@ const MAX_LINE: usize = 1024;
 
 /// Reads a `.bt` file.
 pub fn read(path: &Path) -> Result<Octree, MapError> {
-    let bytes = files::read(path, MAX_BYTES).map_err(|source| MapError::io("read", path, source))?;
+    let bytes = files::read(path, MAX_BYTES).map_err(|source| MapError::from_io("read", path, source))?;
     parse(&bytes, path)
 }
 
@@ -38,11 +38,11 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
     }
     if reader.nodes != header.nodes {
         let expected = format!("as many nodes as the data holds, {}", reader.nodes);
-        return Err(reader.fail(header.nodes_at, expected, header.nodes.to_string()));
+        return Err(reader.error_at(header.nodes_at, expected, header.nodes.to_string()));
     }
     if reader.at < bytes.len() {
         let found = format!("{} more bytes", bytes.len() - reader.at);
-        return Err(reader.fail(reader.at, "the end of the file", found));
+        return Err(reader.error_at(reader.at, "the end of the file", found));
     }
     Ok(Octree::from_parts(header.resolution_m, reader.inner))
 }
@@ -62,7 +62,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn fail(&self, offset: usize, expected: impl Into<String>, found: impl Into<String>) -> MapError {
+    fn error_at(&self, offset: usize, expected: impl Into<String>, found: impl Into<String>) -> MapError {
         MapError::Malformed {
             file: self.path.into(),
             offset: offset as u64,
@@ -72,25 +72,25 @@ impl<'a> Reader<'a> {
     }
 
     /// The next header line and where it began; the newline is taken too.
-    fn line(&mut self, expected: &str) -> Result<(&'a str, usize), MapError> {
+    fn header_line(&mut self, expected: &str) -> Result<(&'a str, usize), MapError> {
         let begin = self.at;
         let rest = &self.bytes[begin..self.bytes.len().min(begin + MAX_LINE)];
         let Some(length) = rest.iter().position(|&b| b == b'\n') else {
             let found = if begin == self.bytes.len() { "the end of the file" } else { "no end of line" };
-            return Err(self.fail(begin, expected, found));
+            return Err(self.error_at(begin, expected, found));
         };
         self.at = begin + length + 1;
         match std::str::from_utf8(&rest[..length]) {
             Ok(text) => Ok((text.trim_end_matches('\r'), begin)),
-            Err(_) => Err(self.fail(begin, expected, "bytes that are no text")),
+            Err(_) => Err(self.error_at(begin, expected, "bytes that are no text")),
         }
     }
 
     fn header(&mut self) -> Result<Header, MapError> {
         let expected = format!("`{MAGIC}`");
-        let (first, at) = self.line(&expected)?;
+        let (first, at) = self.header_line(&expected)?;
         if !first.starts_with(MAGIC) {
-            return Err(self.fail(at, expected, quoted(first)));
+            return Err(self.error_at(at, expected, quoted(first)));
         }
         let (mut id, mut nodes, mut resolution_m) = (false, None, None);
         let after_header;
@@ -104,39 +104,41 @@ impl<'a> Reader<'a> {
             } else {
                 "`data`"
             };
-            let (line, at) = self.line(missing)?;
+            let (line, at) = self.header_line(missing)?;
             let (word, value) = line.split_once(' ').unwrap_or((line, ""));
             let (value_at, value) = (at + word.len() + 1, value.trim());
             match word {
                 "" => {}
                 _ if line.starts_with('#') => {}
                 "id" if IDS.contains(&value) => id = true,
-                "id" => return Err(self.fail(value_at, "the id `OcTree` or `ColorOcTree`", quoted(value))),
+                "id" => {
+                    return Err(self.error_at(value_at, "the id `OcTree` or `ColorOcTree`", quoted(value)));
+                }
                 "size" => match value.parse::<u64>() {
                     Ok(n) => nodes = Some((n, value_at)),
-                    Err(_) => return Err(self.fail(value_at, "a number of nodes", quoted(value))),
+                    Err(_) => return Err(self.error_at(value_at, "a number of nodes", quoted(value))),
                 },
                 "res" => match value.parse::<f64>() {
                     Ok(r) if r.is_finite() && (1e-6..=1e6).contains(&r) => resolution_m = Some(r),
                     _ => {
                         let expected = "a resolution from 0.000001 to 1000000 metres";
-                        return Err(self.fail(value_at, expected, quoted(value)));
+                        return Err(self.error_at(value_at, expected, quoted(value)));
                     }
                 },
                 "data" => {
                     after_header = at;
                     break;
                 }
-                _ => return Err(self.fail(at, missing, quoted(line))),
+                _ => return Err(self.error_at(at, missing, quoted(line))),
             }
         }
         match (id, nodes, resolution_m) {
             (true, Some((nodes, nodes_at)), Some(resolution_m)) => {
                 Ok(Header { nodes, nodes_at, resolution_m })
             }
-            (false, ..) => Err(self.fail(after_header, "`id OcTree`", "`data`")),
-            (_, None, _) => Err(self.fail(after_header, "`size N`", "`data`")),
-            _ => Err(self.fail(after_header, "`res METRES`", "`data`")),
+            (false, ..) => Err(self.error_at(after_header, "`id OcTree`", "`data`")),
+            (_, None, _) => Err(self.error_at(after_header, "`size N`", "`data`")),
+            _ => Err(self.error_at(after_header, "`res METRES`", "`data`")),
         }
     }
 
@@ -145,12 +147,16 @@ impl<'a> Reader<'a> {
         let begin = self.at;
         let Some(&[low, high]) = self.bytes.get(begin..begin + 2) else {
             let found = format!("the end of the file ({} bytes)", self.bytes.len());
-            return Err(self.fail(begin, format!("the two bytes of an inner node at depth {depth}"), found));
+            return Err(self.error_at(
+                begin,
+                format!("the two bytes of an inner node at depth {depth}"),
+                found,
+            ));
         };
         self.at += 2;
         let mut node = Inner { children: u16::from_le_bytes([low, high]), first: 0 };
         if node.children == 0 {
-            return Err(self.fail(begin, "an inner node with children", "one without"));
+            return Err(self.error_at(begin, "an inner node with children", "one without"));
         }
         let mut inner = heapless::Vec::<Inner, 8>::new();
         for index in 0..8 {
@@ -160,7 +166,7 @@ impl<'a> Reader<'a> {
                 continue;
             }
             if depth + 1 == TREE_DEPTH {
-                return Err(self.fail(
+                return Err(self.error_at(
                     begin,
                     format!("leaves at depth {TREE_DEPTH}"),
                     "a child that is an inner node",
@@ -200,7 +206,7 @@ fn push_node(tree: &Octree, node: Inner, bytes: &mut Vec<u8>) {
 
 /// Writes a `.bt` file.
 pub fn write(tree: &Octree, path: &Path) -> Result<(), MapError> {
-    std::fs::write(path, to_bytes(tree)).map_err(|source| MapError::io("write", path, source))
+    std::fs::write(path, to_bytes(tree)).map_err(|source| MapError::from_io("write", path, source))
 }
 
 #[cfg(test)]
@@ -219,7 +225,7 @@ mod tests {
 
     #[test]
     fn the_building_written_and_read_is_the_same_grid() {
-        let map = building::building(building::DEFAULT_SEED, 0.25).unwrap();
+        let map = building::building_map(building::DEFAULT_SEED, 0.25).unwrap();
         let bytes = to_bytes(&map.to_octree("building").unwrap());
         let tree = parse(&bytes, Path::new("building.bt")).unwrap();
         assert_eq!(OccupancyMap::from_octree(&tree, 0.25, "building.bt").unwrap(), map);

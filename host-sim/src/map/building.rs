@@ -43,7 +43,7 @@ struct Block {
 }
 
 /// The building at `resolution_m`; walls are never thinner than one cell.
-pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> {
+pub fn building_map(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> {
     let name = "builtin:building";
     if !(0.05..=1.0).contains(&resolution_m) {
         let why = format!("resolution_m of {resolution_m}, its walls and doors ask for 0.05 to 1");
@@ -51,8 +51,8 @@ pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> 
     }
     let cells = |metres: f32| (metres / resolution_m).round() as u32;
     let shape = GridShape { dims: SIZE_M.map(cells), min: Point::zeros(), resolution_m };
-    let mut map = OccupancyMap::unknown(shape, name)?;
-    for Block { min, max, state } in blocks(seed) {
+    let mut map = OccupancyMap::all_unknown(shape, name)?;
+    for Block { min, max, state } in building_blocks(seed) {
         let from = [0, 1, 2].map(|a| cells(min[a]).min(shape.dims[a] - 1));
         let to = [0, 1, 2].map(|a| cells(max[a]).clamp(from[a] + 1, shape.dims[a]));
         map.fill(from, to, state);
@@ -61,34 +61,34 @@ pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> 
 }
 
 /// Later blocks overwrite earlier ones.
-fn blocks(seed: u64) -> Vec<Block> {
-    let mut plan = Plan { blocks: Vec::new(), rng: Pcg32::seed_from_u64(seed) };
+fn building_blocks(seed: u64) -> Vec<Block> {
+    let mut plan = BlockList { blocks: Vec::new(), rng: Pcg32::seed_from_u64(seed) };
     let [length, width, height] = SIZE_M;
-    plan.solid([0.0; 3], SIZE_M);
-    plan.carve([WALL_M; 3], [length - WALL_M, width - WALL_M, height - WALL_M]);
+    plan.add_solid([0.0; 3], SIZE_M);
+    plan.add_opening([WALL_M; 3], [length - WALL_M, width - WALL_M, height - WALL_M]);
     for floor in 0..FLOORS {
-        plan.floor(floor);
+        plan.add_floor(floor);
     }
     for [x0, x1] in SHAFTS_M {
         for floor in 1..FLOORS {
             let z = floor as f32 * FLOOR_HEIGHT_M;
-            plan.carve([x0, CORRIDOR_M[0], z], [x1, CORRIDOR_M[1], z + WALL_M]);
+            plan.add_opening([x0, CORRIDOR_M[0], z], [x1, CORRIDOR_M[1], z + WALL_M]);
         }
     }
     plan.blocks
 }
 
-struct Plan {
+struct BlockList {
     blocks: Vec<Block>,
     rng: Pcg32,
 }
 
-impl Plan {
-    fn solid(&mut self, min: [f32; 3], max: [f32; 3]) {
+impl BlockList {
+    fn add_solid(&mut self, min: [f32; 3], max: [f32; 3]) {
         self.blocks.push(Block { min, max, state: Occupancy::Occupied });
     }
 
-    fn carve(&mut self, min: [f32; 3], max: [f32; 3]) {
+    fn add_opening(&mut self, min: [f32; 3], max: [f32; 3]) {
         self.blocks.push(Block { min, max, state: Occupancy::Free });
     }
 
@@ -97,19 +97,19 @@ impl Plan {
         from + (to - from) * (self.rng.next_u32() >> 8) as f32 / 16_777_216.0
     }
 
-    fn floor(&mut self, floor: u32) {
+    fn add_floor(&mut self, floor: u32) {
         let [length, width, _] = SIZE_M;
         let slab = floor as f32 * FLOOR_HEIGHT_M;
         let z = slab + WALL_M;
         let ceiling = if floor + 1 == FLOORS { SIZE_M[2] - WALL_M } else { slab + FLOOR_HEIGHT_M };
         if floor > 0 {
-            self.solid([0.0, 0.0, slab], [length, width, z]);
+            self.add_solid([0.0, 0.0, slab], [length, width, z]);
         }
         for (y0, y1, wall) in [
             (WALL_M, CORRIDOR_M[0] - WALL_M, CORRIDOR_M[0] - WALL_M),
             (CORRIDOR_M[1] + WALL_M, width - WALL_M, CORRIDOR_M[1]),
         ] {
-            self.solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
+            self.add_solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
             // Five or six rooms a side: partitions near even shares, moved by up to 0.4 m.
             let rooms = 5 + (self.rng.next_u32() % 2) as usize;
             let mut west = WALL_M;
@@ -120,39 +120,39 @@ impl Plan {
                     length * room as f32 / rooms as f32 + self.uniform(-0.4, 0.4)
                 };
                 if room < rooms {
-                    self.solid([east, y0, z], [east + WALL_M, y1, ceiling]);
+                    self.add_solid([east, y0, z], [east + WALL_M, y1, ceiling]);
                 }
-                self.door(west, east, wall, z);
+                self.add_door(west, east, wall, z);
                 if room < rooms && self.rng.next_u32().is_multiple_of(2) {
                     let at = self.uniform(y0 + 1.0, y1 - 4.5);
-                    self.carve([east, at, z], [east + WALL_M, at + 3.0, z + 3.5]);
+                    self.add_opening([east, at, z], [east + WALL_M, at + 3.0, z + 3.5]);
                 }
-                self.window(west, east, if y0 < 1.0 { 0.0 } else { width - WALL_M }, z);
+                self.add_window(west, east, if y0 < 1.0 { 0.0 } else { width - WALL_M }, z);
                 west = east + WALL_M;
             }
         }
         // Walls across the corridor, each with a wide opening.
         for x in CROSS_WALLS_M {
-            self.solid([x, CORRIDOR_M[0], z], [x + WALL_M, CORRIDOR_M[1], ceiling]);
-            self.carve([x, CORRIDOR_M[0] + 0.75, z], [x + WALL_M, CORRIDOR_M[1] - 0.75, z + 4.0]);
+            self.add_solid([x, CORRIDOR_M[0], z], [x + WALL_M, CORRIDOR_M[1], ceiling]);
+            self.add_opening([x, CORRIDOR_M[0] + 0.75, z], [x + WALL_M, CORRIDOR_M[1] - 0.75, z + 4.0]);
         }
         if floor == 0 {
             let [x0, x1] = LOBBY_M;
-            self.carve([x0, WALL_M, z], [x1, CORRIDOR_M[1], ceiling]);
+            self.add_opening([x0, WALL_M, z], [x1, CORRIDOR_M[1], ceiling]);
         }
     }
 
     /// A door from the corridor into the room between `west` and `east`.
-    fn door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
+    fn add_door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
         let width = self.uniform(3.5, 4.25);
         let at = self.uniform(west + 0.75, east - 0.75 - width);
         let height = self.uniform(3.75, 4.5);
-        self.carve([at, wall, z], [at + width, wall + WALL_M, z + height]);
+        self.add_opening([at, wall, z], [at + width, wall + WALL_M, z + height]);
     }
 
-    fn window(&mut self, west: f32, east: f32, wall: f32, z: f32) {
+    fn add_window(&mut self, west: f32, east: f32, wall: f32, z: f32) {
         let at = self.uniform(west + 1.0, (west + east) / 2.0);
-        self.carve([at, wall, z + 1.0], [(at + 2.5).min(east - 0.5), wall + WALL_M, z + 2.5]);
+        self.add_opening([at, wall, z + 1.0], [(at + 2.5).min(east - 0.5), wall + WALL_M, z + 2.5]);
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn rooms_on_every_floor_are_reached_whatever_the_seed() {
         for seed in [DEFAULT_SEED, 2, 7] {
-            let map = building(seed, 0.25).unwrap();
+            let map = building_map(seed, 0.25).unwrap();
             assert_eq!(map.shape().dims, [164, 96, 196]);
             assert_eq!(map.counts().unknown, 0);
             assert_eq!(floors_reached(&map), (0..FLOORS).collect::<Vec<_>>(), "seed {seed}");
@@ -205,9 +205,9 @@ mod tests {
 
     #[test]
     fn the_seed_decides() {
-        let map = building(DEFAULT_SEED, 0.5).unwrap();
-        assert_eq!(map, building(DEFAULT_SEED, 0.5).unwrap());
-        assert_ne!(map, building(2, 0.5).unwrap());
-        assert!(building(1, 0.01).is_err() && building(1, f32::NAN).is_err());
+        let map = building_map(DEFAULT_SEED, 0.5).unwrap();
+        assert_eq!(map, building_map(DEFAULT_SEED, 0.5).unwrap());
+        assert_ne!(map, building_map(2, 0.5).unwrap());
+        assert!(building_map(1, 0.01).is_err() && building_map(1, f32::NAN).is_err());
     }
 }

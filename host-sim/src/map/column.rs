@@ -18,7 +18,7 @@ const NEAREST_COLUMN_CELLS: f32 = 3e8;
 /// Spacing of the places that [`nearest_column`] tries, metres.
 const NEAREST_COLUMN_STEP_M: f32 = 0.1;
 
-/// Why a vehicle cannot fly straight up or down between the ground and a point.
+/// Reason why a vehicle cannot fly straight up or down between the ground and a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColumnError {
     /// The point lies in an obstacle, in unknown space or outside the map.
@@ -50,7 +50,12 @@ pub enum ColumnError {
 ///
 /// # Errors
 /// The first thing that is wrong; of all that is too near, the nearest.
-pub fn column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> Result<f32, ColumnError> {
+pub fn ground_below_column(
+    map: &VoxelMap,
+    point: &Point,
+    radius_m: f32,
+    required_m: f32,
+) -> Result<f32, ColumnError> {
     let shape = &map.shape;
     if map.never_sample().is_blocked_at(point) {
         return Err(ColumnError::NotFree);
@@ -142,7 +147,7 @@ pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: 
     offsets.into_iter().take(most).find_map(|(i, j)| {
         let (x, y) = (point.x + i as f32 * NEAREST_COLUMN_STEP_M, point.y + j as f32 * NEAREST_COLUMN_STEP_M);
         let place = Point::new(round(x), round(y), point.z);
-        column(map, &place, radius_m, required_m).is_ok().then_some(place)
+        ground_below_column(map, &place, radius_m, required_m).is_ok().then_some(place)
     })
 }
 

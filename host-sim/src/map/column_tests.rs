@@ -15,7 +15,7 @@ fn uniform(rng: &mut Pcg32) -> f32 {
 fn random_map(rng: &mut Pcg32) -> OccupancyMap {
     let dims = [9, 8, 12];
     let shape = GridShape { dims, min: Point::new(-1.3, 0.4, -0.7), resolution_m: 0.2 };
-    let mut map = OccupancyMap::unknown(shape, "random").unwrap();
+    let mut map = OccupancyMap::all_unknown(shape, "random").unwrap();
     let sparse = uniform(rng) * 0.08;
     for (i, j, k) in
         (0..dims[0]).flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
@@ -46,15 +46,15 @@ fn brute_force(
     };
     let [x, y, z] = [p.x, p.y, p.z].map(f64::from);
     let [i, j, top] = shape.cell_of(p)?;
-    if map.at([i, j, top]) != Occupancy::Free {
+    if map.state_at([i, j, top]) != Occupancy::Free {
         return None;
     }
-    let below = (0..top).rev().find(|&k| match map.at([i, j, k]) {
+    let below = (0..top).rev().find(|&k| match map.state_at([i, j, k]) {
         Occupancy::Occupied => true,
         Occupancy::Unknown => unknown == Unknown::Blocked,
         Occupancy::Free => false,
     })?;
-    if map.at([i, j, below]) == Occupancy::Unknown {
+    if map.state_at([i, j, below]) == Occupancy::Unknown {
         return None;
     }
     let ground = bounds(2, below).1;
@@ -67,7 +67,7 @@ fn brute_force(
     // Beyond the map too, where that is blocked: a margin of cells all around, but below.
     let state = |c: [i64; 3]| {
         let inside = (0..3).all(|a| c[a] >= 0 && c[a] < i64::from(shape.dims[a]));
-        if inside { map.at(c.map(|c| c as u32)) } else { Occupancy::Unknown }
+        if inside { map.state_at(c.map(|c| c as u32)) } else { Occupancy::Unknown }
     };
     for k in i64::from(below) + 1..i64::from(nz) + 6 {
         for j in -6..i64::from(ny) + 6 {
@@ -107,7 +107,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                         .component_mul(&size);
                 let radius_m = 0.05 + 0.2 * uniform(&mut rng);
                 let required_m = radius_m + 0.3 * uniform(&mut rng);
-                let ours = column(&voxels, &p, radius_m, required_m);
+                let ours = ground_below_column(&voxels, &p, radius_m, required_m);
                 let expected = brute_force(&map, unknown, &p, radius_m, required_m);
                 assert_eq!(ours.is_ok(), expected.is_some(), "{p} {radius_m} {required_m}: {ours:?}");
                 match (ours, expected) {
@@ -136,7 +136,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
 #[test]
 fn what_is_wrong_with_a_column_is_named() {
     let shape = GridShape { dims: [40, 40, 40], min: Point::zeros(), resolution_m: 0.25 };
-    let mut map = OccupancyMap::unknown(shape, "room").unwrap();
+    let mut map = OccupancyMap::all_unknown(shape, "room").unwrap();
     for (i, j, k) in (0..40).flat_map(|i| (0..40).flat_map(move |j| (0..40).map(move |k| (i, j, k)))) {
         map.set([i, j, k], if k == 0 { Occupancy::Occupied } else { Occupancy::Free });
     }
@@ -145,7 +145,7 @@ fn what_is_wrong_with_a_column_is_named() {
     map.set([8, 8, 0], Occupancy::Unknown);
     map.set([30, 30, 0], Occupancy::Free);
     let voxels = map.voxel_map(Unknown::Blocked);
-    let look = |x: f32, y: f32, z: f32| column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
+    let look = |x: f32, y: f32, z: f32| ground_below_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
     assert_eq!(look(5.0, 2.0, 4.0), Ok(0.25));
     let bar = ColumnError::TooNear { place: Point::new(5.5, 5.1, 2.25), distance_m: 0.5, unknown: false };
     assert_eq!(look(5.0, 5.1, 4.0), Err(bar));

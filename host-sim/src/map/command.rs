@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::occupancy::OccupancyMap;
 use super::octree::Octree;
 use super::{MapError, RESOLUTION_RANGE_M, Source, bt, building};
-use crate::files::Results;
+use crate::files::ResultFiles;
 use crate::say;
 
 /// Planning resolution where none is given, metres.
@@ -29,7 +29,7 @@ enum Action {
         /// An OctoMap `.bt` file or `builtin:building`
         file: String,
         /// Cells of this edge, metres; a file's own resolution if absent, 0.25 for a builtin
-        #[arg(long, value_name = "METRES", value_parser = resolution)]
+        #[arg(long, value_name = "METRES", value_parser = parse_resolution)]
         resolution: Option<f32>,
         /// Print JSON
         #[arg(long)]
@@ -42,14 +42,14 @@ enum Action {
         /// The `.bt` file to write
         out: PathBuf,
         /// Cells of this edge, metres; a file's own resolution if absent, 0.25 for a builtin
-        #[arg(long, value_name = "METRES", value_parser = resolution)]
+        #[arg(long, value_name = "METRES", value_parser = parse_resolution)]
         resolution: Option<f32>,
     },
 }
 
 /// What `map info` prints.
 #[derive(Debug, Serialize)]
-pub struct Info {
+pub struct MapInfo {
     /// `"octomap"` or `"builtin"`.
     pub kind: &'static str,
     /// Edge of the smallest cell, metres.
@@ -74,9 +74,9 @@ pub struct Info {
     pub unknown_m3: f64,
 }
 
-impl Info {
+impl MapInfo {
     /// Sums up a tree that lies `shift_m` beside its keys.
-    pub fn of(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
+    pub fn from_octree(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
         let counts = tree.counts();
         let (lo, hi) = tree.key_bounds().unwrap_or_default();
         let (min_m, max_m) = tree.metric_bounds().unwrap_or_default();
@@ -123,7 +123,7 @@ impl Info {
 pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Info { file, resolution, json } => {
-            let info = info(file, *resolution)?;
+            let info = map_info(file, *resolution)?;
             say!("{}", if *json { serde_json::to_string_pretty(&info)? } else { info.text() });
         }
         Action::Convert { file, out, resolution } => {
@@ -131,13 +131,13 @@ pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
                 let expected = "a file to write that ends in `.bt`";
                 return Err(MapError::UnknownKind { file: out.display().to_string(), expected }.into());
             }
-            let mut results = Results::file(out)?;
+            let mut results = ResultFiles::single_file(out)?;
             let tree = match read(file, *resolution)?.1 {
                 Map::Grid(grid) => grid.to_octree(file)?,
                 Map::Tree(tree) => tree,
             };
             results.add_file(out, &bt::to_bytes(&tree))?;
-            results.keep()?;
+            results.commit()?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -153,7 +153,7 @@ enum Map {
 fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), MapError> {
     match (Source::parse(file)?, resolution_m) {
         (Source::Building(seed), _) => {
-            let map = building::building(seed, resolution_m.unwrap_or(DEFAULT_RESOLUTION_M))?;
+            let map = building::building_map(seed, resolution_m.unwrap_or(DEFAULT_RESOLUTION_M))?;
             Ok(("builtin", Map::Grid(map)))
         }
         (Source::Bt(path), None) => Ok(("octomap", Map::Tree(bt::read(path)?))),
@@ -163,18 +163,18 @@ fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), Ma
     }
 }
 
-fn info(file: &str, resolution_m: Option<f32>) -> Result<Info, MapError> {
+fn map_info(file: &str, resolution_m: Option<f32>) -> Result<MapInfo, MapError> {
     let (kind, map) = read(file, resolution_m)?;
     let (tree, shift) = match map {
         Map::Tree(tree) => (Some(tree), [0.0; 3]),
         Map::Grid(grid) => grid.to_shifted_octree(),
     };
     let refuse = || MapError::Grid { file: file.into(), why: "all its cells are alike".into() };
-    Ok(Info::of(kind, &tree.ok_or_else(refuse)?, shift))
+    Ok(MapInfo::from_octree(kind, &tree.ok_or_else(refuse)?, shift))
 }
 
 /// Edge of a planning cell as scenarios take it.
-fn resolution(text: &str) -> Result<f32, String> {
+fn parse_resolution(text: &str) -> Result<f32, String> {
     let given = text.parse().ok().filter(|r: &f32| RESOLUTION_RANGE_M.contains(&f64::from(*r)));
     let (least, most) = (RESOLUTION_RANGE_M.start(), RESOLUTION_RANGE_M.end());
     given.ok_or_else(|| format!("expected a number from {least} to {most}, in metres"))
@@ -197,7 +197,7 @@ mod tests {
         let file = path.to_str().unwrap();
         for resolution_m in [0.05, 0.1, 0.13, 0.15, 0.2, 0.25, 0.3, 0.43, 1.0, 7.0] {
             let grid = crate::map::load(file, resolution_m).unwrap();
-            let info = info(file, Some(resolution_m)).unwrap();
+            let info = map_info(file, Some(resolution_m)).unwrap();
             assert_eq!(info.dims, grid.shape().dims, "{resolution_m}");
             for axis in 0..3 {
                 let (from_m, to_m) = (grid.shape().min[axis], grid.shape().max()[axis]);

@@ -166,7 +166,7 @@ mod tests {
         #[test]
         fn equals_the_definition(seed in any::<u64>(), dims in [1u32..13, 1u32..13, 1u32..13], rarity in 2u64..200) {
             let shape = GridShape { dims, min: Point::new(-1.0, 2.0, 0.5), resolution_m: 0.5 };
-            let mut map = OccupancyMap::unknown(shape, "random").unwrap();
+            let mut map = OccupancyMap::all_unknown(shape, "random").unwrap();
             let all: Vec<[u32; 3]> = (0..dims[0])
                 .flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| [i, j, k])))
                 .collect();
@@ -194,7 +194,7 @@ mod tests {
     fn beyond_the_faces() {
         let shape = GridShape { dims: [8, 8, 8], min: Point::zeros(), resolution_m: 1.0 };
         let map = {
-            let mut map = OccupancyMap::unknown(shape, "cube").unwrap();
+            let mut map = OccupancyMap::all_unknown(shape, "cube").unwrap();
             for cell in 0..512 {
                 map.set([cell % 8, cell / 8 % 8, cell / 64], Occupancy::Free);
             }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::quote::{quoted, quoted_path};
 
-/// Why a map could not be read, made or written.
+/// Reason why a map could not be read, made or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The file system said no.
@@ -48,7 +48,7 @@ pub enum MapError {
 }
 
 impl MapError {
-    pub(super) fn io(action: &'static str, file: &Path, source: std::io::Error) -> Self {
+    pub(super) fn from_io(action: &'static str, file: &Path, source: std::io::Error) -> Self {
         Self::Io { action, file: file.into(), source }
     }
 }

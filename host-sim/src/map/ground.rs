@@ -14,7 +14,7 @@ const MAX_GROUND_CELLS: f32 = 4e6;
 ///
 /// # Errors
 /// It is larger than a map can be.
-pub fn level(low: &Point, high: &Point, cell_m: f32) -> Result<OccupancyMap, MapError> {
+pub fn level_ground_map(low: &Point, high: &Point, cell_m: f32) -> Result<OccupancyMap, MapError> {
     let size = high - low;
     let mut cell_m = cell_m;
     let dims = |cell_m: f32| [size.x, size.y, size.z].map(|side| (side / cell_m).ceil().max(1.0));
@@ -27,7 +27,7 @@ pub fn level(low: &Point, high: &Point, cell_m: f32) -> Result<OccupancyMap, Map
         min: Point::new(low.x, low.y, low.z - cell_m),
         resolution_m: cell_m,
     };
-    let mut map = OccupancyMap::unknown(shape, "the ground")?;
+    let mut map = OccupancyMap::all_unknown(shape, "the ground")?;
     map.fill([0, 0, 1], [x, y, z + 1], Occupancy::Free);
     map.fill([0, 0, 0], [x, y, 1], Occupancy::Occupied);
     Ok(map)

@@ -18,7 +18,7 @@ use std::path::Path;
 pub use boxes::BoxTree;
 pub use edt::ClearanceField;
 pub use error::MapError;
-pub use ground::level;
+pub use ground::level_ground_map;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 
@@ -59,7 +59,7 @@ impl<'a> Source<'a> {
 /// Loads a map at the planning resolution. `file` is a builtin's name, or a path (relative to the working directory).
 pub fn load(file: &str, resolution_m: f32) -> Result<OccupancyMap, MapError> {
     match Source::parse(file)? {
-        Source::Building(seed) => building::building(seed, resolution_m),
+        Source::Building(seed) => building::building_map(seed, resolution_m),
         Source::Bt(path) => OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file),
     }
 }

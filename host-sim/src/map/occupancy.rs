@@ -49,7 +49,7 @@ pub struct CellCounts {
 
 impl OccupancyMap {
     /// A map of unknown cells. `name` is the map's, for the error when the grid is too large.
-    pub fn unknown(shape: GridShape, name: &str) -> Result<Self, MapError> {
+    pub fn all_unknown(shape: GridShape, name: &str) -> Result<Self, MapError> {
         let cells = shape.dims.iter().map(|&d| u64::from(d)).product::<u64>();
         if shape.dims.iter().any(|&d| d == 0 || d > MAX_DIM) || cells > MAX_CELLS {
             let [x, y, z] = shape.dims;
@@ -87,7 +87,7 @@ impl OccupancyMap {
         let dims = span.map(|s| s.min(f64::from(u32::MAX)) as u32);
         let corner = lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
         let shape = GridShape { dims, min: Point::from(corner), resolution_m };
-        let mut map = Self::unknown(shape, name)?;
+        let mut map = Self::all_unknown(shape, name)?;
         // Share of each cell that is known to be free, by volume.
         let mut free_share = vec![0f32; dims.iter().map(|&d| d as usize).product()];
         tree.for_each_leaf(|leaf| {
@@ -127,7 +127,7 @@ impl OccupancyMap {
         for k in 0..dims[2] {
             for j in 0..dims[1] {
                 for i in 0..dims[0] {
-                    if free_share[at] >= whole && self.at([i, j, k]) == Occupancy::Unknown {
+                    if free_share[at] >= whole && self.state_at([i, j, k]) == Occupancy::Unknown {
                         self.set([i, j, k], Occupancy::Free);
                     }
                     at += 1;
@@ -166,7 +166,7 @@ impl OccupancyMap {
             min[axis] = key as u32;
             shift[axis] = (cells - (key - f64::from(KEY_ORIGIN))) * resolution;
         }
-        (Octree::from_cells(resolution, min, self.shape.dims, |cell| self.at(cell)), shift)
+        (Octree::from_cells(resolution, min, self.shape.dims, |cell| self.state_at(cell)), shift)
     }
 
     /// Shape and place.
@@ -175,7 +175,7 @@ impl OccupancyMap {
     }
 
     /// State of a cell. Panics outside the grid.
-    pub fn at(&self, cell: [u32; 3]) -> Occupancy {
+    pub fn state_at(&self, cell: [u32; 3]) -> Occupancy {
         let (word, mask) = self.shape.address(cell);
         if self.occupied[word] & mask != 0 {
             Occupancy::Occupied
@@ -225,7 +225,7 @@ impl OccupancyMap {
 
     /// The bit grids to plan on.
     pub fn voxel_map(&self, unknown: Unknown) -> VoxelMap {
-        let inside = self.inside();
+        let inside = self.inside_mask();
         let not_free: Vec<u64> = self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();
         let occupied = self.occupied.clone();
         let (words, seen, never_sample, outside) = match unknown {
@@ -236,7 +236,7 @@ impl OccupancyMap {
     }
 
     /// Bits of the cells inside the dimensions; the last brick of a row may be wider.
-    fn inside(&self) -> Vec<u64> {
+    fn inside_mask(&self) -> Vec<u64> {
         let mut words = Vec::with_capacity(self.free.len());
         let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, 0, self.shape.dims[axis]));
         for (_, z) in &zs {
@@ -367,7 +367,7 @@ mod tests {
             for (i, j, k) in (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))
             {
                 let want = expected(&tree, map.shape(), [i, j, k]);
-                assert_eq!(map.at([i, j, k]), want, "resolution {resolution}, cell {:?}", (i, j, k));
+                assert_eq!(map.state_at([i, j, k]), want, "resolution {resolution}, cell {:?}", (i, j, k));
             }
         }
     }
@@ -408,7 +408,7 @@ mod tests {
     #[test]
     fn the_ground_is_the_first_obstacle_below() {
         let shape = GridShape { dims: [3, 1, 8], min: Point::new(0.0, 0.0, -1.0), resolution_m: 0.5 };
-        let mut map = OccupancyMap::unknown(shape, "column").unwrap();
+        let mut map = OccupancyMap::all_unknown(shape, "column").unwrap();
         for (i, k) in (0..3).flat_map(|i| (0..8).map(move |k| (i, k))) {
             let solid = (i == 0 && (k == 0 || k == 4)) || (i == 1 && k == 7);
             map.set([i, 0, k], if solid { Occupancy::Occupied } else { Occupancy::Free });

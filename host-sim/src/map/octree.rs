@@ -127,7 +127,7 @@ impl Octree {
 
     fn walk(&self, node: Inner, min: [u32; 3], size: u32, visit: &mut impl FnMut(Leaf)) {
         for index in 0..8 {
-            let child_min = octant(min, size, index);
+            let child_min = octant_corner(min, size, index);
             match node.child(index) {
                 UNKNOWN => {}
                 INNER => self.walk(self.inner[node.inner_index(index)], child_min, size / 2, visit),
@@ -155,7 +155,7 @@ impl Octree {
     }
 
     /// Occupancy of a point, metres in the map's frame.
-    pub fn at(&self, point: [f64; 3]) -> Occupancy {
+    pub fn occupancy_at(&self, point: [f64; 3]) -> Occupancy {
         let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
         if key.iter().all(|k| (0.0..f64::from(KEYS_PER_AXIS)).contains(k)) {
             self.at_key(key.map(|k| k as u32))
@@ -203,7 +203,7 @@ impl Octree {
 }
 
 /// Lowest corner of the octant `index` (x in bit 0, y in bit 1, z in bit 2) with edge `size`.
-fn octant(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
+fn octant_corner(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
     [0, 1, 2].map(|axis| min[axis] + (index >> axis & 1) * size)
 }
 
@@ -236,7 +236,7 @@ impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
         let mut children = 0;
         let mut inner = heapless::Vec::<Inner, 8>::new();
         for index in 0..8 {
-            let code = match self.build(octant(corner, size / 2, index), size / 2) {
+            let code = match self.build(octant_corner(corner, size / 2, index), size / 2) {
                 Child::Leaf(kind) => kind,
                 Child::Inner(node) => {
                     inner.push(node).expect("a node has eight children");
@@ -277,11 +277,11 @@ mod tests {
         assert_eq!((counts.free_leaves, counts.occupied_leaves), (1, 1));
         assert_eq!((counts.free_m3, counts.occupied_m3), (8.0, 0.125));
         assert_eq!(tree.metric_bounds(), Some(([0.0; 3], [2.5, 2.0, 2.0])));
-        assert_eq!(tree.at([1.99, 0.0, 1.0]), Occupancy::Free);
-        assert_eq!(tree.at([2.0, 0.0, 0.0]), Occupancy::Occupied);
-        assert_eq!(tree.at([2.0, 0.6, 0.0]), Occupancy::Unknown);
-        assert_eq!(tree.at([f64::NAN, 0.0, 0.0]), Occupancy::Unknown);
-        assert_eq!(tree.at([1e30, 0.0, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.occupancy_at([1.99, 0.0, 1.0]), Occupancy::Free);
+        assert_eq!(tree.occupancy_at([2.0, 0.0, 0.0]), Occupancy::Occupied);
+        assert_eq!(tree.occupancy_at([2.0, 0.6, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.occupancy_at([f64::NAN, 0.0, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.occupancy_at([1e30, 0.0, 0.0]), Occupancy::Unknown);
     }
 
     #[test]

@@ -40,7 +40,7 @@ fn real_maps_read_as_octomap_reads_them() {
         let queries = want["queries"].as_array().unwrap();
         assert_eq!(queries.len(), 60);
         for query in queries {
-            let state = match tree.at([0, 1, 2].map(|a| query[a].as_f64().unwrap())) {
+            let state = match tree.occupancy_at([0, 1, 2].map(|a| query[a].as_f64().unwrap())) {
                 Occupancy::Unknown => -1,
                 Occupancy::Free => 0,
                 Occupancy::Occupied => 1,

@@ -7,26 +7,26 @@ use companion::PlanFailure;
 use companion::margins::TRACKING_M;
 use companion::planner::coverage::{self, Error, Request, Workspace};
 use companion::storage::mission_file::coverage::{
-    CoverageHeader, CoverageParts, CoverageView, Ground, Parts, Share,
+    CoverageHeader, CoverageParts, CoverageView, Ground, PartEligibility, VehicleShare,
 };
-use companion::storage::mission_file::{Block, Kind};
-use companion::swarm::fleet::Lot;
+use companion::storage::mission_file::{MissionBlock, MissionKind};
+use companion::swarm::fleet::DivisionInput;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
-use planner_core::coverage::pack::Unit;
+use planner_core::coverage::pack::TrackUnit;
 use planner_core::coverage::transit::Transit;
-use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::field::FieldView;
-use planner_core::flight::{PathError, Range};
+use planner_core::flight::{PathError, WaypointRange};
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
 use super::ready::{Mission, OwnPlan, SwarmPlan, schedule_config};
 use crate::area::MAX_VERTICES;
-use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
+use crate::capacity::{BOARD_CORNERS, BoardCapacity, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
-use crate::coverage::{MAX_CORNERS, MAX_LANES, MAX_VEHICLES as COVERAGE_VEHICLES, Planned};
+use crate::coverage::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES as COVERAGE_VEHICLES};
 use crate::scenario::coverage::{Method, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
@@ -40,8 +40,11 @@ const AROUND_AREA_M: f32 = 30.0;
 type DeskWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 
 /// The mission up to its files.
-pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> anyhow::Result<Mission> {
-    let planned = Planned::flown(&scenario)?;
+pub(super) fn prepare(
+    mut scenario: Scenario,
+    board: Option<&'static BoardCapacity>,
+) -> anyhow::Result<Mission> {
+    let planned = CoveragePlan::plan_as_companions(&scenario)?;
     let Some(shares) = planned.shares.clone() else {
         bail!(
             "cannot be flown: {}: companions give parts to vehicles by the least sum of their ways, and those of method \"exact\" would then \
@@ -49,13 +52,13 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
             scenario.path
         );
     };
-    let map = ground(&planned)?;
+    let map = ground_map(&planned)?;
     let routes = planned.plan.clone();
-    let climbs: Vec<Share> = planned
+    let climbs: Vec<VehicleShare> = planned
         .vehicles
         .iter()
         .zip(&shares)
-        .map(|(v, &weight)| Share { weight, climb_mps: v.climb_mps, descend_mps: v.descend_mps })
+        .map(|(v, &weight)| VehicleShare { weight, climb_mps: v.climb_mps, descend_mps: v.descend_mps })
         .collect();
     check_batteries(&planned)?;
     check_height(&planned)?;
@@ -64,7 +67,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
     }
-    // Over fields there is nothing but the others to keep clear of: each may stray half of what lies between.
+    // Over fields there is nothing but the others to keep clear of: each may deviate half of what lies between.
     let stray_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
@@ -97,14 +100,14 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
 
 /// No vehicle is sent out for longer than its simulated battery lasts until it has to land:
 /// companions fly a route whole.
-fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
+fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
         let cruise_mps = planned.vehicles[index].cruise_mps;
-        let beyond_hover = sim_autopilot::cruise_load(cruise_mps) - 1.0;
-        let takes_s = sorties::flown_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
-        let lasts_s = sorties::lasts_s(vehicle);
+        let beyond_hover = sim_autopilot::power_ratio_at_speed(cruise_mps) - 1.0;
+        let takes_s = sorties::route_duration_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
+        let lasts_s = sorties::battery_duration_s(vehicle);
         if takes_s > USABLE_CHARGE * lasts_s {
             let hint = match planned.wanted.batteries {
                 true => "`cover` writes a plan for each sortie, which autopilots fly without a companion",
@@ -125,11 +128,11 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whoever believes to be at the height of the pictures is over the ground.
-fn check_height(planned: &Planned<'_>) -> anyhow::Result<()> {
+/// A vehicle that believes to be at the height of the pictures must be above the ground.
+fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = above_ground_m(planned.wanted);
     for vehicle in &planned.scenario.vehicles {
-        let lower_m = margins::lower_m(planned.scenario.simulation.estimator, vehicle.personality);
+        let lower_m = margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.personality);
         let least_m = lower_m + vehicle.radius_m + TRACKING_M;
         if height_m < least_m {
             bail!(
@@ -143,14 +146,14 @@ fn check_height(planned: &Planned<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// How its work is divided.
-pub fn method(scenario: &Scenario) -> Method {
+/// Method by which the work is divided.
+pub fn division_method(scenario: &Scenario) -> Method {
     scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
 
 /// The ground as the mission file has it.
 fn ground_of(area: &scenario::coverage::Area, terrain: &Terrain) -> anyhow::Result<Ground> {
-    let [low_m, high_m] = uneven_m(terrain)?;
+    let [low_m, high_m] = ground_height_range_m(terrain)?;
     Ok(Ground { height_m: area.height_m, tolerance_m: terrain.tolerance_m, low_m, high_m })
 }
 
@@ -160,14 +163,14 @@ fn above_ground_m(area: &scenario::coverage::Area) -> f32 {
 }
 
 /// The lowest and the highest ground below an area, where it is not level, metres above the origin.
-fn uneven_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
+fn ground_height_range_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
     let field = FieldView::parse(&terrain.field).map_err(|error| anyhow!("no field: {error}"))?;
     let [low_m, high_m] = terrain.grid.range_m().context("no ground")?;
     Ok([low_m, high_m.min(field.highest_m())])
 }
 
 /// Level ground below area and pads, as low as it is anywhere: the map of a flight over terrain has that beside.
-fn ground(planned: &Planned<'_>) -> anyhow::Result<map::OccupancyMap> {
+fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
     let places = planned.wanted.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
     let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
     for place in places {
@@ -179,32 +182,32 @@ fn ground(planned: &Planned<'_>) -> anyhow::Result<map::OccupancyMap> {
     let around = Point::new(AROUND_AREA_M, AROUND_AREA_M, 0.0);
     high.z += AROUND_AREA_M;
     if let Some(terrain) = &planned.wanted.terrain {
-        low.z = uneven_m(terrain)?[0];
+        low.z = ground_height_range_m(terrain)?[0];
     }
     let cell_m = planned.scenario.map.resolution_m;
-    Ok(map::level(&(low - around), &(high + around), cell_m)?)
+    Ok(map::level_ground_map(&(low - around), &(high + around), cell_m)?)
 }
 
 impl Mission {
     /// Writes the mission file.
-    fn encode_area(&mut self, shares: &[Share]) -> anyhow::Result<()> {
+    fn encode_area(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
         let Some(area) = &self.scenario.area else { return Ok(()) };
-        let parts = match method(&self.scenario) {
-            Method::PowellBinpat | Method::Exact => Parts::Anyone,
+        let parts = match division_method(&self.scenario) {
+            Method::PowellBinpat | Method::Exact => PartEligibility::Anyone,
             Method::SimpleBinpat | Method::Binpat => {
                 let alike = shares.iter().all(|share| share.weight == shares[0].weight);
-                if alike { Parts::Anyone } else { Parts::SameWeight }
+                if alike { PartEligibility::Anyone } else { PartEligibility::SameWeight }
             }
         };
         let header = CoverageHeader {
             unit: match area.method {
-                Method::SimpleBinpat => Unit::Lane,
-                _ => Unit::Waypoint,
+                Method::SimpleBinpat => TrackUnit::Lane,
+                _ => TrackUnit::Waypoint,
             },
             parts,
             heading: area.heading,
             trigger: area.trigger,
-            looks: coverage::MAX_ORDER_CHANGES,
+            search_steps: coverage::MAX_ORDER_CHANGES,
             heights: area.heights,
             spacing: area.usable,
             angle_deg: area.angle_deg,
@@ -212,7 +215,7 @@ impl Mission {
             ground: area.terrain.as_ref().map(|terrain| ground_of(area, terrain)).transpose()?,
         };
         let (rings, vertices) = (&area.rings[..], &area.vertices[..]);
-        let block = Block::Coverage(CoverageParts { header, shares, rings, vertices });
+        let block = MissionBlock::Coverage(CoverageParts { header, shares, rings, vertices });
         self.mission_file = self.encode(&block)?;
         Ok(())
     }
@@ -220,33 +223,33 @@ impl Mission {
     /// Plans as every companion does.
     fn plan_area<'l>(
         &self,
-        done: &[Range],
-        losses: impl Iterator<Item = &'l [Lot]>,
+        done: &[WaypointRange],
+        losses: impl Iterator<Item = &'l [DivisionInput]>,
         ws: &mut DeskWorkspace,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         let mission = self.mission_view();
-        let Kind::Coverage(view) = mission.kind() else { bail!("no area: {}", self.scenario.path) };
+        let MissionKind::Coverage(view) = mission.kind() else { bail!("no area: {}", self.scenario.path) };
         let mut schedule = on_heap(ScheduleWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
-        coverage::plan::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, VEHICLES, WAYPOINTS>(
+        coverage::plan_flights::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, VEHICLES, WAYPOINTS>(
             &Request {
                 mission: &mission,
                 view,
-                field: self.field(),
-                gates_most: self.board.map_or(GATES, |board| board.gates),
-                done,
+                field: self.height_field(),
+                max_gates: self.board.map_or(GATES, |board| board.gates),
+                photographed: done,
             },
             losses,
             ws,
             &mut schedule,
             &mut plan,
         )
-        .map_err(|error| self.explained(&error))?;
+        .map_err(|error| self.explain_error(&error))?;
         Ok(plan)
     }
 
     /// The heights to fly above, as a board reads them; none over level ground.
-    fn field(&self) -> Option<FieldView<'_>> {
+    fn height_field(&self) -> Option<FieldView<'_>> {
         FieldView::parse(&self.roadmap_file).ok()
     }
 
@@ -258,27 +261,27 @@ impl Mission {
     /// The plan of what is left when these waypoints are photographed, after these losses.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Reason why there is none.
     pub fn plan_rest<'l>(
         &self,
-        done: &[Range],
-        losses: impl Iterator<Item = &'l [Lot]>,
+        done: &[WaypointRange],
+        losses: impl Iterator<Item = &'l [DivisionInput]>,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         self.plan_area(done, losses, &mut on_heap(DeskWorkspace::new))
     }
 
-    /// A vehicle's way home over the area, or aside.
-    pub(super) fn around(
+    /// A vehicle's path home over the area, or aside.
+    pub(super) fn plan_area_detour(
         &self,
         request: &DetourRequest,
-        obstacles: &mut [KeepOff],
+        obstacles: &mut [KeepOutZone],
     ) -> Result<Box<OwnPlan>, PlanFailure> {
         let mission = self.mission_view();
-        let Kind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
+        let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
         let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
-        coverage::around::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, WAYPOINTS, GATES>(
+        coverage::plan_detour::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, WAYPOINTS, GATES>(
             view,
-            self.field(),
+            self.height_field(),
             request,
             obstacles,
             &mut ws,
@@ -288,9 +291,9 @@ impl Mission {
     }
 
     /// The first of a board's limits that the area exceeds.
-    pub(super) fn area_excess(&self, view: &CoverageView<'_>, board: &Board) -> Option<String> {
+    pub(super) fn area_excess(&self, view: &CoverageView<'_>, board: &BoardCapacity) -> Option<String> {
         let (vertices, rings): (Vec<_>, Vec<_>) = (view.vertices().collect(), view.rings().collect());
-        let zones = Area::new(&vertices, &rings).map(|area| Transit::<BOARD_CORNERS>::empty().learn(area));
+        let zones = Area::new(&vertices, &rings).map(|area| Transit::<BOARD_CORNERS>::empty().set_area(area));
         if matches!(zones, Ok(Err(_))) {
             return Some(format!(
                 "more outward corners of no-fly zones, {} holds {BOARD_CORNERS}",
@@ -304,7 +307,7 @@ impl Mission {
         }
     }
 
-    fn explained(&self, error: &Error) -> anyhow::Error {
+    fn explain_error(&self, error: &Error) -> anyhow::Error {
         let path = &self.scenario.path;
         match error {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(

@@ -2,25 +2,25 @@
 //! another one, with which it would take off with nobody.
 
 use companion::planner;
-use companion::storage::mission_file::Kind;
+use companion::storage::mission_file::MissionKind;
 use planner_core::flight::PathError;
 use planner_core::plan::{self, PlanError, PlanWorkspace};
 use planner_core::schedule::ScheduleError;
 
 use super::ready::{Mission, SwarmPlan};
-use crate::capacity::{Board, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
+use crate::capacity::{BoardCapacity, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
 
 impl Mission {
     /// The first of a board's limits that the mission exceeds.
-    pub fn excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
+    pub fn board_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
         let mission = self.mission_view();
         let of_mission = || board.mission_excess(&mission);
         match mission.kind() {
-            Kind::Goals => board
+            MissionKind::Goals => board
                 .roadmap_excess(&self.view())
                 .or_else(of_mission)
-                .or_else(|| self.plan_excess(plan, board)),
-            Kind::Coverage(area) => {
+                .or_else(|| self.plan_limit_exceeded(plan, board)),
+            MissionKind::Coverage(area) => {
                 let gates = |i| self.own_plan(plan, i).map_or(usize::MAX, |own| own.gates.len());
                 let most = (0..self.tasks.len()).map(gates).max().unwrap_or(0);
                 self.area_excess(area, board).or_else(of_mission).or_else(|| board.gates_excess(most))
@@ -29,11 +29,13 @@ impl Mission {
     }
 
     /// The first reason why a board cannot make the same plan.
-    fn plan_excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
+    fn plan_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
         let planned = if board.nodes == NUCLEO_H743.nodes {
-            self.crc_on::<{ NUCLEO_H743.nodes }, { NUCLEO_H743.vehicles }, { NUCLEO_H743.pieces }>(board)
+            self.plan_crc_on_board::<{ NUCLEO_H743.nodes }, { NUCLEO_H743.vehicles }, { NUCLEO_H743.pieces }>(
+                board,
+            )
         } else {
-            self.crc_on::<{ HALF.nodes }, { HALF.vehicles }, { HALF.pieces }>(board)
+            self.plan_crc_on_board::<{ HALF.nodes }, { HALF.vehicles }, { HALF.pieces }>(board)
         };
         let name = board.name;
         match planned {
@@ -57,13 +59,20 @@ impl Mission {
     }
 
     /// The CRC of the plan that is found with the memory of a board.
-    fn crc_on<const N: usize, const V: usize, const P: usize>(
+    fn plan_crc_on_board<const N: usize, const V: usize, const P: usize>(
         &self,
-        board: &Board,
+        board: &BoardCapacity,
     ) -> Result<u32, PlanError> {
         let mut workspace = on_heap(PlanWorkspace::<N, V, P>::new);
         let mut plan = on_heap(plan::SwarmPlan::<V, WAYPOINTS>::new);
-        planner::goals(&self.mission_view(), &self.view(), board.gates, &mut workspace, &mut plan, |_| {})?;
+        planner::plan_goals(
+            &self.mission_view(),
+            &self.view(),
+            board.gates,
+            &mut workspace,
+            &mut plan,
+            |_| {},
+        )?;
         Ok(plan.crc)
     }
 }

@@ -11,9 +11,9 @@ use planner_core::schedule::ScheduleConfig;
 use planner_core::segment::segment_is_clear;
 
 use crate::map::VoxelMap;
-use crate::map::column::{ColumnError, column, nearest_column};
-use crate::roadmap::passages::Wanted;
-use crate::roadmap::{self, Parts, Roadmap};
+use crate::map::column::{ColumnError, ground_below_column, nearest_column};
+use crate::roadmap::passages::WantedConnection;
+use crate::roadmap::{self, BuildTimes, Roadmap};
 use crate::scenario::{self, Scenario, Terminals};
 
 /// Spacing of the places tried as slots around a single goal, metres.
@@ -29,7 +29,7 @@ pub(super) fn height_over_ground(
     radius_m: f32,
 ) -> anyhow::Result<f32> {
     let required_m = radius_m + scenario.roadmap.safety_margin_m;
-    let error = match column(map, point, radius_m, required_m) {
+    let error = match ground_below_column(map, point, radius_m, required_m) {
         Ok(ground_m) => return Ok(point.z - ground_m - radius_m),
         Err(error) => error,
     };
@@ -69,7 +69,7 @@ pub(super) fn height_over_ground(
     }
 }
 
-pub(super) fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
+pub(super) fn vehicle_tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
     let task = |(i, vehicle): (usize, &scenario::Vehicle)| {
         let place = scenario.vehicle_places.get(i);
         let what = format!("start of vehicle {}", vehicle.id);
@@ -84,7 +84,7 @@ pub(super) fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<V
 }
 
 /// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough apart to land in.
-pub(super) fn goals(
+pub(super) fn goal_points(
     scenario: &Scenario,
     map: &VoxelMap,
     schedule: &ScheduleConfig,
@@ -108,9 +108,9 @@ pub(super) fn goals(
         let slot = goal + Point::new(i as f32, j as f32, 0.0) * SLOT_GRID_M;
         let apart = slots.iter().all(|s| (s - slot).norm() >= apart_m);
         if apart
-            && scenario.mission.geofence.as_ref().is_none_or(|fence| fence.holds(&slot))
+            && scenario.mission.geofence.as_ref().is_none_or(|fence| fence.contains(&slot))
             && segment_is_clear(&map.grid(), &goal, &slot, required_m)
-            && column(map, &slot, largest_m, required_m).is_ok()
+            && ground_below_column(map, &slot, largest_m, required_m).is_ok()
         {
             slots.push(slot);
             if slots.len() == wanted {
@@ -145,21 +145,21 @@ fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32
 }
 
 /// Which starts and goals are to be joined: a vehicle and its own goal, or else each of them with each.
-fn wanted(scenario: &Scenario, goals: usize) -> Vec<Wanted> {
+fn wanted_connections(scenario: &Scenario, goals: usize) -> Vec<WantedConnection> {
     let vehicles = scenario.vehicles.len();
     let pairs = scenario.vehicles.iter().enumerate().flat_map(|(start, vehicle)| {
         let required_m = vehicle.radius_m + scenario.roadmap.safety_margin_m;
         let own = move |goal: &usize| vehicle.goal.is_none_or(|own| own == *goal);
-        (0..goals).filter(own).map(move |goal| Wanted { start, goal: vehicles + goal, required_m })
+        (0..goals).filter(own).map(move |goal| WantedConnection { start, goal: vehicles + goal, required_m })
     });
     pairs.collect()
 }
 
-pub(super) fn build(
+pub(super) fn build_roadmap(
     scenario: &Scenario,
     map: &VoxelMap,
     goals: &[Point],
-) -> anyhow::Result<(Roadmap, RoadmapHeader, Parts)> {
+) -> anyhow::Result<(Roadmap, RoadmapHeader, BuildTimes)> {
     let starts = scenario.vehicles.iter().map(|v| v.start);
     let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
     let settings = &scenario.roadmap;
@@ -184,7 +184,7 @@ pub(super) fn build(
     keep_apart(&mut roadmap);
     if settings.passages {
         let searching = Instant::now();
-        roadmap::add_passages(map, &mut roadmap, &config, &wanted(scenario, goals.len()))?;
+        roadmap::add_passages(map, &mut roadmap, &config, &wanted_connections(scenario, goals.len()))?;
         keep_apart(&mut roadmap);
         parts.passages_s = searching.elapsed().as_secs_f64();
     }

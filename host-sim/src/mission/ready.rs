@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use anyhow::anyhow;
-use companion::storage::mission_file::{self, Block, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::mission_file::{self, MissionBlock, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
@@ -11,7 +11,7 @@ use planner_core::plan::{self, Mode, Objective, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleConfig, ScheduleError};
 
-use crate::capacity::{Board, GATES, VEHICLES, WAYPOINTS};
+use crate::capacity::{BoardCapacity, GATES, VEHICLES, WAYPOINTS};
 use crate::map::{ClearanceField, VoxelMap};
 use crate::margins;
 use crate::result::{RoadmapSize, Timing};
@@ -52,7 +52,7 @@ pub struct Mission {
     /// Computing times so far.
     pub timing: Timing,
     /// The board that the files are for; none if they are for the desk.
-    pub(super) board: Option<&'static Board>,
+    pub(super) board: Option<&'static BoardCapacity>,
     pub(super) clearance_field: OnceLock<ClearanceField>,
 }
 
@@ -77,7 +77,7 @@ impl Mission {
         map: VoxelMap,
         tasks: Vec<VehicleTask>,
         schedule: ScheduleConfig,
-        board: Option<&'static Board>,
+        board: Option<&'static BoardCapacity>,
     ) -> Self {
         Self {
             scenario,
@@ -100,7 +100,7 @@ impl Mission {
         self.clearance_field.get_or_init(|| ClearanceField::new(&self.map.grid()))
     }
 
-    /// Separation and nominal speeds that the mission file carries; [`Mission::separate`] changes them.
+    /// Separation and nominal speeds that the mission file carries; [`Mission::set_separation`] changes them.
     pub fn schedule(&self) -> &ScheduleConfig {
         &self.schedule
     }
@@ -115,7 +115,7 @@ impl Mission {
 
     /// The roadmap as a board reads it; the whole file is checked at each call.
     pub fn view(&self) -> RoadmapView<'_> {
-        parsed(&self.roadmap_file)
+        parse_roadmap(&self.roadmap_file)
     }
 
     /// Height of what a vehicle comes to stand on that sinks from a place, metres; none beside the map.
@@ -147,7 +147,7 @@ impl Mission {
     }
 
     /// Place of the centre of a vehicle's body while it stands on its pad.
-    pub fn pad(&self, index: usize) -> Geodetic {
+    pub fn pad_position(&self, index: usize) -> Geodetic {
         let start = self.scenario.vehicles[index].start;
         let pad = start - Point::new(0.0, 0.0, self.tasks[index].climb_m);
         enu_to_geodetic(&self.scenario.map.origin, &pad)
@@ -158,7 +158,7 @@ impl Mission {
         MissionView::parse(&self.mission_file).expect("we wrote it ourselves")
     }
 
-    pub(super) fn encode(&self, block: &Block<'_>) -> anyhow::Result<Vec<u8>> {
+    pub(super) fn encode(&self, block: &MissionBlock<'_>) -> anyhow::Result<Vec<u8>> {
         let scenario = &self.scenario;
         let header = MissionHeader {
             roadmap_crc: self.roadmap_file.last_chunk().map_or(0, |crc| u32::from_le_bytes(*crc)),
@@ -183,13 +183,13 @@ impl Mission {
             })
             .collect();
         let mut bytes = vec![0; block.file_len(vehicles.len())];
-        mission_file::write(&header, &vehicles, block, &mut bytes)
+        mission_file::write_mission(&header, &vehicles, block, &mut bytes)
             .map_err(|e| anyhow!("no mission file: {}: {e}", scenario.path))?;
         Ok(bytes)
     }
 }
 
-fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {
+fn parse_roadmap(roadmap_file: &[u8]) -> RoadmapView<'_> {
     RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 

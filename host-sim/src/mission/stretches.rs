@@ -1,7 +1,7 @@
 //! Routes with more lanes than a path holds: how often all divide what is left, if nobody is lost.
 
 use anyhow::bail;
-use companion::swarm::fleet::{COMMITMENT_S, Lot, MAX_DIVISIONS};
+use companion::swarm::fleet::{COMMITMENT_S, DivisionInput, MAX_DIVISIONS};
 use planner_core::flight::{Flight, Task};
 
 use super::ready::{Mission, SwarmPlan};
@@ -13,45 +13,47 @@ const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 /// Time at which a flight will ask for a division by its plan, seconds after the plan began; none if its route ends with its path.
 fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
-    let end_m = photographs.end_m(&flight.path).filter(|_| photographs.goes_on)?;
+    let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.goes_on)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
-    Some(flight.depart_s + end.at_s - COMMITMENT_S)
+    Some(flight.depart_s + end.arrive_s - COMMITMENT_S)
 }
 
 /// Lot of a flight if all are to hold `t_s` seconds after the plan began.
-fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
+fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
     let waypoints = flight.path.waypoints();
     let flown_s = t_s - flight.depart_s;
-    let Some(next) = waypoints.iter().position(|waypoint| waypoint.at_s > flown_s) else {
-        return Lot {
-            lives: !flight.task.flies(),
-            along_dm: if flight.task.flies() { Lot::WHOLE_PATH } else { 0 },
+    let Some(next) = waypoints.iter().position(|waypoint| waypoint.arrive_s > flown_s) else {
+        return DivisionInput {
+            alive: !flight.task.leaves_pad(),
+            along_dm: if flight.task.leaves_pad() { DivisionInput::WHOLE_PATH } else { 0 },
         };
     };
     let on_pad = flight.climb_m > 0.0 && (next == 0 || flown_s <= 0.0);
-    if !flight.task.flies() || on_pad {
-        return Lot { lives: true, along_dm: 0 };
+    if !flight.task.leaves_pad() || on_pad {
+        return DivisionInput { alive: true, along_dm: 0 };
     }
     let along_m = match next.checked_sub(1).map(|before| (waypoints[before], waypoints[next])) {
-        Some((a, b)) => a.along_m + (b.along_m - a.along_m) * (flown_s - a.at_s) / (b.at_s - a.at_s),
+        Some((a, b)) => {
+            a.along_m + (b.along_m - a.along_m) * (flown_s - a.arrive_s) / (b.arrive_s - a.arrive_s)
+        }
         None => 0.0,
     };
-    Lot { lives: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
+    DivisionInput { alive: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
 }
 
-/// Lots when the first vehicle of a plan requests a division, by rank; none where no route goes on.
-pub fn next_lots(plan: &SwarmPlan) -> Option<Vec<Lot>> {
+/// Lots when the first vehicle of a plan requests a division, by rank; none where no route continues.
+pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
     let hold_s = plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
     flights.sort_by_key(|flight| flight.id);
-    Some(flights.into_iter().map(|flight| lot(flight, hold_s)).collect())
+    Some(flights.into_iter().map(|flight| division_input_at(flight, hold_s)).collect())
 }
 
 impl Mission {
     /// The divisions that routes need if nobody is lost are fewer than vehicles may agree on.
     pub(super) fn check_stretches(&self, plan: &SwarmPlan) -> anyhow::Result<()> {
-        let mut losses: Vec<Vec<Lot>> = Vec::new();
-        let mut next = next_lots(plan);
+        let mut losses: Vec<Vec<DivisionInput>> = Vec::new();
+        let mut next = next_division_inputs(plan);
         while let Some(lots) = next {
             losses.push(lots);
             if losses.len() > MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES {
@@ -62,7 +64,7 @@ impl Mission {
                     MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES
                 );
             }
-            next = next_lots(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);
+            next = next_division_inputs(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);
         }
         Ok(())
     }

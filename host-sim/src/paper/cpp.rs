@@ -13,8 +13,8 @@ use super::cpp_figures;
 use super::cpp_rows::{Row, Summary};
 use crate::commands::cover;
 use crate::coverage::check::check_plan;
-use crate::coverage::{Planned, page};
-use crate::files::Results;
+use crate::coverage::{CoveragePlan, page};
+use crate::files::ResultFiles;
 use crate::report::Figure;
 use crate::result::{self, Timing, rounded};
 use crate::say;
@@ -40,7 +40,12 @@ const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::Powe
 const TIMED_RUNS: usize = 51;
 
 /// A scenario: polygon, vehicles in a row 20 m before its first corner, spacing, height.
-fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> anyhow::Result<Scenario> {
+fn paper_scenario(
+    polygon: &str,
+    places: &[[f64; 2]],
+    lane_m: f64,
+    height_m: f64,
+) -> anyhow::Result<Scenario> {
     let mut text = format!(
         "[area]\npolygon = {polygon}\nlane_m = {lane_m:?}\nwaypoint_m = {lane_m:?}\nheight_m = {height_m:?}\n\
          layer_m = 5.0\n[mission]\ncruise_mps = 5.0\n"
@@ -68,10 +73,10 @@ struct Tables {
 
 impl Tables {
     /// Plans, checks, and gives each vehicle's cost: 0 for one that stays on the ground.
-    fn costs(&mut self, scenario: &Scenario, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
-        let planned = Planned::new(scenario, method)?;
+    fn plan_costs(&mut self, scenario: &Scenario, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
+        let planned = CoveragePlan::new(scenario, method)?;
         let findings = check_plan(&planned);
-        let result = cover::described(&planned, &findings);
+        let result = cover::cover_result(&planned, &findings);
         self.complete &= findings.is_clean();
         let rank = f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
         if self.worst.as_ref().is_none_or(|(worst, _)| rank > *worst) {
@@ -116,7 +121,7 @@ impl Tables {
 /// Results that cannot be written.
 pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let mut results = Results::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
+    let mut results = ResultFiles::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
     let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
     table_2(&mut tables)?;
     let planning = table_3()?;
@@ -134,36 +139,36 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let timing = Timing { plan_s, wall_s: began.elapsed().as_secs_f64(), ..Timing::default() };
     results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
     // Fig. 8 d: Table 2's plan by POWELL-BINPAT.
-    let scenario = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
-    let planned = Planned::new(&scenario, Method::PowellBinpat)?;
+    let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)?;
     let findings = check_plan(&planned);
-    let result = serde_json::to_value(cover::described(&planned, &findings))?;
-    let mut page = page::page(&planned, &planned.flights(), &findings, result);
-    page.figures = figures(&tables)?;
+    let result = serde_json::to_value(cover::cover_result(&planned, &findings))?;
+    let mut page = page::report_data(&planned, &planned.flights(), &findings, result);
+    page.figures = paper_figures(&tables)?;
     results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
-    results.keep()?;
+    results.commit()?;
     say!();
     say!("{}", if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" });
     Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// The paper's drawings of our plans.
-fn figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
-    let convex = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
+    let convex = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let compared = [
-        scenario(COMPARED_AREAS[0], &in_a_row(3), 10.0, 35.0)?,
-        scenario(COMPARED_AREAS[1], &in_a_row(3), 10.0, 35.0)?,
+        paper_scenario(COMPARED_AREAS[0], &in_a_row(3), 10.0, 35.0)?,
+        paper_scenario(COMPARED_AREAS[1], &in_a_row(3), 10.0, 35.0)?,
     ];
-    let small = scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
-    let [fig_8, fig_9, fig_10] = cpp_figures::routes(&convex, &compared, &small)?;
-    let [fig_12, fig_13] = cpp_figures::spreads(&tables.rows);
+    let small = paper_scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
+    let [fig_8, fig_9, fig_10] = cpp_figures::route_figures(&convex, &compared, &small)?;
+    let [fig_12, fig_13] = cpp_figures::spread_figures(&tables.rows);
     Ok(vec![fig_8, fig_9, fig_10, fig_12, fig_13])
 }
 
 fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     for (method, theirs) in METHODS.into_iter().zip(COSTS_M) {
-        let ours = tables.costs(&scenario, method, "m")?;
+        let ours = tables.plan_costs(&scenario, method, "m")?;
         tables.add("2", method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
     }
     Ok(())
@@ -174,10 +179,10 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
     let mut all = [[0.0; 6]; 3];
     for (row, method) in all.iter_mut().zip(METHODS) {
         for (slot, count) in row.iter_mut().zip(2..) {
-            let scenario = scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
+            let scenario = paper_scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
             let mut times = Vec::with_capacity(TIMED_RUNS);
             for _ in 0..TIMED_RUNS {
-                times.push(Planned::new(&scenario, method)?.seconds.iter().sum::<f64>());
+                times.push(CoveragePlan::new(&scenario, method)?.seconds.iter().sum::<f64>());
             }
             times.sort_by(f64::total_cmp);
             *slot = times[TIMED_RUNS / 2];
@@ -188,9 +193,9 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
 
 /// One vehicle stands so far away that the others are done sooner without it.
 fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
+    let scenario = paper_scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
     for (method, theirs) in METHODS[1..].iter().zip(FEWER_M) {
-        let ours = tables.costs(&scenario, *method, "m")?;
+        let ours = tables.plan_costs(&scenario, *method, "m")?;
         tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
     }
     Ok(())
@@ -202,8 +207,8 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
         let method = Method::named(table.method).map_err(anyhow::Error::msg)?;
         let (polygon, columns) = if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT_COLUMNS) };
         for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
-            let scenario = scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
-            let ours = tables.costs(&scenario, method, "s")?;
+            let scenario = paper_scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
+            let ours = tables.plan_costs(&scenario, method, "s")?;
             let index = METHODS.iter().position(|m| *m == method).unwrap_or(0);
             mean_max[usize::from(table.long)][index] += ours.iter().copied().fold(0.0, f64::max) / 12.0;
             tables.add(table.name, method, spacing, "s", [ours, theirs.to_vec()]);
@@ -222,9 +227,9 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
 }
 
 fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = scenario(SHORT_TRACK, &in_a_row(3), 10.0, 20.0)?;
+    let scenario = paper_scenario(SHORT_TRACK, &in_a_row(3), 10.0, 20.0)?;
     for (method, theirs) in METHODS.into_iter().zip(REAL_S) {
-        let ours = tables.costs(&scenario, method, "s")?;
+        let ours = tables.plan_costs(&scenario, method, "s")?;
         tables.add("6", method, (10.0, 20.0), "s", [ours, theirs.to_vec()]);
     }
     Ok(())

@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::coverage::area::RingKind;
 
 use super::cpp_rows::{Row, Summary};
-use crate::coverage::Planned;
+use crate::coverage::CoveragePlan;
 use crate::report::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 use crate::result::rounded;
 use crate::scenario::Scenario;
@@ -20,8 +20,8 @@ const TRACKS: [&str; 2] = ["short", "long"];
 /// other; Fig. 10: fewer UAVs finish sooner.
 ///
 /// # Errors
-/// As [`Planned::new`].
-pub(super) fn routes(
+/// As [`CoveragePlan::new`].
+pub(super) fn route_figures(
     convex: &Scenario,
     others: &[Scenario; 2],
     small: &Scenario,
@@ -31,19 +31,20 @@ pub(super) fn routes(
         (Method::Binpat, "BINPAT"),
         (Method::PowellBinpat, "POWELL-BINPAT"),
     ];
-    let mut fig_8 = vec![map("(a) area and UAVs".to_owned(), &Planned::new(convex, Method::Binpat)?, false)];
+    let mut fig_8 =
+        vec![route_map("(a) area and UAVs".to_owned(), &CoveragePlan::new(convex, Method::Binpat)?, false)];
     for ((method, name), letter) in three.iter().zip('b'..) {
-        fig_8.push(map(format!("({letter}) {name}"), &Planned::new(convex, *method)?, true));
+        fig_8.push(route_map(format!("({letter}) {name}"), &CoveragePlan::new(convex, *method)?, true));
     }
     let mut fig_9 = Vec::new();
     for ((method, name), letters) in three.iter().zip([['c', 'd'], ['e', 'f'], ['g', 'h']]) {
         for (scenario, letter) in others.iter().zip(letters) {
-            fig_9.push(map(format!("({letter}) {name}"), &Planned::new(scenario, *method)?, true));
+            fig_9.push(route_map(format!("({letter}) {name}"), &CoveragePlan::new(scenario, *method)?, true));
         }
     }
     let mut fig_10 = Vec::new();
     for ((method, name), letter) in three[1..].iter().zip('a'..) {
-        fig_10.push(map(format!("({letter}) {name}"), &Planned::new(small, *method)?, true));
+        fig_10.push(route_map(format!("({letter}) {name}"), &CoveragePlan::new(small, *method)?, true));
     }
     let figure = |name: &str, caption: &str, panels| Figure {
         name: name.to_owned(),
@@ -70,7 +71,7 @@ pub(super) fn routes(
 }
 
 /// A plan from above; without its routes, area and UAVs alone.
-fn map(title: String, planned: &Planned<'_>, shown: bool) -> Panel {
+fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
     let corners = planned.wanted.rings_of(RingKind::Outer).flatten();
     let flights = planned.flights();
     let (mut costs, mut most_s) = (Vec::new(), 0.0f32);
@@ -120,7 +121,7 @@ impl Figures {
 }
 
 /// Fig. 12: average times by case, for three and five UAVs; Fig. 13: CV by case, on the short and the long track.
-pub(super) fn spreads(rows: &[Row]) -> [Figure; 2] {
+pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.track.is_some()).collect();
     let (mut times, mut spreads) = (Vec::new(), Vec::new());
     for (fleet, letter) in FLEETS.into_iter().zip('a'..) {

@@ -40,7 +40,7 @@ struct PageData<'a> {
 pub(super) fn html(data: &ReportData) -> anyhow::Result<String> {
     let palette = (0..data.vehicles.len()).map(vehicle_color).collect();
     let json = script_safe(&serde_json::to_string(&PageData { data, palette })?);
-    Ok(fill(TEMPLATE, |name| match name {
+    Ok(fill_template(TEMPLATE, |name| match name {
         "title" => escape(&data.title),
         "style" => STYLE.to_owned(),
         "libraries" => LIBRARIES.to_owned(),
@@ -51,7 +51,7 @@ pub(super) fn html(data: &ReportData) -> anyhow::Result<String> {
 }
 
 /// Replaces each `{{name}}` once; what is put in is never searched again.
-fn fill(template: &str, part: impl Fn(&str) -> String) -> String {
+fn fill_template(template: &str, part: impl Fn(&str) -> String) -> String {
     let mut out = String::new();
     let mut rest = template;
     while let Some((before, after)) = rest.split_once("{{") {

@@ -34,7 +34,7 @@ const FAR_EDGE_ROUNDS: usize = 2;
 const MAX_DETOUR_RATIO: f32 = 1.5;
 
 /// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes connected.
-pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
+pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
     if edges.len() <= most {
         return Some(edges.to_vec());
     }
@@ -43,23 +43,24 @@ pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
     let mut kept = widest_forest(nodes.len(), edges);
     let room = most.checked_sub(kept.iter().filter(|&&kept| kept).count())?;
     let near = (room as f32 * NEAREST_EDGE_SHARE) as usize;
-    let rows = rows(nodes.len(), edges, &lengths);
-    let ranks = ranks(&rows, edges.len());
-    keep(&mut kept, near, &lengths, |i| ranks[i]);
-    let usages: Vec<Vec<u32>> = classes().map(|class| usage(&rows, edges.len(), class)).collect();
+    let rows = adjacency_lists(nodes.len(), edges, &lengths);
+    let ranks = edge_ranks(&rows, edges.len());
+    keep_first(&mut kept, near, &lengths, |i| ranks[i]);
+    let usages: Vec<Vec<u32>> =
+        clearance_classes().map(|class| edge_usage(&rows, edges.len(), class)).collect();
     let far = room - near;
     for round in 0..FAR_EDGE_ROUNDS {
-        let losses = losses(&rows, &usages, &kept);
+        let losses = path_length_losses(&rows, &usages, &kept);
         // The bits of floats that are not negative are in their order.
         let most = far * (round + 1) / FAR_EDGE_ROUNDS - far * round / FAR_EDGE_ROUNDS;
-        keep(&mut kept, most, &lengths, |i| Reverse(losses[i].to_bits()));
+        keep_first(&mut kept, most, &lengths, |i| Reverse(losses[i].to_bits()));
     }
     Some(edges.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(edge, _)| *edge).collect())
 }
 
 /// An edge as seen from one of its nodes.
 #[derive(Clone, Copy)]
-struct Out {
+struct OutgoingEdge {
     to: u16,
     /// Number of [`CLEARANCE_CLASSES_M`] that the edge is wider than.
     class: u8,
@@ -68,13 +69,13 @@ struct Out {
 }
 
 /// The edges of each node, by length.
-fn rows(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out>> {
+fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<OutgoingEdge>> {
     let mut rows = vec![Vec::new(); nodes];
     for (i, (edge, &length_m)) in edges.iter().zip(lengths).enumerate() {
         let class =
             CLEARANCE_CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count() as u8;
         for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
-            rows[usize::from(from)].push(Out { to, class, length_m, edge: i as u32 });
+            rows[usize::from(from)].push(OutgoingEdge { to, class, length_m, edge: i as u32 });
         }
     }
     rows.par_iter_mut().for_each(|row| {
@@ -85,7 +86,7 @@ fn rows(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out>> {
 
 /// For each edge how many shorter ones its nodes have, wide enough for a vehicle of some class that it is wide enough for: the
 /// fewest of either node and any class.
-fn ranks(rows: &[Vec<Out>], edges: usize) -> Vec<u32> {
+fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     let mut ranks = vec![u32::MAX; edges];
     for row in rows {
         let mut shorter = [0; CLEARANCE_CLASSES_M.len() + 1];
@@ -127,8 +128,8 @@ fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     kept
 }
 
-/// Keeps so many more of the edges, the first in an order; of equal ones the shortest.
-fn keep<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn(usize) -> O) {
+/// Keeps `count` more edges, first by the given order, then the shortest.
+fn keep_first<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn(usize) -> O) {
     let mut others: Vec<usize> = (0..kept.len()).filter(|&i| !kept[i]).collect();
     others.sort_by(|&a, &b| order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b)));
     for i in others.into_iter().take(count) {
@@ -136,30 +137,31 @@ fn keep<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn
     }
 }
 
-/// The classes of vehicles, as [`Out::class`] has them.
-fn classes() -> impl Iterator<Item = u8> {
+/// The classes of vehicles, as [`OutgoingEdge::class`] has them.
+fn clearance_classes() -> impl Iterator<Item = u8> {
     1..=CLEARANCE_CLASSES_M.len() as u8
 }
 
 /// For each edge that is not kept how much longer the shortest paths over it become, metres, in the mean over all paths of a
 /// class; the sum over the classes. `usages` are the paths over each edge, of each class.
-fn losses(rows: &[Vec<Out>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
-    let is_kept = |out: &&Out| kept[out.edge as usize];
-    let kept_rows: Vec<Vec<Out>> =
+fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
+    let is_kept = |out: &&OutgoingEdge| kept[out.edge as usize];
+    let kept_rows: Vec<Vec<OutgoingEdge>> =
         rows.iter().map(|row| row.iter().filter(is_kept).copied().collect()).collect();
     let mut losses = vec![0.0; kept.len()];
-    for (class, usage) in classes().zip(usages) {
+    for (class, usage) in clearance_classes().zip(usages) {
         let all = usage.iter().map(|&paths| f64::from(paths)).sum::<f64>().max(1.0) as f32;
         let found: Vec<Vec<(u32, f32)>> = (0..rows.len())
             .into_par_iter()
             .map(|node| {
-                let is_wanted = |out: &&Out| {
+                let is_wanted = |out: &&OutgoingEdge| {
                     usize::from(out.to) > node && usage[out.edge as usize] > 0 && !kept[out.edge as usize]
                 };
-                let wanted: Vec<&Out> = rows[node].iter().filter(is_wanted).collect();
+                let wanted: Vec<&OutgoingEdge> = rows[node].iter().filter(is_wanted).collect();
                 let Some(longest) = wanted.last() else { return Vec::new() };
-                let ways_m = ways_within(node, &kept_rows, class, MAX_DETOUR_RATIO * longest.length_m);
-                let loss = |out: &&Out| {
+                let ways_m =
+                    shortest_distances_within(node, &kept_rows, class, MAX_DETOUR_RATIO * longest.length_m);
+                let loss = |out: &&OutgoingEdge| {
                     let around_m = ways_m[usize::from(out.to)].min(MAX_DETOUR_RATIO * out.length_m);
                     // Rounding alone can make it less than nothing.
                     let longer_m = (around_m - out.length_m).max(0.0);
@@ -176,7 +178,7 @@ fn losses(rows: &[Vec<Out>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
 }
 
 /// Lengths of the shortest ways from a node over edges of at least a class, as far as they are no longer than `most_m`.
-fn ways_within(source: usize, rows: &[Vec<Out>], class: u8, most_m: f32) -> Vec<f32> {
+fn shortest_distances_within(source: usize, rows: &[Vec<OutgoingEdge>], class: u8, most_m: f32) -> Vec<f32> {
     let mut way_m = vec![f32::INFINITY; rows.len()];
     let mut waiting = BinaryHeap::from([(Reverse(0_u32), source)]);
     way_m[source] = 0.0;
@@ -198,7 +200,7 @@ fn ways_within(source: usize, rows: &[Vec<Out>], class: u8, most_m: f32) -> Vec<
 
 /// For each edge the number of shortest paths that lead over it, of those from [`PATH_SOURCES`] nodes to all others, of vehicles
 /// of a class.
-fn usage(rows: &[Vec<Out>], edges: usize, class: u8) -> Vec<u32> {
+fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     let sources = PATH_SOURCES.min(rows.len());
     let searches: Vec<Vec<(u32, u32)>> = (0..sources)
         .into_par_iter()
@@ -213,7 +215,7 @@ fn usage(rows: &[Vec<Out>], edges: usize, class: u8) -> Vec<u32> {
 
 /// The edges of the shortest paths from a node over edges of at least a class, each with how many of them lead over it
 /// (Dijkstra 1959).
-fn paths_from(source: usize, rows: &[Vec<Out>], class: u8) -> Vec<(u32, u32)> {
+fn paths_from(source: usize, rows: &[Vec<OutgoingEdge>], class: u8) -> Vec<(u32, u32)> {
     let mut way_m = vec![f32::INFINITY; rows.len()];
     let mut last_edge = vec![None; rows.len()];
     let (mut settled, mut order) = (vec![false; rows.len()], Vec::new());
@@ -277,7 +279,7 @@ mod tests {
                 .collect();
             let parts: std::collections::BTreeSet<u16> = reached(nodes.len(), &edges, -1.0).into_iter().collect();
             let forest = nodes.len() - parts.len();
-            let kept = cap(&nodes, &edges, room);
+            let kept = limit_edges(&nodes, &edges, room);
             prop_assert_eq!(kept.is_some(), room >= forest.min(edges.len()));
             let Some(kept) = kept else { return Ok(()) };
             prop_assert_eq!(kept.len(), room.min(edges.len()));

@@ -25,7 +25,7 @@ const MAX_SEARCHED_CELLS: usize = 1 << 25;
 
 /// A start and a goal, by their nodes, and the clearance that the vehicle between them needs, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wanted {
+pub struct WantedConnection {
     /// The start's node.
     pub start: usize,
     /// The goal's node.
@@ -35,36 +35,37 @@ pub struct Wanted {
 }
 
 /// Nodes that join what is wanted and not joined yet, where the map has a way for it.
-pub fn missing(
+pub fn missing_passage_nodes(
     map: &VoxelMap,
     tree: &BoxTree,
     nodes: &[Point],
     edges: &[Edge],
     config: &Config,
-    wanted: &[Wanted],
+    wanted: &[WantedConnection],
 ) -> Vec<Point> {
     let mut wanted = wanted.to_vec();
     // A passage that is wide enough for a large vehicle is so for a smaller one.
     wanted.sort_by(|a, b| b.required_m.total_cmp(&a.required_m));
     let mut found = Vec::new();
-    let mut ways: Vec<Wanted> = Vec::new();
+    let mut ways: Vec<WantedConnection> = Vec::new();
     for class in wanted.chunk_by(|a, b| a.required_m == b.required_m) {
         let required_m = class[0].required_m;
-        let mut parts = Parts::new(nodes.len(), edges, required_m);
-        ways.iter().for_each(|way| parts.join(way.start, way.goal));
+        let mut parts = ConnectedComponents::new(nodes.len(), edges, required_m);
+        ways.iter().for_each(|way| parts.union(way.start, way.goal));
         let mut walled_off = BTreeSet::new();
         for pair in class {
-            let (from, to) = (parts.of(pair.start), parts.of(pair.goal));
+            let (from, to) = (parts.component_of(pair.start), parts.component_of(pair.goal));
             if from == to || walled_off.contains(&(from, to)) {
                 continue;
             }
             let ends = (nodes[pair.start], nodes[pair.goal]);
-            let cells = Search::new(map, tree, required_m).and_then(|search| search.way(&ends.0, &ends.1));
-            match cells.and_then(|way| corners(tree, &way, config, required_m)) {
+            let cells = CellSearch::new(map, tree, required_m)
+                .and_then(|search| search.shortest_cell_path(&ends.0, &ends.1));
+            match cells.and_then(|way| fewest_corners(tree, &way, config, required_m)) {
                 Some(corners) => {
                     found.extend(corners);
                     ways.push(*pair);
-                    parts.join(pair.start, pair.goal);
+                    parts.union(pair.start, pair.goal);
                 }
                 None => drop(walled_off.insert((from, to))),
             }
@@ -74,18 +75,18 @@ pub fn missing(
 }
 
 /// Which nodes edges of some clearance join: union by the lowest node.
-pub(super) struct Parts(Vec<usize>);
+pub(super) struct ConnectedComponents(Vec<usize>);
 
-impl Parts {
+impl ConnectedComponents {
     pub(super) fn new(nodes: usize, edges: &[Edge], required_m: f32) -> Self {
         let mut parts = Self((0..nodes).collect());
         for edge in edges.iter().filter(|edge| edge.clearance_m > required_m) {
-            parts.join(usize::from(edge.a), usize::from(edge.b));
+            parts.union(usize::from(edge.a), usize::from(edge.b));
         }
         parts
     }
 
-    pub(super) fn of(&mut self, mut node: usize) -> usize {
+    pub(super) fn component_of(&mut self, mut node: usize) -> usize {
         while self.0[node] != node {
             self.0[node] = self.0[self.0[node]];
             node = self.0[node];
@@ -93,8 +94,8 @@ impl Parts {
         node
     }
 
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.of(a), self.of(b));
+    fn union(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.component_of(a), self.component_of(b));
         self.0[a.max(b)] = a.min(b);
     }
 }
@@ -106,14 +107,14 @@ fn is_clear(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) -> bool {
 }
 
 /// A search over the centres of the map's cells.
-struct Search<'a> {
+struct CellSearch<'a> {
     shape: &'a GridShape,
     map: &'a VoxelMap,
     tree: &'a BoxTree,
     required_m: f32,
 }
 
-impl<'a> Search<'a> {
+impl<'a> CellSearch<'a> {
     /// The search; none where the map is too large.
     fn new(map: &'a VoxelMap, tree: &'a BoxTree, required_m: f32) -> Option<Self> {
         let cells = map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
@@ -136,7 +137,7 @@ impl<'a> Search<'a> {
     }
 
     /// The cell itself and those that touch it.
-    fn around(&self, cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+    fn cell_and_neighbours(&self, cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
         let dims = self.shape.dims;
         (0..27).filter_map(move |n| {
             let step = [n % 3, n / 3 % 3, n / 9];
@@ -149,15 +150,15 @@ impl<'a> Search<'a> {
     }
 
     /// Cells from whose centres a place is seen.
-    fn at(&self, place: &Point) -> Vec<usize> {
+    fn cells_seen_from(&self, place: &Point) -> Vec<usize> {
         let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
         let sees = |next: &[u32; 3]| is_clear(self.tree, place, &self.centre(*next), self.required_m);
-        self.around(cell).filter(sees).map(|next| self.index(next)).collect()
+        self.cell_and_neighbours(cell).filter(sees).map(|next| self.index(next)).collect()
     }
 
     /// The places of a shortest way over cells, both ends among them.
-    fn way(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
-        let ends: BTreeSet<usize> = self.at(to).into_iter().collect();
+    fn shortest_cell_path(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
+        let ends: BTreeSet<usize> = self.cells_seen_from(to).into_iter().collect();
         let grid = self.map.grid();
         let never_sample = self.map.never_sample();
         let cells = self.shape.dims.iter().map(|&d| d as usize).product();
@@ -165,7 +166,7 @@ impl<'a> Search<'a> {
         let mut open = BinaryHeap::new();
         // The bits of floats that are not negative are in their order.
         let rank = |cost_m: f32, at: &Point| Reverse((cost_m + (to - at).norm()).to_bits());
-        for index in self.at(from) {
+        for index in self.cells_seen_from(from) {
             let centre = self.centre(self.cell(index));
             cost[index] = (centre - from).norm();
             open.push((rank(cost[index], &centre), index));
@@ -184,7 +185,7 @@ impl<'a> Search<'a> {
                 way.reverse();
                 return Some(std::iter::once(*from).chain(way).chain([*to]).collect());
             }
-            for next in self.around(cell) {
+            for next in self.cell_and_neighbours(cell) {
                 let (i, place) = (self.index(next), self.centre(next));
                 let cost_m = cost[index] + (place - centre).norm();
                 if cost_m < cost[i]
@@ -202,7 +203,7 @@ impl<'a> Search<'a> {
 }
 
 /// The places between the ends of a way that the fewest edges join: each is clear and as long as edges may be.
-fn corners(tree: &BoxTree, way: &[Point], config: &Config, required_m: f32) -> Option<Vec<Point>> {
+fn fewest_corners(tree: &BoxTree, way: &[Point], config: &Config, required_m: f32) -> Option<Vec<Point>> {
     let last = way.len() - 1;
     let mut hops = vec![u32::MAX; way.len()];
     let mut came = vec![0; way.len()];

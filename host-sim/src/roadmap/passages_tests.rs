@@ -1,6 +1,6 @@
 //! Passages: rooms behind narrow doors are joined, by clear edges, and what is walled off stays so.
 
-use super::passages::{Parts, Wanted};
+use super::passages::{ConnectedComponents, WantedConnection};
 use super::{Config, Roadmap, add_passages, build};
 use crate::map::occupancy::{OccupancyMap, Unknown};
 use crate::map::{Occupancy, VoxelMap};
@@ -18,7 +18,7 @@ fn rooms(rng: &mut Pcg32, count: u32) -> VoxelMap {
     let dims = [30 * count, 40, 20];
     let shape = GridShape { dims, min: Point::zeros(), resolution_m: 0.1 };
     let doors: Vec<u32> = (0..count).map(|_| 2 + rng.next_u32() % 32).collect();
-    let mut map = OccupancyMap::unknown(shape, "rooms").unwrap();
+    let mut map = OccupancyMap::all_unknown(shape, "rooms").unwrap();
     for k in 0..dims[2] {
         for j in 0..dims[1] {
             for i in 0..dims[0] {
@@ -50,11 +50,11 @@ fn rooms_behind_narrow_doors_are_joined() {
         let (mut roadmap, _) = build(&map, &ends, &config).unwrap();
         let before = roadmap.nodes.len();
         let joined = |roadmap: &Roadmap| {
-            let mut parts = Parts::new(roadmap.nodes.len(), &roadmap.edges, REQUIRED_M);
-            parts.of(0) == parts.of(1)
+            let mut parts = ConnectedComponents::new(roadmap.nodes.len(), &roadmap.edges, REQUIRED_M);
+            parts.component_of(0) == parts.component_of(1)
         };
         missed += usize::from(!joined(&roadmap));
-        let wanted = [Wanted { start: 0, goal: 1, required_m: REQUIRED_M }];
+        let wanted = [WantedConnection { start: 0, goal: 1, required_m: REQUIRED_M }];
         let added = add_passages(&map, &mut roadmap, &config, &wanted).unwrap();
         assert!(joined(&roadmap), "seed {seed}");
         assert_eq!(roadmap.nodes.len(), before + added);
@@ -82,6 +82,6 @@ fn what_is_walled_off_stays_so() {
         sampling: Sampling::Uniform,
     };
     let (mut roadmap, _) = build(&map, &ends, &config).unwrap();
-    let wanted = [Wanted { start: 0, goal: 1, required_m: 0.26 }];
+    let wanted = [WantedConnection { start: 0, goal: 1, required_m: 0.26 }];
     assert_eq!(add_passages(&map, &mut roadmap, &config, &wanted).unwrap(), 0);
 }

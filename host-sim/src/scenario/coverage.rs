@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-pub use companion::storage::mission_file::coverage::Heading;
+pub use companion::storage::mission_file::coverage::HeadingRule;
 use planner_core::coverage::area::{Ring, RingKind};
 use planner_core::coverage::footprint::{Camera, Spacing};
 use planner_core::coverage::{Flat, pack::Heights};
 use planner_core::field::FieldView;
-use planner_core::field::follow::Following;
+use planner_core::field::follow::TerrainFollowing;
 use planner_core::file::FileError;
 pub use planner_core::flight::Trigger;
 use planner_core::frames::Geodetic;
@@ -50,7 +50,7 @@ pub struct Area {
     /// How work is divided.
     pub method: Method,
     /// Heading of the vehicles.
-    pub heading: Heading,
+    pub heading: HeadingRule,
     /// Trigger of the pictures.
     pub trigger: Trigger,
 }
@@ -73,9 +73,9 @@ impl Terrain {
     ///
     /// # Errors
     /// The bytes are no field.
-    pub fn following(&self, height_m: f32) -> Result<Following<'_>, FileError> {
+    pub fn following(&self, height_m: f32) -> Result<TerrainFollowing<'_>, FileError> {
         let field = FieldView::parse(&self.field)?;
-        Ok(Following { field, height_m, tolerance_m: self.tolerance_m, slope: self.slope })
+        Ok(TerrainFollowing { field, height_m, tolerance_m: self.tolerance_m, slope: self.slope })
     }
 }
 

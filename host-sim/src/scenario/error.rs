@@ -59,7 +59,7 @@ impl fmt::Display for ScenarioError {
                 let margin = " ".repeat(line.to_string().len());
                 writeln!(f, "bad scenario: {file}:{line}:{column}: {why}")?;
                 writeln!(f, "{margin} |")?;
-                let (shown, before, marked) = around(text, column - 1, *marked);
+                let (shown, before, marked) = marked_line(text, column - 1, *marked);
                 writeln!(f, "{line} | {shown}")?;
                 write!(f, "{margin} | {}{}", " ".repeat(before), "^".repeat(marked))?;
             }
@@ -73,7 +73,7 @@ impl fmt::Display for ScenarioError {
 
 /// A line as it is shown, of which `marked` characters from `from` on are meant; then how many characters of it stand
 /// before those, and how many of those are shown. Of a long line that is the part around them.
-fn around(text: &str, from: usize, marked: usize) -> (String, usize, usize) {
+fn marked_line(text: &str, from: usize, marked: usize) -> (String, usize, usize) {
     let begin = if from + marked > MAX_QUOTE_CHARS { from.saturating_sub(CONTEXT_CHARS) } else { 0 };
     let plain = |c: char| if quoted(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
     let mut shown: String = text.chars().skip(begin).take(MAX_QUOTE_CHARS - 2).map(plain).collect();
@@ -95,11 +95,11 @@ mod tests {
     #[test]
     fn of_a_long_line_the_part_is_shown_that_is_meant() {
         let text = format!("{}KEY = 1{}", "x".repeat(5000), "y".repeat(5000));
-        let (shown, before, marked) = around(&text, 5000, 3);
+        let (shown, before, marked) = marked_line(&text, 5000, 3);
         assert_eq!(shown.chars().skip(before).take(marked).collect::<String>(), "KEY");
         assert!(shown.chars().count() <= MAX_QUOTE_CHARS && shown.starts_with('…') && shown.ends_with('…'));
-        assert_eq!(around("a\tb\u{1b}c", 2, 1), ("a b c".to_owned(), 2, 1));
-        let (shown, before, marked) = around(&text, 0, 9000);
+        assert_eq!(marked_line("a\tb\u{1b}c", 2, 1), ("a b c".to_owned(), 2, 1));
+        let (shown, before, marked) = marked_line(&text, 0, 9000);
         assert_eq!((before + marked, shown.chars().count()), (MAX_QUOTE_CHARS - 2, MAX_QUOTE_CHARS - 1));
     }
 }

@@ -23,7 +23,7 @@ pub use planner_core::prm::Sampling;
 pub use sim_autopilot::{AutopilotKind, Estimator};
 pub use types::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode, Objective,
-    Roadmap, Scenario, Simulation, Terminals, Unbuilt, Vehicle,
+    Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
 };
 
 /// Reads a scenario file; paths in it are relative to its folder.
@@ -54,7 +54,7 @@ pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
 /// Reads a text, by the kind of mission that it is for.
 fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
     let text = reader::Text { file, text };
-    sections::root(text, |root| match (root.get("map"), root.get("area")) {
+    sections::read_root(text, |root| match (root.get("map"), root.get("area")) {
         (None, Some(_)) => sections::area::coverage(text, root, folder),
         _ => sections::goals_mission(text, root, folder),
     })

@@ -67,7 +67,7 @@ impl<'a> Value<'a> {
         self.text.error(&self.span, format!("{} {why}", self.name))
     }
 
-    fn expected(&self, what: &str) -> ScenarioError {
+    fn expected_error(&self, what: &str) -> ScenarioError {
         self.error(&format!("must be {what}, not a value of type {}", self.value.type_str()))
     }
 
@@ -76,7 +76,7 @@ impl<'a> Value<'a> {
         let number = match self.value {
             DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
             DeValue::Integer(_) => self.integer().map(|i| i as f64),
-            _ => return Err(self.expected("a number")),
+            _ => return Err(self.expected_error("a number")),
         };
         match number {
             Some(number) if number.is_finite() && range.contains(&number) => Ok(number),
@@ -90,9 +90,9 @@ impl<'a> Value<'a> {
     }
 
     /// A whole number inside a range.
-    pub(super) fn whole(&self, range: RangeInclusive<u64>) -> Result<u64> {
+    pub(super) fn integer_in_range(&self, range: RangeInclusive<u64>) -> Result<u64> {
         if !self.value.is_integer() {
-            return Err(self.expected("a whole number"));
+            return Err(self.expected_error("a whole number"));
         }
         match self.integer().and_then(|i| u64::try_from(i).ok()) {
             Some(number) if range.contains(&number) => Ok(number),
@@ -103,27 +103,27 @@ impl<'a> Value<'a> {
     }
 
     pub(super) fn boolean(&self) -> Result<bool> {
-        self.value.as_bool().ok_or_else(|| self.expected("true or false"))
+        self.value.as_bool().ok_or_else(|| self.expected_error("true or false"))
     }
 
     pub(super) fn str(&self) -> Result<&'a str> {
-        self.value.as_str().ok_or_else(|| self.expected("a string"))
+        self.value.as_str().ok_or_else(|| self.expected_error("a string"))
     }
 
-    /// One of several words; each stands beside its meaning.
-    pub(super) fn word<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
+    /// Value of a keyword, from a list of keywords and their values.
+    pub(super) fn one_of<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
         let given = self.str()?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == given) {
             return Ok(*meaning);
         }
         let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
         let error = self.error(&format!("must be one of {}", all.join(", ")));
-        Err(ScenarioError { hint: nearest(given, words.iter().map(|(word, _)| *word)), ..error })
+        Err(ScenarioError { hint: nearest_word(given, words.iter().map(|(word, _)| *word)), ..error })
     }
 
     pub(super) fn items(&self) -> Result<Vec<Value<'a>>> {
         let array = self.value.as_array().ok_or_else(|| {
-            let error = self.expected("a list");
+            let error = self.expected_error("a list");
             let hint = self
                 .is_table()
                 .then(|| format!("in double brackets, [[{0}]], each is one of {0}", self.name));
@@ -135,7 +135,7 @@ impl<'a> Value<'a> {
 
     /// Three finite numbers.
     pub(super) fn triple(&self) -> Result<[f64; 3]> {
-        let items = self.items().map_err(|_| self.expected("[east, north, up] in metres"))?;
+        let items = self.items().map_err(|_| self.expected_error("[east, north, up] in metres"))?;
         let [x, y, z] = items.as_slice() else {
             return Err(
                 self.error(&format!("must be three numbers, east, north, up in metres, not {}", items.len()))
@@ -152,7 +152,7 @@ impl<'a> Value<'a> {
     pub(super) fn table(&self) -> Result<Table<'a>> {
         match self.value {
             DeValue::Table(table) => Ok(Table::new(self.text, &self.name, self.span.clone(), table)),
-            _ => Err(self.expected("a table")),
+            _ => Err(self.expected_error("a table")),
         }
     }
 }
@@ -188,20 +188,20 @@ impl<'a> Table<'a> {
                 strsim::jaro_winkler(AsRef::<str>::as_ref(given.get_ref()), key) > 0.85
             };
             match self.table.iter().find(misspelt) {
-                Some((given, _)) => self.unknown(given, Some(format!("did you mean `{key}`?"))),
+                Some((given, _)) => self.unknown_key_error(given, Some(format!("did you mean `{key}`?"))),
                 None => self.text.with_hint(&self.span, format!("{} is missing", self.path(key)), hint),
             }
         })
     }
 
-    fn unknown(&self, key: &Spanned<DeString<'_>>, hint: Option<String>) -> ScenarioError {
+    fn unknown_key_error(&self, key: &Spanned<DeString<'_>>, hint: Option<String>) -> ScenarioError {
         let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
         let error = self.text.error(&key.span(), format!("unknown key `{}`{place}", quoted(key.get_ref())));
         ScenarioError { hint, ..error }
     }
 
     /// Names keys that will be asked for later.
-    pub(super) fn expect(&self, keys: &[&'static str]) {
+    pub(super) fn declare_keys(&self, keys: &[&'static str]) {
         self.known.borrow_mut().extend(keys);
     }
 
@@ -213,16 +213,21 @@ impl<'a> Table<'a> {
         self.get(key).map(|v| v.f64(&range).map(|n| n as f32)).transpose()
     }
 
-    pub(super) fn whole(&self, key: &'static str, default: u64, range: RangeInclusive<u64>) -> Result<u64> {
-        self.get(key).map_or(Ok(default), |v| v.whole(range))
+    pub(super) fn integer_in_range(
+        &self,
+        key: &'static str,
+        default: u64,
+        range: RangeInclusive<u64>,
+    ) -> Result<u64> {
+        self.get(key).map_or(Ok(default), |v| v.integer_in_range(range))
     }
 
     pub(super) fn boolean(&self, key: &'static str) -> Result<bool> {
         self.get(key).map_or(Ok(false), |v| v.boolean())
     }
 
-    pub(super) fn word<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
-        self.get(key).map_or(Ok(default), |v| v.word(words))
+    pub(super) fn one_of<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
+        self.get(key).map_or(Ok(default), |v| v.one_of(words))
     }
 
     /// Refuses the first key in the file that was never asked for.
@@ -230,12 +235,12 @@ impl<'a> Table<'a> {
         let known = self.known.borrow();
         let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let Some((key, _)) = unknown.min_by_key(|(key, _)| key.span().start) else { return Ok(()) };
-        Err(self.unknown(key, nearest(key.get_ref(), known.iter().copied())))
+        Err(self.unknown_key_error(key, nearest_word(key.get_ref(), known.iter().copied())))
     }
 }
 
 /// The nearest word, or all of them where none is near.
-fn nearest<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
+fn nearest_word<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
     let given = given.to_lowercase();
     let score = |word: &&str| strsim::jaro_winkler(&given, word);
     let best = words.clone().max_by(|a, b| score(a).total_cmp(&score(b)))?;

@@ -17,13 +17,13 @@ use sim_autopilot::AutopilotKind;
 use toml::de::DeTable;
 
 use self::checks::{VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins};
-use self::simulation::{deconfliction, fault, simulation};
-use self::values::{MAX_ID, point};
+use self::simulation::{read_deconfliction, read_fault, read_simulation};
+use self::values::{MAX_ID, read_point};
 use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::types::{
     Companion, Deconfliction, Fault, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario, Simulation,
-    Terminals, Unbuilt, Vehicle,
+    Terminals, UnsupportedTable, Vehicle,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
@@ -40,7 +40,7 @@ const MAX_FAULTS: usize = 1000;
 const DEFAULT_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
 /// Content of a scenario's root table, if it is TOML and all its keys are known.
-pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
+pub(super) fn read_root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
         let what = quoted(error.message().lines().next().unwrap_or_default());
@@ -49,7 +49,7 @@ pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>
         ScenarioError { hint: hint.map(str::to_owned), ..error }
     })?;
     let root = Table::new(text, "", 0..0, root.get_ref());
-    root.expect(&[
+    root.declare_keys(&[
         "seed",
         "map",
         "roadmap",
@@ -69,32 +69,32 @@ pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>
 pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } =
-        common(text, root, (margins::PAIR_STRAY_M, DEFAULT_TIME_LIMIT_S))?;
+        read_common(text, root, (margins::PAIR_STRAY_M, DEFAULT_TIME_LIMIT_S))?;
     let map_table = root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
-    let (map, has_origin) = map(&map_table, folder)?;
+    let (map, has_origin) = read_map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
-    let roadmap = self::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
+    let roadmap = read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
     let origin = has_origin.then_some(map.origin);
     let mission_value = root.get("mission");
-    let vehicles = vehicles(
+    let vehicles = read_vehicles(
         &root.required("vehicles", "add a `[[vehicles]]` with `id` and `start` for each")?,
         origin.as_ref(),
         &mut unsupported,
     )?;
     let mission_table = mission_value.as_ref().map(Value::table).transpose()?;
-    let mission_table = mission_table.unwrap_or_else(|| empty(text, "mission"));
-    let (mission, mode_span) = mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
-    let faults = faults(root, &vehicles)?;
+    let mission_table = mission_table.unwrap_or_else(|| empty_table(text, "mission"));
+    let (mission, mode_span) = read_mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
+    let faults = read_faults(root, &vehicles)?;
     if let Some(area) = root.get("area") {
-        unsupported.push(not_yet(text, &area.span, "[area] beside [map]"));
+        unsupported.push(unsupported_error(text, &area.span, "[area] beside [map]"));
     }
-    let formation = unbuilt(root, "formation", &mut unsupported)?;
+    let formation = read_unsupported(root, "formation", &mut unsupported)?;
     match (mission.mode, &mode_span) {
         (Mode::Coverage, Some(span)) if root.get("area").is_none() => {
             let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
             return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
         }
-        (Mode::Formation, Some(span)) => unsupported.push(not_yet(text, span, "this mission.mode")),
+        (Mode::Formation, Some(span)) => unsupported.push(unsupported_error(text, span, "this mission.mode")),
         _ => {}
     }
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
@@ -133,26 +133,27 @@ struct Common {
     estimator_span: Option<Span>,
 }
 
-/// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the stray of two
+/// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the deviation of two
 /// vehicles, metres, and the time limit of a flight, seconds.
-fn common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
-    let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
+fn read_common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
+    let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
-    let deconfliction = deconfliction.unwrap_or_else(|| empty(text, "deconfliction"));
-    let deconfliction = self::deconfliction(&deconfliction, stray_m)?;
+    let deconfliction = deconfliction.unwrap_or_else(|| empty_table(text, "deconfliction"));
+    let deconfliction = read_deconfliction(&deconfliction, stray_m)?;
     let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
     let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
-    let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")), limit_s)?;
+    let simulation =
+        read_simulation(&simulation.unwrap_or_else(|| empty_table(text, "simulation")), limit_s)?;
     Ok(Common { seed, deconfliction, simulation, estimator_span })
 }
 
 /// Faults of the vehicles.
-fn faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<Fault>> {
+fn read_faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<Fault>> {
     let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
     let Some(value) = root.get("faults") else { return Ok(Vec::new()) };
     let items = value.items()?;
-    at_most(&value, items.len(), MAX_FAULTS, "faults")?;
-    items.iter().map(|v| fault(&v.table()?, &ids)).collect()
+    check_list_len(&value, items.len(), MAX_FAULTS, "faults")?;
+    items.iter().map(|v| read_fault(&v.table()?, &ids)).collect()
 }
 
 /// Usual cause of text that is no TOML.
@@ -168,30 +169,30 @@ fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
 }
 
 /// A table that the file leaves out: all defaults.
-fn empty<'a>(text: Text<'a>, name: &str) -> Table<'a> {
+fn empty_table<'a>(text: Text<'a>, name: &str) -> Table<'a> {
     static EMPTY: std::sync::LazyLock<DeTable<'static>> = std::sync::LazyLock::new(DeTable::new);
     Table::new(text, name, 0..0, &EMPTY)
 }
 
-fn not_yet(text: Text<'_>, span: &Span, what: &str) -> ScenarioError {
+fn unsupported_error(text: Text<'_>, span: &Span, what: &str) -> ScenarioError {
     text.error(span, format!("not available yet: {what}"))
 }
 
-fn unbuilt(
+fn read_unsupported(
     root: &Table<'_>,
     key: &'static str,
     unsupported: &mut Vec<ScenarioError>,
-) -> Result<Option<Unbuilt>> {
+) -> Result<Option<UnsupportedTable>> {
     let Some(value) = root.get(key) else { return Ok(None) };
     value.table()?;
-    unsupported.push(not_yet(root.text, &value.span, &format!("[{key}]")));
+    unsupported.push(unsupported_error(root.text, &value.span, &format!("[{key}]")));
     let whole: toml::Table = toml::from_str(root.text.text)
         .map_err(|error| root.text.error(&value.span, format!("not TOML: {}", error.message())))?;
     let table = whole.get(key).and_then(toml::Value::as_table).cloned().unwrap_or_default();
-    Ok(Some(Unbuilt { table }))
+    Ok(Some(UnsupportedTable { table }))
 }
 
-fn geodetic(value: &Value<'_>) -> Result<Geodetic> {
+fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
     let table = value.table()?;
     let hint = "a position is { lat_deg = …, lon_deg = …, alt_m = … }";
     let lat_deg = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
@@ -202,7 +203,7 @@ fn geodetic(value: &Value<'_>) -> Result<Geodetic> {
 }
 
 /// The map, and whether its origin was given.
-fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
+fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     let file_value = table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
     let name = file_value.str()?;
     if let Err(error) = Source::parse(name) {
@@ -210,11 +211,11 @@ fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     }
     let file =
         if name.starts_with("builtin:") { name.to_owned() } else { folder.join(name).display().to_string() };
-    let origin = table.get("origin").map(|v| geodetic(&v)).transpose()?;
+    let origin = table.get("origin").map(|v| read_geodetic(&v)).transpose()?;
     let map = Map {
         file,
         resolution_m: table.f32("resolution_m", 0.25, RESOLUTION_RANGE_M)?,
-        unknown: table.word(
+        unknown: table.one_of(
             "unknown",
             Unknown::Blocked,
             &[("blocked", Unknown::Blocked), ("free", Unknown::Free)],
@@ -225,7 +226,7 @@ fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     Ok((map, origin.is_some()))
 }
 
-fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
+fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
     let edge_max = table.get("edge_max_m");
     let shares = [("edge_min_share", "edge_min_m"), ("edge_max_share", "edge_max_m")];
     for (share, metres) in shares {
@@ -234,18 +235,18 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
         }
     }
     let roadmap = Roadmap {
-        nodes: table.whole("nodes", 2300, 0..=1_000_000)? as u32,
+        nodes: table.integer_in_range("nodes", 2300, 0..=1_000_000)? as u32,
         edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=MAX_EDGE_M.into())?,
         edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=MAX_EDGE_M.into())?,
         edge_min_share: table.optional_f32("edge_min_share", 0.0..=1.0)?,
         edge_max_share: table.optional_f32("edge_max_share", 0.0001..=1.0)?,
-        terminals: table.word(
+        terminals: table.one_of(
             "terminals",
             Terminals::Joined,
             &[("joined", Terminals::Joined), ("apart", Terminals::Apart)],
         )?,
         safety_margin_m: table.f32("safety_margin_m", 0.5, 0.0..=100.0)?,
-        sampling: table.word(
+        sampling: table.one_of(
             "sampling",
             Sampling::Uniform,
             &[("uniform", Sampling::Uniform), ("halton", Sampling::Halton), ("bridge", Sampling::Bridge)],
@@ -264,14 +265,14 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
 }
 
 /// The mission, and where its mode stands.
-fn mission(
+fn read_mission(
     table: &Table<'_>,
     folder: &Path,
     origin: Option<&Geodetic>,
     vehicles: &[(Vehicle, VehicleSpans)],
 ) -> Result<(Mission, Option<Span>)> {
     let mode_span = table.get("mode").map(|v| v.span);
-    let mode = table.word(
+    let mode = table.one_of(
         "mode",
         Mode::Unlabelled,
         &[
@@ -284,7 +285,7 @@ fn mission(
             ("labeled", Mode::Labelled),
         ],
     )?;
-    let objective = table.word(
+    let objective = table.one_of(
         "objective",
         Objective::Total,
         &[("total", Objective::Total), ("makespan", Objective::Makespan)],
@@ -297,10 +298,13 @@ fn mission(
         }
         (Some(list), None) => {
             let goals = list.items()?;
-            at_most(list, goals.len(), VEHICLES, "goals")?;
-            goals.iter().map(|v| Ok((place(v, origin)?, table.text.line(&v.span)))).collect::<Result<_>>()?
+            check_list_len(list, goals.len(), VEHICLES, "goals")?;
+            goals
+                .iter()
+                .map(|v| Ok((read_place(v, origin)?, table.text.line(&v.span))))
+                .collect::<Result<_>>()?
         }
-        (None, Some(file)) => goals_file(file, folder)?,
+        (None, Some(file)) => read_goals_file(file, folder)?,
         (None, None) => Vec::new(),
     };
     let (goals, goal_places): (Vec<Point>, Vec<String>) = goals.into_iter().unzip();
@@ -326,14 +330,14 @@ fn fence_and_ground_stations(
     table: &Table<'_>,
     vehicles: &[(Vehicle, VehicleSpans)],
 ) -> Result<(Option<Geofence>, [u8; GROUND_STATIONS])> {
-    let geofence = table.get("geofence").map(|v| geofence(&v)).transpose()?;
-    let ground_stations = table.get("ground_stations").map(|v| ground_stations(&v, vehicles)).transpose()?;
+    let geofence = table.get("geofence").map(|v| read_geofence(&v)).transpose()?;
+    let ground_stations = table.get("ground_stations").map(|v| read_stations(&v, vehicles)).transpose()?;
     let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
     Ok((geofence, ground_stations))
 }
 
 /// Refuses a list that is longer than any mission's.
-fn at_most(value: &Value<'_>, count: usize, most: usize, what: &str) -> Result<()> {
+fn check_list_len(value: &Value<'_>, count: usize, most: usize, what: &str) -> Result<()> {
     if count > most {
         return Err(value.error(&format!("holds more than {most} {what}")));
     }
@@ -341,14 +345,14 @@ fn at_most(value: &Value<'_>, count: usize, most: usize, what: &str) -> Result<(
 }
 
 /// System ids whose commands count.
-fn ground_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<[u8; GROUND_STATIONS]> {
+fn read_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<[u8; GROUND_STATIONS]> {
     let given = value.items()?;
     if !(1..=GROUND_STATIONS).contains(&given.len()) {
         return Err(value.error(&format!("takes 1 to {GROUND_STATIONS} MAVLink system ids")));
     }
     let mut ids = [0; GROUND_STATIONS];
     for (id, given) in ids.iter_mut().zip(given) {
-        *id = given.whole(1..=255)? as u8;
+        *id = given.integer_in_range(1..=255)? as u8;
         if vehicles.iter().any(|(vehicle, _)| vehicle.id == *id) {
             return Err(given.error("is a vehicle's id: a ground station has one of its own"));
         }
@@ -357,11 +361,11 @@ fn ground_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> R
 }
 
 /// A point of the mission frame, in metres or by latitude and longitude about the origin that was given.
-fn place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
+fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     if !value.is_table() {
-        return point(value);
+        return read_point(value);
     }
-    let position = geodetic(value)?;
+    let position = read_geodetic(value)?;
     let Some(origin) = origin else {
         let hint = "add `origin = { lat_deg = …, lon_deg = …, alt_m = … }` to [map], or give metres";
         let why = format!("{} is given by latitude and longitude, but map.origin is missing", value.name);
@@ -371,7 +375,7 @@ fn place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
 }
 
 /// One `x y z` a line; empty lines and those that begin with `#` are passed over.
-fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
+fn read_goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
     let path = folder.join(value.str()?);
     let text = files::read_text(&path)
         .map_err(|error| value.error(&format!("cannot be read: {}: {error}", quoted_path(&path))))?;
@@ -389,7 +393,7 @@ fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> 
             {
                 let place = format!("{}:{}", quoted_path(&path), index + 1);
                 goals.push((Point::new(x, y, z), place));
-                at_most(value, goals.len(), VEHICLES, "goals")?;
+                check_list_len(value, goals.len(), VEHICLES, "goals")?;
             }
             _ => {
                 let place = format!("{}:{}", quoted_path(&path), index + 1);
@@ -403,10 +407,10 @@ fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> 
     Ok(goals)
 }
 
-fn geofence(value: &Value<'_>) -> Result<Geofence> {
+fn read_geofence(value: &Value<'_>) -> Result<Geofence> {
     let table = value.table()?;
     let hint = "a geofence is { min = [x, y, z], max = [x, y, z] }";
-    let (min, max) = (point(&table.required("min", hint)?)?, point(&table.required("max", hint)?)?);
+    let (min, max) = (read_point(&table.required("min", hint)?)?, read_point(&table.required("max", hint)?)?);
     table.finish()?;
     if (0..3).any(|axis| min[axis] >= max[axis]) {
         return Err(value.error("must have every coordinate of min below that of max"));
@@ -414,7 +418,7 @@ fn geofence(value: &Value<'_>) -> Result<Geofence> {
     Ok(Geofence { min, max })
 }
 
-fn vehicles(
+fn read_vehicles(
     value: &Value<'_>,
     origin: Option<&Geodetic>,
     unsupported: &mut Vec<ScenarioError>,
@@ -423,11 +427,11 @@ fn vehicles(
     for item in value.items()? {
         let table = item.table()?;
         let id_value = table.required("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
-        let id = id_value.whole(1..=MAX_ID)? as u8;
+        let id = id_value.integer_in_range(1..=MAX_ID)? as u8;
         if vehicles.iter().any(|(v, _)| v.id == id) {
             return Err(id_value.error(&format!("is {id}, which another vehicle already has")));
         }
-        vehicles.push(vehicle(&table, id, origin, unsupported)?);
+        vehicles.push(read_vehicle(&table, id, origin, unsupported)?);
     }
     if vehicles.is_empty() {
         return Err(value.error("must hold at least one vehicle"));
@@ -435,7 +439,7 @@ fn vehicles(
     Ok(vehicles)
 }
 
-fn vehicle(
+fn read_vehicle(
     table: &Table<'_>,
     id: u8,
     origin: Option<&Geodetic>,
@@ -446,7 +450,7 @@ fn vehicle(
         "where its path begins: [east, north, up] in metres, or { lat_deg, lon_deg, alt_m }",
     )?;
     let goal = table.get("goal");
-    let personality = table.word(
+    let personality = table.one_of(
         "personality",
         AutopilotKind::Px4,
         &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::Ardupilot)],
@@ -456,23 +460,23 @@ fn vehicle(
         Some(value) => match value.str()? {
             "in-process" => Companion::InProcess { flash: None },
             _ => Companion::Url {
-                autopilot: link(&value)?,
-                radio: table.get("radio").map(|radio| link(&radio)).transpose()?,
+                autopilot: read_link(&value)?,
+                radio: table.get("radio").map(|radio| read_link(&radio)).transpose()?,
             },
         },
     };
     let vehicle = Vehicle {
         id,
-        start: place(&start, origin)?,
-        goal: goal.as_ref().map(|v| v.whole(0..=1_000_000).map(|g| g as usize)).transpose()?,
+        start: read_place(&start, origin)?,
+        goal: goal.as_ref().map(|v| v.integer_in_range(0..=1_000_000).map(|g| g as usize)).transpose()?,
         radius_m: table.f32("radius_m", 0.3, 0.001..=100.0)?,
         altitude_m: table.optional_f32("altitude_m", -1000.0..=20_000.0)?,
         speed_max_mps: table.f32("speed_max_mps", 5.0, 0.01..=100.0)?,
         endurance_s: table.optional_f32("endurance_s", 1.0..=1e6)?,
         payload_kg: table.optional_f32("payload_kg", 0.0..=1e4)?,
         personality,
-        home: table.get("home").map(|v| geodetic(&v)).transpose()?,
-        ekf_origin: table.get("ekf_origin").map(|v| geodetic(&v)).transpose()?,
+        home: table.get("home").map(|v| read_geodetic(&v)).transpose()?,
+        ekf_origin: table.get("ekf_origin").map(|v| read_geodetic(&v)).transpose()?,
         companion,
         weight: table.optional_f32("weight", 0.001..=1000.0)?,
         climb_mps: table.optional_f32("climb_mps", 0.01..=100.0)?,
@@ -480,7 +484,7 @@ fn vehicle(
     };
     for key in ["altitude_m", "endurance_s", "payload_kg", "weight", "climb_mps", "descend_mps"] {
         if let Some(value) = table.get(key) {
-            unsupported.push(not_yet(table.text, &value.span, key));
+            unsupported.push(unsupported_error(table.text, &value.span, key));
         }
     }
     table.finish()?;
@@ -488,7 +492,7 @@ fn vehicle(
     Ok((vehicle, spans))
 }
 
-fn link(value: &Value<'_>) -> Result<LinkUrl> {
+fn read_link(value: &Value<'_>) -> Result<LinkUrl> {
     let parsed = value.str()?.parse();
     parsed.map_err(|_| value.error("must be \"in-process\" or a URL such as \"tcp:HOST:PORT\""))
 }

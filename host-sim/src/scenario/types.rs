@@ -42,14 +42,14 @@ pub struct Scenario {
     /// `[area]`: what a coverage mission photographs.
     pub area: Option<Area>,
     /// `[formation]`
-    pub formation: Option<Unbuilt>,
+    pub formation: Option<UnsupportedTable>,
     /// Settings that are requested and not built yet, in the file's order.
     pub(super) unsupported: Vec<ScenarioError>,
 }
 
 /// A table that is read by a part not built yet.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Unbuilt {
+pub struct UnsupportedTable {
     /// The table as TOML values.
     pub table: toml::Table,
 }
@@ -107,7 +107,7 @@ pub struct Mission {
     pub mode: Mode,
     /// Objective that an assignment minimises.
     pub objective: Objective,
-    /// Speed along a path, metres a second.
+    /// Speed along a path, m/s.
     pub cruise_mps: f32,
     /// Tasks, ENU metres.
     pub goals: Vec<Point>,
@@ -154,7 +154,7 @@ pub struct Geofence {
 
 impl Geofence {
     /// Whether a place is inside the box or on one of its faces.
-    pub fn holds(&self, place: &Point) -> bool {
+    pub fn contains(&self, place: &Point) -> bool {
         (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&place[axis]))
     }
 }
@@ -172,7 +172,7 @@ pub struct Vehicle {
     pub radius_m: f32,
     /// Layer of the vehicle on 2D maps.
     pub altitude_m: Option<f32>,
-    /// Highest speed, metres a second.
+    /// Highest speed, m/s.
     pub speed_max_mps: f32,
     /// Flight time on one battery.
     pub endurance_s: Option<f32>,
@@ -188,9 +188,9 @@ pub struct Vehicle {
     pub companion: Companion,
     /// Coverage: its share of the work beside those of the others.
     pub weight: Option<f32>,
-    /// Coverage: speed of climb, metres a second.
+    /// Coverage: speed of climb, m/s.
     pub climb_mps: Option<f32>,
-    /// Coverage: speed of descent, metres a second.
+    /// Coverage: speed of descent, m/s.
     pub descend_mps: Option<f32>,
 }
 
@@ -200,7 +200,7 @@ const DEFAULT_CLIMB_MPS: f32 = 3.0;
 const DEFAULT_DESCEND_MPS: f32 = 1.0;
 
 impl Vehicle {
-    /// V_a and V_d, metres a second.
+    /// V_a and V_d, m/s.
     pub fn climbs_mps(&self) -> [f32; 2] {
         [self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS), self.descend_mps.unwrap_or(DEFAULT_DESCEND_MPS)]
     }
@@ -245,7 +245,7 @@ pub struct Deconfliction {
 /// `[simulation]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
-    /// Mean wind, metres a second.
+    /// Mean wind, m/s.
     pub wind_mps: f32,
     /// Gusts on top.
     pub gust_mps: f32,
@@ -289,7 +289,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether it strikes this vehicle: one without a vehicle strikes all, an obstacle nobody.
+    /// Whether the fault strikes this vehicle: a fault without a vehicle strikes all, an obstacle strikes none.
     pub fn strikes(&self, vehicle: &Vehicle) -> bool {
         self.kind != FAULT_OBSTACLE && self.vehicle.is_none_or(|id| id == vehicle.id)
     }

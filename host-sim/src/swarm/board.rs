@@ -18,19 +18,19 @@ use planner_core::Point;
 use super::radio::Radio;
 use super::serial::SerialLink;
 use super::step::STEP_US;
-use crate::boards::{self, Emulated, Piece};
+use crate::boards::{self, EmulatedBoard, PortBytes};
 use crate::link::{Link, LinkUrl};
 
 /// One board.
 pub struct Board {
-    ends: Ends,
+    ends: BoardConnection,
     framer: Framer,
     state: State,
     progress_m: Option<f32>,
 }
 
 /// Links that a board is joined to.
-pub struct Lines<'a> {
+pub struct BoardLinks<'a> {
     /// Bytes from the board's autopilot.
     pub up: &'a mut SerialLink,
     /// Bytes to the board's autopilot.
@@ -46,7 +46,7 @@ pub struct Lines<'a> {
 }
 
 /// Ends of our connection to the board.
-enum Ends {
+enum BoardConnection {
     /// Links, at the speed of the clock.
     Links { autopilot: Box<dyn Link>, radio: Option<Box<dyn Link>> },
     /// Grants of time.
@@ -55,7 +55,7 @@ enum Ends {
 
 /// A board in lock step.
 struct LockStep {
-    board: Emulated,
+    board: EmulatedBoard,
     /// When it started, microseconds of the simulation's time.
     started_us: u64,
     /// Whether it runs.
@@ -68,12 +68,12 @@ impl Board {
     /// # Errors
     /// QEMU or the program does not start; the board does not hold the files.
     pub fn emulate(program: &Path, log: &Path, roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Self> {
-        let mut board = Emulated::start(program, log)?;
-        board.load(&boards::bank(roadmap, mission)?)?;
-        Ok(Self::new(Ends::LockStep(LockStep { board, started_us: 0, runs: false })))
+        let mut board = EmulatedBoard::start(program, log)?;
+        board.load_flash(&boards::flash_bank_image(roadmap, mission)?)?;
+        Ok(Self::new(BoardConnection::LockStep(LockStep { board, started_us: 0, runs: false })))
     }
 
-    fn new(ends: Ends) -> Self {
+    fn new(ends: BoardConnection) -> Self {
         Self { ends, framer: Framer::new(), state: State::default(), progress_m: None }
     }
 
@@ -83,7 +83,7 @@ impl Board {
     /// A link cannot be opened.
     pub fn open(autopilot: &LinkUrl, radio: Option<&LinkUrl>) -> anyhow::Result<Self> {
         let radio = radio.map(LinkUrl::open).transpose()?;
-        Ok(Self::new(Ends::Links { autopilot: autopilot.open()?, radio }))
+        Ok(Self::new(BoardConnection::Links { autopilot: autopilot.open()?, radio }))
     }
 
     /// State of the board's companion as last reported.
@@ -99,7 +99,7 @@ impl Board {
 
     /// Whether its radio is ours.
     pub fn has_radio(&self) -> bool {
-        !matches!(self.ends, Ends::Links { radio: None, .. })
+        !matches!(self.ends, BoardConnection::Links { radio: None, .. })
     }
 
     /// Bytes of the stack that were used since its start; of boards in lock step alone.
@@ -107,9 +107,9 @@ impl Board {
     /// # Errors
     /// The board is gone.
     pub fn stack_used(&mut self) -> anyhow::Result<Option<usize>> {
-        let Ends::LockStep(LockStep { board, runs, .. }) = &mut self.ends else { return Ok(None) };
+        let BoardConnection::LockStep(LockStep { board, runs, .. }) = &mut self.ends else { return Ok(None) };
         if core::mem::take(runs) {
-            board.finish()?;
+            board.finish_grant()?;
         }
         board.stack_used().map(Some)
     }
@@ -119,31 +119,31 @@ impl Board {
     ///
     /// # Errors
     /// A board in lock step hangs or is gone.
-    pub fn step(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
+    pub fn step(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         match &mut self.ends {
-            Ends::Links { .. } => {
+            BoardConnection::Links { .. } => {
                 // A board that is gone is silent, as one without power.
-                let _: anyhow::Result<()> = self.exchange(now_us, lines);
+                let _: anyhow::Result<()> = self.exchange_bytes(now_us, lines);
                 Ok(())
             }
-            Ends::LockStep(lock_step) => {
-                let sent = lock_step.end(now_us)?;
+            BoardConnection::LockStep(lock_step) => {
+                let sent = lock_step.end_grant(now_us)?;
                 let started_us = lock_step.started_us;
-                for Piece { port, at_us, bytes } in sent {
+                for PortBytes { port, at_us, bytes } in sent {
                     match port {
                         Port::Autopilot => lines.down.write(started_us + at_us, &bytes),
-                        Port::Swarm => self.sent(now_us, &bytes, lines),
+                        Port::Swarm => self.broadcast_frames(now_us, &bytes, lines),
                     }
                 }
-                let Ends::LockStep(lock_step) = &mut self.ends else { return Ok(()) };
-                lock_step.begin(now_us, lines)
+                let BoardConnection::LockStep(lock_step) = &mut self.ends else { return Ok(()) };
+                lock_step.begin_grant(now_us, lines)
             }
         }
     }
 
     /// Bytes that have come by now on the links.
-    fn exchange(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
-        let Ends::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
+    fn exchange_bytes(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
+        let BoardConnection::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
         while let Some((_, bytes)) = lines.up.next_by(now_us) {
             autopilot.send(&bytes)?;
         }
@@ -167,11 +167,11 @@ impl Board {
             lines.down.write(now_us, &from_autopilot);
         }
         match from_radio {
-            Some(bytes) => self.sent(now_us, &bytes, lines),
+            Some(bytes) => self.broadcast_frames(now_us, &bytes, lines),
             None => {
                 let mut input = &from_autopilot[..];
                 while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
-                    self.note(&frame, &mut lines.said);
+                    self.note_report(&frame, &mut lines.said);
                 }
             }
         }
@@ -179,18 +179,18 @@ impl Board {
     }
 
     /// The board's radio sends bytes: its frames go out as whole packets.
-    fn sent(&mut self, now_us: u64, bytes: &[u8], lines: &mut Lines<'_>) {
+    fn broadcast_frames(&mut self, now_us: u64, bytes: &[u8], lines: &mut BoardLinks<'_>) {
         let mut input = bytes;
         while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
             let mut packet = [0; MAX_FRAME_LEN];
             let length = frame.encode(&mut packet);
             lines.radio.broadcast(now_us, Some(lines.station), lines.places, &packet[..length]);
-            self.note(&frame, &mut lines.said);
+            self.note_report(&frame, &mut lines.said);
         }
     }
 
     /// Keeps what the board reports of itself.
-    fn note(&mut self, frame: &Frame, said: &mut dyn FnMut(&str)) {
+    fn note_report(&mut self, frame: &Frame, said: &mut dyn FnMut(&str)) {
         if frame.component != COMPANION_COMPONENT {
             return;
         }
@@ -212,11 +212,11 @@ impl Board {
 
 impl LockStep {
     /// Bytes that the board sent in the step that ends now.
-    fn end(&mut self, now_us: u64) -> anyhow::Result<Vec<Piece>> {
+    fn end_grant(&mut self, now_us: u64) -> anyhow::Result<Vec<PortBytes>> {
         if !core::mem::take(&mut self.runs) {
             return Ok(Vec::new());
         }
-        let answer = self.board.finish()?;
+        let answer = self.board.finish_grant()?;
         if answer.restarted {
             self.started_us = now_us;
         }
@@ -224,18 +224,18 @@ impl LockStep {
     }
 
     /// Grants it the next step, and what it receives meanwhile.
-    fn begin(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
+    fn begin_grant(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         let until_us = now_us + STEP_US;
         let board_us = |us: u64| us.max(now_us) - self.started_us;
         let mut pieces = Vec::new();
         while let Some(packet) = lines.radio.receive(now_us, lines.station) {
-            pieces.push(Piece { port: Port::Swarm, at_us: board_us(now_us), bytes: packet.to_vec() });
+            pieces.push(PortBytes { port: Port::Swarm, at_us: board_us(now_us), bytes: packet.to_vec() });
         }
         while let Some((arrives_us, bytes)) = lines.up.next_by(until_us) {
-            pieces.push(Piece { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
+            pieces.push(PortBytes { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
         }
         self.runs = true;
-        self.board.begin(board_us(until_us), &pieces)
+        self.board.begin_grant(board_us(until_us), &pieces)
     }
 }
 

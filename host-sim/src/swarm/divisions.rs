@@ -1,13 +1,13 @@
-//! What companions of a coverage mission divide in flight, as their radio tells: the plans that they fly after it, and what each
-//! division follows from. Whoever has the mission file can plan the same again.
+//! Divisions that companions of a coverage mission make in flight, from their radio messages: the plans that they fly
+//! after it, and what each division follows from. Whoever has the mission file can plan the same again.
 
 use std::collections::HashMap;
 use std::rc::Rc;
 
 use companion::link::frame::Framer;
 use companion::link::intent::Intent;
-use companion::link::roster::Roster;
-use companion::swarm::fleet::Lot;
+use companion::link::roster::RosterReport;
+use companion::swarm::fleet::DivisionInput;
 use companion::time::Instant;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -22,7 +22,7 @@ pub struct Division {
     /// Divisions that count, this one among them.
     pub number: u8,
     /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody reported them.
-    pub lots: Vec<Lot>,
+    pub lots: Vec<DivisionInput>,
     /// The CRC of the plan that the vehicle flies.
     pub plan_crc: u32,
 }
@@ -40,21 +40,21 @@ struct Reported {
 
 /// Reports heard so far.
 #[derive(Debug, Default)]
-pub struct Divisions {
+pub struct DivisionLog {
     vehicles: HashMap<u8, Reported>,
     /// Lots by the hash under which they were reported.
-    lots: HashMap<u32, Vec<Lot>>,
+    lots: HashMap<u32, Vec<DivisionInput>>,
     reported: Vec<Division>,
 }
 
-impl Divisions {
-    /// Takes in what stations sent.
-    pub fn hear(&mut self, t_s: f32, packets: &[Rc<[u8]>]) {
+impl DivisionLog {
+    /// Handles what stations sent.
+    pub fn handle_packets(&mut self, t_s: f32, packets: &[Rc<[u8]>]) {
         for packet in packets {
             let mut input = &packet[..];
             let frame = Framer::new().next(Instant::ZERO, &mut input);
             let Some(frame) = frame.filter(|frame| frame.message_id == TUNNEL_DATA::ID) else { continue };
-            if let Some(roster) = Roster::decode(frame.padded(), frame.system) {
+            if let Some(roster) = RosterReport::decode(frame.padded(), frame.system) {
                 self.take_roster(t_s, &roster);
             } else if let Some(intent) = Intent::decode(frame.padded(), frame.system) {
                 self.take_intent(t_s, &intent);
@@ -62,35 +62,35 @@ impl Divisions {
         }
     }
 
-    fn take_roster(&mut self, t_s: f32, roster: &Roster) {
+    fn take_roster(&mut self, t_s: f32, roster: &RosterReport) {
         let reported = self.vehicles.entry(roster.system_id).or_default();
-        (reported.number, reported.counted) = (roster.divisions, roster.counted);
+        (reported.number, reported.counted) = (roster.divisions, roster.committed_hash);
         if reported.number == reported.flies {
             reported.flown_crc = reported.plan_crc;
         }
-        self.note(t_s, roster.system_id);
+        self.note_division(t_s, roster.system_id);
         if roster.hash == 0 {
             return;
         }
         // A vehicle without a part in the division before has none in this one.
-        let before = self.lots.get(&roster.counted).cloned().unwrap_or_default();
+        let before = self.lots.get(&roster.committed_hash).cloned().unwrap_or_default();
         let lots = self.lots.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
             let rank = i + usize::from(roster.first);
-            lots.resize(lots.len().max(rank + 1), Lot::default());
-            if before.get(rank).is_none_or(|lot| lot.lives) {
-                lots[rank] = Lot::of(entry);
+            lots.resize(lots.len().max(rank + 1), DivisionInput::default());
+            if before.get(rank).is_none_or(|lot| lot.alive) {
+                lots[rank] = DivisionInput::from_entry(entry);
             }
         }
     }
 
     fn take_intent(&mut self, t_s: f32, intent: &Intent) {
         self.vehicles.entry(intent.system_id).or_default().plan_crc = intent.plan_crc;
-        self.note(t_s, intent.system_id);
+        self.note_division(t_s, intent.system_id);
     }
 
     /// A division that counts is flown once the plan is another one.
-    fn note(&mut self, t_s: f32, vehicle: u8) {
+    fn note_division(&mut self, t_s: f32, vehicle: u8) {
         let reported = self.vehicles.entry(vehicle).or_default();
         if reported.number > reported.flies && reported.plan_crc != reported.flown_crc {
             (reported.flies, reported.flown_crc) = (reported.number, reported.plan_crc);

@@ -11,12 +11,12 @@
 //! | `gps-loss` | no position | position again |
 //! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
-//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to go on | |
+//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to continue | |
 //! | `autopilot-reboot` | motors off, everything forgotten, silent while it boots | 3 s if not given |
 //! | `companion-reset` | a new companion with a new clock | |
 //! | `late-plan` | a request for a plan gets no answer | answered |
 //! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
-//! | `pause-order` | the ground station commands a pause | commands to go on |
+//! | `pause-order` | the ground station commands a pause | commands to continue |
 //! | `return-order` | the ground station commands to fly home | |
 //! | `land-order` | the ground station commands to land | |
 //! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | gone; the companions keep off on |
@@ -26,9 +26,9 @@
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
 
-use super::ground_station::{GroundStation, Order};
-use super::member::{Member, Planner};
-use super::radio::{Cut, Radio};
+use super::ground_station::{GroundStation, OperatorCommand};
+use super::member::{Planner, SimulatedVehicle};
+use super::radio::{Radio, RadioOutage};
 use crate::report::{Event, Level};
 use crate::scenario::{Companion, FAULT_OBSTACLE, Fault, Scenario};
 
@@ -69,12 +69,12 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
 }
 
 /// Parts of the simulation that a fault acts on.
-pub struct World<'a> {
+pub struct FaultTargets<'a> {
     /// The vehicles, in the order of the scenario.
-    pub members: &'a mut [Member],
+    pub members: &'a mut [SimulatedVehicle],
     /// Radio of the swarm.
     pub radio: &'a mut Radio,
-    /// The ground station that commands them to go on.
+    /// The ground station that commands them to continue.
     pub ground_station: &'a mut GroundStation,
     /// Spheres that are on no map: centre and radius, metres.
     pub obstacles: &'a mut Vec<(Point, f32)>,
@@ -88,13 +88,13 @@ enum Stage {
 }
 
 /// The scenario's faults and how far they have come.
-pub struct Script<'a> {
+pub struct FaultScript<'a> {
     scenario: &'a Scenario,
     stages: Vec<Stage>,
     struck: Vec<bool>,
 }
 
-impl<'a> Script<'a> {
+impl<'a> FaultScript<'a> {
     /// A script of which nothing has happened yet.
     pub fn new(scenario: &'a Scenario) -> Self {
         Self {
@@ -105,19 +105,24 @@ impl<'a> Script<'a> {
     }
 
     /// Whether a fault has struck the vehicle.
-    pub fn struck(&self, vehicle: usize) -> bool {
+    pub fn is_struck(&self, vehicle: usize) -> bool {
         self.struck[vehicle]
     }
 
-    /// Whether nothing is left to happen.
+    /// Whether all faults have begun and ended.
     pub fn is_over(&self) -> bool {
         let ends = |fault: &Fault| fault.duration_s.is_some();
         let mut pairs = self.scenario.faults.iter().zip(&self.stages);
         pairs.all(|(fault, stage)| *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault)))
     }
 
-    /// Lets begin and end what is due; reports each.
-    pub fn step(&mut self, now_us: u64, world: &mut World<'_>, log: &mut Vec<Event>) -> anyhow::Result<()> {
+    /// Begins and ends the faults that are due, and logs each.
+    pub fn step(
+        &mut self,
+        now_us: u64,
+        world: &mut FaultTargets<'_>,
+        log: &mut Vec<Event>,
+    ) -> anyhow::Result<()> {
         let t_s = (now_us as f64 * 1e-6) as f32;
         for (fault, stage) in self.scenario.faults.iter().zip(&mut self.stages) {
             let ends_s = fault.duration_s.map_or(f32::INFINITY, |lasts_s| fault.at_s + lasts_s);
@@ -133,7 +138,7 @@ impl<'a> Script<'a> {
                 let done = if next == Stage::Acting {
                     world.obstacles.push((place, radius_m));
                     let centre = enu_to_geodetic(&self.scenario.map.origin, &place);
-                    world.ground_station.exclude(centre, radius_m);
+                    world.ground_station.report_obstacle(centre, radius_m);
                     "begins"
                 } else {
                     world.obstacles.retain(|obstacle| *obstacle != (place, radius_m));
@@ -149,10 +154,10 @@ impl<'a> Script<'a> {
                 }
                 let done = if next == Stage::Acting {
                     self.struck[i] = true;
-                    begin(fault, i, now_us, world)?;
+                    begin_fault(fault, i, now_us, world)?;
                     "begins"
                 } else {
-                    end(fault, i, now_us, world, f64::from(self.scenario.simulation.serial_corruption));
+                    end_fault(fault, i, now_us, world, f64::from(self.scenario.simulation.serial_corruption));
                     "ends"
                 };
                 let text = format!("fault {done}: {}", fault.kind);
@@ -163,57 +168,57 @@ impl<'a> Script<'a> {
     }
 }
 
-fn begin(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>) -> anyhow::Result<()> {
+fn begin_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>) -> anyhow::Result<()> {
     let member = &mut world.members[i];
     let spell_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_FAULT_S) * 1e6) as u64;
     match fault.kind {
         "kill" => {
-            world.radio.cut(i, Cut { tx: true, rx: true });
-            member.kill();
+            world.radio.set_outage(i, RadioOutage { tx: true, rx: true });
+            member.cut_power();
         }
         "radio-cut" => {
             let way = fault.direction.as_deref().unwrap_or("both");
-            world.radio.cut(i, Cut { tx: way != "rx", rx: way != "tx" });
+            world.radio.set_outage(i, RadioOutage { tx: way != "rx", rx: way != "tx" });
         }
-        "serial-stall" => member.stall(spell_us),
-        "serial-corrupt" => member.corrupt(CORRUPTED_SHARE),
+        "serial-stall" => member.stall_serial(spell_us),
+        "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
         "position-jump" => member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M)),
         "origin-change" => member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M)),
         "gps-loss" => member.autopilot.set_gps_ok(false),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
-        "pilot-takeover" => member.autopilot.pilot_takes_over(),
-        "pilot-return" => give_back(i, now_us, world),
+        "pilot-takeover" => member.autopilot.take_over_by_pilot(),
+        "pilot-return" => return_from_pilot(i, now_us, world),
         "autopilot-reboot" => member.reboot_autopilot(spell_us),
         "companion-reset" => member.reset_companion(now_us)?,
         "late-plan" => member.planner = Planner::Late,
         "bad-roadmap" => member.planner = Planner::BadRoadmap,
-        "pause-order" => world.ground_station.order(now_us, i, Order::Pause),
-        "return-order" => world.ground_station.order(now_us, i, Order::Return),
-        "land-order" => world.ground_station.order(now_us, i, Order::Land),
+        "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Pause),
+        "return-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Return),
+        "land-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Land),
         kind => anyhow::bail!("no fault of this kind can be played: {kind}"),
     }
     Ok(())
 }
 
-fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: f64) {
+fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>, corruption: f64) {
     let member = &mut world.members[i];
     match fault.kind {
-        "radio-cut" => world.radio.cut(i, Cut::default()),
-        "serial-corrupt" => member.corrupt(corruption),
+        "radio-cut" => world.radio.set_outage(i, RadioOutage::default()),
+        "serial-corrupt" => member.set_serial_corruption(corruption),
         "position-jump" => member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M)),
         "origin-change" => member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M)),
         "gps-loss" => member.autopilot.set_gps_ok(true),
-        "pilot-takeover" => give_back(i, now_us, world),
+        "pilot-takeover" => return_from_pilot(i, now_us, world),
         "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,
-        "pause-order" => world.ground_station.order(now_us, i, Order::Resume),
+        "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Resume),
         // The others end by themselves, or never.
         _ => {}
     }
 }
 
-fn give_back(i: usize, now_us: u64, world: &mut World<'_>) {
-    world.members[i].autopilot.pilot_returns();
-    world.ground_station.order(now_us, i, Order::Resume);
+fn return_from_pilot(i: usize, now_us: u64, world: &mut FaultTargets<'_>) {
+    world.members[i].autopilot.return_from_pilot();
+    world.ground_station.set_command(now_us, i, OperatorCommand::Resume);
 }
 
 #[cfg(test)]

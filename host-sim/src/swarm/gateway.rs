@@ -11,7 +11,7 @@ use companion::link::frame::Framer;
 use companion::time::Instant;
 use planner_core::Point;
 
-use super::member::Member;
+use super::member::SimulatedVehicle;
 use super::radio::Radio;
 use crate::link::Link;
 
@@ -33,7 +33,7 @@ impl Gateway {
     }
 
     /// Gives the vehicles their port for it.
-    pub fn attach(&self, members: &mut [Member]) {
+    pub fn add_ground_ports(&self, members: &mut [SimulatedVehicle]) {
         members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
     }
 
@@ -45,7 +45,7 @@ impl Gateway {
     pub fn step(
         &mut self,
         now_us: u64,
-        members: &mut [Member],
+        members: &mut [SimulatedVehicle],
         radio: &mut Radio,
         places: &[Point],
         overheard: &[Rc<[u8]>],
@@ -57,7 +57,7 @@ impl Gateway {
                 break;
             }
             let bytes = &buffer[..length];
-            members.iter_mut().for_each(|member| member.hear_ground(now_us, bytes));
+            members.iter_mut().for_each(|member| member.handle_ground_bytes(now_us, bytes));
             radio.broadcast(now_us, None, places, bytes);
         }
         for packet in overheard.iter().filter(|packet| is_for_ground(packet)) {
@@ -65,7 +65,7 @@ impl Gateway {
         }
         for member in members {
             loop {
-                let length = member.tell_ground(now_us, &mut buffer[..MAX_DATAGRAM]);
+                let length = member.poll_ground_transmit(now_us, &mut buffer[..MAX_DATAGRAM]);
                 if length == 0 {
                     break;
                 }

@@ -1,6 +1,6 @@
 //! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! commands a vehicle to go on that its pilot gave back, gives the orders of the script, and reports each obstacle it sees to
-//! all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
+//! commands a vehicle to continue that its pilot gave back, gives the orders of the script, and reports each obstacle
+//! it sees to all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -9,7 +9,7 @@ use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavC
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-use super::member::{Member, is_finished};
+use super::member::{SimulatedVehicle, is_finished};
 use super::radio::Radio;
 
 /// MAV_COMP_ID_MISSIONPLANNER.
@@ -24,8 +24,8 @@ const ORDER_REPEATED_FOR_US: u64 = 10_000_000;
 
 /// Command to one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// To go on after a pilot's control, or after a pause.
+pub enum OperatorCommand {
+    /// To continue after a pilot's control, or after a pause.
     Resume,
     /// To stop.
     Pause,
@@ -35,9 +35,9 @@ pub enum Order {
     Land,
 }
 
-impl Order {
-    /// Whether a vehicle in this state is still to be told.
-    fn is_open(self, state: State) -> bool {
+impl OperatorCommand {
+    /// Whether a vehicle in this state still needs the command.
+    fn is_still_needed(self, state: State) -> bool {
         match self {
             // On the pad a vehicle waits for it in its states before the start.
             Self::Resume => matches!(
@@ -56,10 +56,10 @@ impl Order {
 
     fn command(self, id: u8) -> COMMAND_LONG_DATA {
         match self {
-            Self::Resume => order(PAUSE_CONTINUE, id, 1.0),
-            Self::Pause => order(PAUSE_CONTINUE, id, 0.0),
-            Self::Return => order(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, id, 0.0),
-            Self::Land => order(MavCmd::MAV_CMD_NAV_LAND, id, 0.0),
+            Self::Resume => command_long(PAUSE_CONTINUE, id, 1.0),
+            Self::Pause => command_long(PAUSE_CONTINUE, id, 0.0),
+            Self::Return => command_long(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, id, 0.0),
+            Self::Land => command_long(MavCmd::MAV_CMD_NAV_LAND, id, 0.0),
         }
     }
 }
@@ -73,7 +73,7 @@ pub struct GroundStation {
     first_us: Option<u64>,
     last_us: u64,
     /// Commands to vehicles, and until when they are repeated.
-    orders: Vec<(usize, Order, u64)>,
+    orders: Vec<(usize, OperatorCommand, u64)>,
     /// Centres and radii of obstacles to report, metres.
     obstacles: Vec<(Geodetic, f32)>,
 }
@@ -93,7 +93,7 @@ impl GroundStation {
     }
 
     /// Whether the start was commanded.
-    pub fn started(&self) -> bool {
+    pub fn is_started(&self) -> bool {
         self.first_us.is_some()
     }
 
@@ -102,29 +102,35 @@ impl GroundStation {
         self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
-    /// Commands a vehicle to do this from now on, in place of what it was told before.
-    pub fn order(&mut self, now_us: u64, vehicle: usize, order: Order) {
+    /// Sets the command for a vehicle; it replaces the earlier command.
+    pub fn set_command(&mut self, now_us: u64, vehicle: usize, order: OperatorCommand) {
         self.orders.retain(|&(of, ..)| of != vehicle);
         self.orders.push((vehicle, order, now_us + ORDER_REPEATED_FOR_US));
     }
 
     /// Reports an obstacle to all vehicles, from now on.
-    pub fn exclude(&mut self, centre: Geodetic, radius_m: f32) {
+    pub fn report_obstacle(&mut self, centre: Geodetic, radius_m: f32) {
         self.obstacles.push((centre, radius_m));
     }
 
     /// Commands the start once all are ready, and again to each that has not heard it.
-    pub fn step(&mut self, now_us: u64, members: &mut [Member], radio: &mut Radio, places: &[Point]) {
-        let frames = self.frames(now_us, members);
+    pub fn step(
+        &mut self,
+        now_us: u64,
+        members: &mut [SimulatedVehicle],
+        radio: &mut Radio,
+        places: &[Point],
+    ) {
+        let frames = self.due_frames(now_us, members);
         for frame in frames {
             radio.broadcast(now_us, None, places, &frame);
-            members.iter_mut().for_each(|member| member.forward(now_us, &frame));
+            members.iter_mut().for_each(|member| member.forward_to_board(now_us, &frame));
         }
     }
 
     /// Frames that the ground station sends.
-    fn frames(&mut self, now_us: u64, members: &[Member]) -> Vec<Vec<u8>> {
-        let state = |m: &Member| m.state();
+    fn due_frames(&mut self, now_us: u64, members: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
+        let state = |m: &SimulatedVehicle| m.state();
         if self.first_us.is_none() {
             let ready = || members.iter().filter(|m| state(m) == State::Ready);
             if ready().next().is_some() {
@@ -137,7 +143,7 @@ impl GroundStation {
             }
             self.first_us = Some(now_us);
             self.last_us = now_us;
-            return vec![self.frame(&order(START, ALL_SYSTEMS, 0.0))];
+            return vec![self.command_frame(&command_long(START, ALL_SYSTEMS, 0.0))];
         }
         if now_us < self.last_us + COMMAND_EVERY_US {
             return Vec::new();
@@ -145,11 +151,12 @@ impl GroundStation {
         self.last_us = now_us;
         // A pause that was obeyed is not commanded again: it may be resumed.
         self.orders.retain(|&(of, order, until_us)| {
-            now_us < until_us && (order != Order::Pause || order.is_open(state(&members[of])))
+            now_us < until_us
+                && (order != OperatorCommand::Pause || order.is_still_needed(state(&members[of])))
         });
         let mut frames = Vec::new();
         for (centre, radius_m) in self.obstacles.clone() {
-            frames.push(self.frame(&COMMAND_INT_DATA {
+            frames.push(self.command_frame(&COMMAND_INT_DATA {
                 command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
                 target_system: ALL_SYSTEMS,
                 frame: MavFrame::MAV_FRAME_GLOBAL,
@@ -163,18 +170,18 @@ impl GroundStation {
         for (i, member) in members.iter().enumerate() {
             let id = member.system_id();
             if state(member) == State::Ready {
-                frames.push(self.frame(&order(START, id, 0.0)));
+                frames.push(self.command_frame(&command_long(START, id, 0.0)));
             }
             for (_, order, _) in self.orders.clone().into_iter().filter(|&(of, ..)| of == i) {
-                if order.is_open(state(member)) {
-                    frames.push(self.frame(&order.command(id)));
+                if order.is_still_needed(state(member)) {
+                    frames.push(self.command_frame(&order.command(id)));
                 }
             }
         }
         frames
     }
 
-    fn frame(&mut self, command: &impl MessageData) -> Vec<u8> {
+    fn command_frame(&mut self, command: &impl MessageData) -> Vec<u8> {
         let mut buffer = [0; frame::MAX_FRAME_LEN];
         let length = encode(command, self.system_id, self.sequence, &mut buffer);
         self.sequence = self.sequence.wrapping_add(1);
@@ -190,10 +197,10 @@ const ALL_SYSTEMS: u8 = 0;
 
 /// A frame by which ground station `from` commands the start; returns its length.
 pub fn mission_start(from: u8, target_system: u8, out: &mut [u8; frame::MAX_FRAME_LEN]) -> usize {
-    encode(&order(START, target_system, 0.0), from, 0, out)
+    encode(&command_long(START, target_system, 0.0), from, 0, out)
 }
 
-fn order(command: MavCmd, target_system: u8, param1: f32) -> COMMAND_LONG_DATA {
+fn command_long(command: MavCmd, target_system: u8, param1: f32) -> COMMAND_LONG_DATA {
     COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT }
 }
 

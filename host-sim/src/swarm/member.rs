@@ -2,11 +2,11 @@
 
 use anyhow::Context;
 use companion::storage::store::{MAX_READ, Store};
-use companion::{Config, Event, Instant, Link, State, Wanted};
+use companion::{Config, Event, Instant, Link, PlanKind, State};
 use planner_core::Point;
 use sim_autopilot::{Autopilot, Photo};
 
-use super::board::{Board, Lines};
+use super::board::{Board, BoardLinks};
 use super::radio::Radio;
 use super::referee::{Observation, Phase};
 use super::serial::{SerialConfig, SerialLink};
@@ -35,7 +35,7 @@ pub enum Planner {
 }
 
 /// One vehicle.
-pub struct Member {
+pub struct SimulatedVehicle {
     /// Autopilot of the vehicle.
     pub autopilot: Autopilot,
     /// Companion of the vehicle, unless a board runs it.
@@ -45,10 +45,10 @@ pub struct Member {
     /// Flash of the companion.
     flash: Option<DeskFlash>,
     /// The plan that the companion waits for.
-    pub wants_plan: Option<Wanted>,
+    pub wants_plan: Option<PlanKind>,
     /// How it is answered.
     pub planner: Planner,
-    /// The last warning of a mission that did not go on since: why it left its usual course.
+    /// The last warning of a mission that did not continue since: why it left its usual course.
     pub cause: Option<&'static str>,
     /// When it left the ground, seconds.
     pub took_off_s: Option<f64>,
@@ -67,7 +67,7 @@ pub struct Member {
     wrecked: bool,
 }
 
-impl Member {
+impl SimulatedVehicle {
     /// A vehicle on its pad, powered up.
     pub fn new(
         autopilot: &sim_autopilot::Config,
@@ -102,7 +102,7 @@ impl Member {
     ///
     /// # Errors
     /// None that the first start had not.
-    pub fn keep_flash(&mut self, flash: DeskFlash) -> anyhow::Result<()> {
+    pub fn attach_flash(&mut self, flash: DeskFlash) -> anyhow::Result<()> {
         self.flash = Some(flash);
         self.start_companion()
     }
@@ -110,21 +110,21 @@ impl Member {
     fn start_companion(&mut self) -> anyhow::Result<()> {
         self.companion = new_companion(self.config.clone())?;
         if let Some(flash) = &mut self.flash {
-            self.companion.mount(Store::mount(LAYOUT, flash));
+            self.companion.attach_store(Store::mount(LAYOUT, flash));
         }
         Ok(())
     }
 
     /// A board runs the companion from now on.
-    pub fn put_on(&mut self, board: Board) {
+    pub fn attach_board(&mut self, board: Board) {
         self.board = Some(board);
     }
 
-    /// Says how much of its stack its board used, if it has one in lock step.
+    /// Prints how much stack its board used, if the board is in lock step.
     ///
     /// # Errors
     /// The board is gone.
-    pub fn say_stack(&mut self) -> anyhow::Result<()> {
+    pub fn print_stack_use(&mut self) -> anyhow::Result<()> {
         let (id, board) = (self.system_id(), self.board.as_mut());
         if let Some(used) = board.map(Board::stack_used).transpose()?.flatten() {
             say!("board {id}: stack: {used} of {STACK_LEN} bytes used");
@@ -143,17 +143,17 @@ impl Member {
     }
 
     /// Whether it has lost all power.
-    pub fn killed(&self) -> bool {
+    pub fn is_powerless(&self) -> bool {
         self.killed
     }
 
     /// Whether it fell without its motors.
-    pub fn wrecked(&self) -> bool {
+    pub fn is_wrecked(&self) -> bool {
         self.wrecked
     }
 
-    /// Takes all power away.
-    pub fn kill(&mut self) {
+    /// Cuts the power of autopilot and companion.
+    pub fn cut_power(&mut self) {
         self.cut_motors();
         self.killed = true;
     }
@@ -165,7 +165,7 @@ impl Member {
     }
 
     fn cut_motors(&mut self) {
-        let truth = self.autopilot.truth();
+        let truth = self.autopilot.true_state();
         self.wrecked |= truth.armed && !truth.touching;
         self.autopilot.reboot();
     }
@@ -182,15 +182,15 @@ impl Member {
     }
 
     /// No byte passes between companion and autopilot until `until_us`.
-    pub fn stall(&mut self, until_us: u64) {
+    pub fn stall_serial(&mut self, until_us: u64) {
         self.up.stall(until_us);
         self.down.stall(until_us);
     }
 
     /// Changes the share of bytes that the serial link changes.
-    pub fn corrupt(&mut self, share: f64) {
-        self.up.corrupt(share);
-        self.down.corrupt(share);
+    pub fn set_serial_corruption(&mut self, share: f64) {
+        self.up.set_corruption(share);
+        self.down.set_corruption(share);
     }
 
     /// The companion's time.
@@ -214,7 +214,7 @@ impl Member {
         let now_us = (step + 1) * STEP_US;
         if step % GROUND_CHECK_STEPS == station as u64 % GROUND_CHECK_STEPS {
             self.ground_m =
-                mission.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
+                mission.ground_below(&self.autopilot.true_state().position).unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
         if self.killed {
@@ -241,7 +241,7 @@ impl Member {
         if !self.bytes.is_empty() && !booting {
             self.autopilot.handle_bytes(&self.bytes);
         }
-        let (t_s, truth) = (now_us as f64 * 1e-6, self.autopilot.truth());
+        let (t_s, truth) = (now_us as f64 * 1e-6, self.autopilot.true_state());
         if !truth.touching && truth.armed {
             self.took_off_s.get_or_insert(t_s);
         }
@@ -269,11 +269,11 @@ impl Member {
         };
         let (up, down) = (&mut self.up, &mut self.down);
         board
-            .step(now_us, &mut Lines { up, down, radio, station, places, said: &mut said })
+            .step(now_us, &mut BoardLinks { up, down, radio, station, places, said: &mut said })
             .with_context(|| format!("the board of vehicle {id}"))
     }
 
-    /// Lets the companion in this process have what has come by now.
+    /// Gives the companion in this process the bytes that have arrived by now.
     fn step_companion(
         &mut self,
         now_us: u64,
@@ -305,19 +305,19 @@ impl Member {
                     log.push(report::Event { t_s, vehicle, level: Level::Info, text });
                 }
                 Event::StateChanged { from, to, text, warning } => {
-                    self.note(from, to, text, warning);
-                    log.push(self.entry(now_us, from, to, text));
+                    self.log_transition(from, to, text, warning);
+                    log.push(self.log_entry(now_us, from, to, text));
                 }
             }
         }
         if let Some(flash) = &mut self.flash {
             let mut read = [0; MAX_READ];
             while let Some(request) = self.companion.poll_flash() {
-                let outcome = flash.obey(request, &mut read);
+                let outcome = flash.execute_request(request, &mut read);
                 self.companion.handle_flash(now, outcome);
             }
         }
-        self.drain(now_us, station, radio, places);
+        self.drain_companion(now_us, station, radio, places);
         if restarts {
             // Cannot fail: the companion was made once, so it can be made again.
             let _ = self.reset_companion(now_us);
@@ -326,25 +326,25 @@ impl Member {
 
     /// Faults of the vehicle's serial link over `lasted_s` seconds, the worse direction first.
     pub fn link_trouble(&self, lasted_s: f64) -> Option<String> {
-        self.up.trouble(lasted_s).or_else(|| self.down.trouble(lasted_s))
+        self.up.describe_fault(lasted_s).or_else(|| self.down.describe_fault(lasted_s))
     }
 
     /// Passes on to a board without a radio what a ground station sends its companion: by the autopilot, as that forwards it.
-    pub fn forward(&mut self, now_us: u64, frame: &[u8]) {
+    pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
             self.up.write(now_us, frame);
         }
     }
 
-    /// Takes what a ground station sent.
-    pub fn hear_ground(&mut self, now_us: u64, bytes: &[u8]) {
+    /// Handles bytes from a ground station.
+    pub fn handle_ground_bytes(&mut self, now_us: u64, bytes: &[u8]) {
         if !self.is_down(now_us) {
             self.autopilot.handle_ground_bytes(bytes);
         }
     }
 
     /// Moves what a ground station gets into `out`, whole frames; the bytes moved.
-    pub fn tell_ground(&mut self, now_us: u64, out: &mut [u8]) -> usize {
+    pub fn poll_ground_transmit(&mut self, now_us: u64, out: &mut [u8]) -> usize {
         let length = self.autopilot.poll_ground_transmit(out);
         if self.is_down(now_us) { 0 } else { length }
     }
@@ -354,7 +354,7 @@ impl Member {
         self.killed || now_us < self.boots_until_us
     }
 
-    fn note(&mut self, from: State, to: State, text: &'static str, warning: bool) {
+    fn log_transition(&mut self, from: State, to: State, text: &'static str, warning: bool) {
         if warning && !text.is_empty() {
             self.cause = Some(text);
         } else if to == State::Follow || from == State::Aborted {
@@ -362,7 +362,7 @@ impl Member {
         }
     }
 
-    fn entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::Event {
+    fn log_entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::Event {
         let level = match to {
             State::Aborted | State::Failsafe => Level::Error,
             State::PilotControl
@@ -378,7 +378,7 @@ impl Member {
     }
 
     /// How it ended: the state of its mission, and why where it left the usual course.
-    pub fn end(&self) -> String {
+    pub fn describe_end(&self) -> String {
         match (self.killed, self.cause) {
             (true, _) => "Killed".to_owned(),
             (false, Some(cause)) => format!("{:?}: {cause}", self.state()),
@@ -393,7 +393,7 @@ impl Member {
         self.companion.handle_plan(now, wanted, plan);
     }
 
-    fn drain(&mut self, now_us: u64, station: usize, radio: &mut Radio, places: &[Point]) {
+    fn drain_companion(&mut self, now_us: u64, station: usize, radio: &mut Radio, places: &[Point]) {
         let mut buffer = [0; 512];
         loop {
             let length = self.companion.poll_transmit(Link::Autopilot, &mut buffer);
@@ -425,10 +425,10 @@ impl Member {
 
     /// State of the vehicle as the referee sees it.
     pub fn observation(&self) -> Observation {
-        let truth = self.autopilot.truth();
+        let truth = self.autopilot.true_state();
         let state = self.state();
         // A board's report of its state is up to a second old; the autopilot's actions are seen.
-        let lands = self.board.is_some() && self.autopilot.lands();
+        let lands = self.board.is_some() && self.autopilot.is_landing();
         let phase = match (truth.touching, on_path(state) && !lands) {
             (touching, _) if self.wrecked => {
                 if touching {

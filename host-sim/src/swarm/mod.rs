@@ -19,20 +19,20 @@ pub mod vehicles;
 use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
-use companion::{PlanFailure, State, Wanted};
+use companion::{PlanFailure, PlanKind, State};
 use planner_core::Point;
-use planner_core::flight::Range;
+use planner_core::flight::WaypointRange;
 use planner_core::roadmap::RoadmapView;
 
-use self::divisions::{Division, Divisions};
-use self::faults::{Script, World};
+use self::divisions::{Division, DivisionLog};
+use self::faults::{FaultScript, FaultTargets};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
-use self::member::{Member, Planner, is_finished};
+use self::member::{Planner, SimulatedVehicle, is_finished};
 use self::radio::{Radio, RadioConfig};
 use self::referee::{Referee, Sample};
 use self::step::STEP_US;
-use self::vehicles::members;
+use self::vehicles::vehicles_on_pads;
 use crate::coverage::check::Picture;
 use crate::margins;
 use crate::mission::{Mission, OwnPlan, SwarmPlan};
@@ -46,7 +46,7 @@ use crate::shortage;
 const REACHED_M: f32 = 0.5;
 /// Distance from its pad beyond which a vehicle has left the pad, metres.
 const OFF_PAD_M: f32 = 2.0;
-/// Simulated time that goes on after the last vehicle is done, seconds.
+/// Simulated time that continues after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
 /// Standstill of all vehicles after a fault after which no vehicle will fly any more, seconds:
 /// longer than from a gate's opening to the take-off.
@@ -69,7 +69,7 @@ pub struct Flight {
     /// Events that the companions reported.
     pub log: Vec<report::Event>,
     /// Waypoints of a coverage mission that were photographed in flights before.
-    pub done: Vec<Range>,
+    pub done: Vec<WaypointRange>,
     /// Divisions that companions of a coverage mission made, in order of time.
     pub divisions: Vec<Division>,
     /// Simulated seconds.
@@ -93,7 +93,7 @@ pub fn fly(
 ///
 /// # Errors
 /// The link to the ground station is gone.
-pub fn fly_shown(
+pub fn fly_with_ground_station(
     mission: &Mission,
     plan: &SwarmPlan,
     command: &'static str,
@@ -104,18 +104,18 @@ pub fn fly_shown(
 }
 
 /// A simulation under way.
-struct Run<'a> {
+struct SimulationRun<'a> {
     mission: &'a Mission,
     plan: &'a SwarmPlan,
-    members: Vec<Member>,
+    members: Vec<SimulatedVehicle>,
     radio: Radio,
     referee: Referee<'a>,
     ground_station: GroundStation,
     gateway: Option<Gateway>,
-    divisions: Divisions,
-    script: Script<'a>,
+    divisions: DivisionLog,
+    script: FaultScript<'a>,
     log: Vec<report::Event>,
-    done: Vec<Range>,
+    done: Vec<WaypointRange>,
     places: Vec<Point>,
     nearest_goal_m: Vec<f32>,
     /// Simulated seconds.
@@ -133,20 +133,20 @@ fn simulate(
     gateway: Option<Gateway>,
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
-    let mut run = Run::new(mission, plan, gateway)?;
+    let mut run = SimulationRun::new(mission, plan, gateway)?;
     let settings = &mission.scenario.simulation;
     // The time of a board behind links is the clock's.
     let by_clock = mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
-    let bar = progress.steps("flight", settings.time_limit_s as u64);
+    let bar = progress.begin_counted_stage("flight", settings.time_limit_s as u64);
     let began = Clock::now();
     let mut put_off = Duration::ZERO;
     for step in 0..steps {
         let now_us = (step + 1) * STEP_US;
         run.step(step, now_us)?;
         if step % 250 == 0 {
-            bar.at(run.t_s as u64);
-            run.look_for_end();
+            bar.set_position(run.t_s as u64);
+            run.update_end();
         }
         if run.t_s >= run.ends_at_s {
             break;
@@ -158,12 +158,12 @@ fn simulate(
         }
     }
     let took_s = began.elapsed().as_secs_f64();
-    run.members.iter_mut().try_for_each(Member::say_stack)?;
+    run.members.iter_mut().try_for_each(SimulatedVehicle::print_stack_use)?;
     let result = run.result(command);
     run.log_losses(&result);
     let tracks = (0..run.members.len()).map(|i| run.referee.track(i).to_vec()).collect();
-    let pictures = run.members.iter_mut().flat_map(Member::take_pictures).collect();
-    let Run { referee, log, done, divisions, t_s, .. } = run;
+    let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::take_pictures).collect();
+    let SimulationRun { referee, log, done, divisions, t_s, .. } = run;
     let divisions = divisions.into_divisions();
     Ok(Flight {
         result,
@@ -178,11 +178,11 @@ fn simulate(
     })
 }
 
-impl<'a> Run<'a> {
+impl<'a> SimulationRun<'a> {
     fn new(mission: &'a Mission, plan: &'a SwarmPlan, gateway: Option<Gateway>) -> anyhow::Result<Self> {
         let scenario = &mission.scenario;
         let settings = &scenario.simulation;
-        let mut members = members(mission)?;
+        let mut members = vehicles_on_pads(mission)?;
         let mut radio = Radio::new(
             RadioConfig {
                 range_m: settings.radio_range_m,
@@ -193,10 +193,10 @@ impl<'a> Run<'a> {
             scenario.seed,
         );
         if let Some(gateway) = &gateway {
-            gateway.attach(&mut members);
+            gateway.add_ground_ports(&mut members);
         }
         if gateway.is_some() || scenario.area.is_some() {
-            radio.overhear();
+            radio.start_recording();
         }
         let vehicles: Vec<(u8, f32)> = scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
@@ -212,11 +212,11 @@ impl<'a> Run<'a> {
             referee,
             ground_station: GroundStation::new(scenario.mission.ground_stations[0]),
             gateway,
-            divisions: Divisions::default(),
-            script: Script::new(scenario),
+            divisions: DivisionLog::default(),
+            script: FaultScript::new(scenario),
             log: Vec::new(),
             done: Vec::new(),
-            places: members.iter().map(|m| m.autopilot.truth().position).collect(),
+            places: members.iter().map(|m| m.autopilot.true_state().position).collect(),
             nearest_goal_m: vec![f32::INFINITY; members.len()],
             members,
             t_s: 0.0,
@@ -228,7 +228,7 @@ impl<'a> Run<'a> {
     fn step(&mut self, step: u64, now_us: u64) -> anyhow::Result<()> {
         let Self { mission, plan, members, radio, places, log, .. } = self;
         self.t_s = now_us as f64 * 1e-6;
-        let mut world = World {
+        let mut world = FaultTargets {
             members,
             radio,
             ground_station: &mut self.ground_station,
@@ -240,15 +240,16 @@ impl<'a> Run<'a> {
             if let Some(wanted) = member.wants_plan.filter(|_| member.planner != Planner::Late) {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
-                    _ => mission.answer(plan, i, wanted, &member.companion),
+                    _ => mission.answer_plan_request(plan, i, wanted, &member.companion),
                 };
-                if wanted == Wanted::Mission {
-                    self.done = member.companion.done().to_vec();
+                if wanted == PlanKind::Mission {
+                    self.done = member.companion.excluded_waypoints().to_vec();
                 }
                 member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
             }
-            places[i] = member.autopilot.truth().position;
-            if let (true, Some(end)) = (plan.flights[i].task.flies(), plan.flights[i].path.waypoints().last())
+            places[i] = member.autopilot.true_state().position;
+            if let (true, Some(end)) =
+                (plan.flights[i].task.leaves_pad(), plan.flights[i].path.waypoints().last())
             {
                 let off = places[i] - end.position;
                 let nearest_m = &mut self.nearest_goal_m[i];
@@ -261,25 +262,25 @@ impl<'a> Run<'a> {
             }
         }
         self.ground_station.step(now_us, members, radio, places);
-        let overheard = radio.overheard();
-        self.divisions.hear(self.t_s as f32, &overheard);
+        let overheard = radio.take_recorded();
+        self.divisions.handle_packets(self.t_s as f32, &overheard);
         if let Some(gateway) = &mut self.gateway {
             gateway.step(now_us, members, radio, places, &overheard).context("link lost: --qgc")?;
         }
-        let seen: Vec<_> = members.iter().map(Member::observation).collect();
+        let seen: Vec<_> = members.iter().map(SimulatedVehicle::observation).collect();
         self.referee.observe(self.t_s, &seen);
         Ok(())
     }
 
-    /// Sets when the simulation ends, once nothing more is to come.
-    fn look_for_end(&mut self) {
+    /// Sets the end of the simulation once no vehicle will move any more.
+    fn update_end(&mut self) {
         let (members, plan) = (&self.members, self.plan);
-        let started = self.ground_station.started();
+        let started = self.ground_station.is_started();
         let done = |i: usize| {
-            let at_rest = is_finished(members[i].state()) || members[i].killed();
-            at_rest || (!plan.flights[i].task.flies() && started) || left_to_pilot(&members[i])
+            let at_rest = is_finished(members[i].state()) || members[i].is_powerless();
+            at_rest || (!plan.flights[i].task.leaves_pad() && started) || is_left_to_pilot(&members[i])
         };
-        let still = |m: &Member| !m.autopilot.truth().armed || left_to_pilot(m);
+        let still = |m: &SimulatedVehicle| !m.autopilot.true_state().armed || is_left_to_pilot(m);
         if !(self.script.is_over() && started && members.iter().all(still)) {
             self.moved_s = self.t_s;
         }
@@ -304,7 +305,10 @@ impl<'a> Run<'a> {
             seed: scenario.seed,
             complete: clean
                 && all_served
-                && vehicles.iter().enumerate().all(|(i, v)| self.did_its_task(i, v) || self.is_taken_out(i)),
+                && vehicles
+                    .iter()
+                    .enumerate()
+                    .all(|(i, v)| self.has_completed_task(i, v) || self.is_disabled_by_fault(i)),
             vehicles,
             totals: Totals {
                 path_m: rounded(plan.total_m() as f32),
@@ -319,7 +323,7 @@ impl<'a> Run<'a> {
                 deadlocks: referee.deadlocks,
             },
             roadmap: mission.roadmap_size(),
-            left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
+            left: Left { reasons: shortage::shortage_lines(mission, plan), ..mission.unserved(plan) },
             coverage: None,
         }
     }
@@ -327,32 +331,34 @@ impl<'a> Run<'a> {
     fn vehicle_result(&self, i: usize) -> VehicleResult {
         let scenario = &self.mission.scenario;
         // The vehicle cannot know of an error of its estimate.
-        let error_m = margins::estimate_m(scenario.simulation.estimator, scenario.vehicles[i].personality);
+        let error_m =
+            margins::max_estimate_error_m(scenario.simulation.estimator, scenario.vehicles[i].personality);
         let nearest_goal_m = self.nearest_goal_m[i] - error_m;
         let flown_m = self.referee.flown_m(i);
         vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
     }
 
     /// Whether a vehicle flew to the end of its path and landed, if it flies.
-    fn did_its_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
-        !self.plan.flights[i].task.flies() || (vehicle.reached && vehicle.landed)
+    fn has_completed_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
+        !self.plan.flights[i].task.leaves_pad() || (vehicle.reached && vehicle.landed)
     }
 
     /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row of the table.
-    fn is_taken_out(&self, i: usize) -> bool {
+    fn is_disabled_by_fault(&self, i: usize) -> bool {
         let member = &self.members[i];
-        self.script.struck(i)
-            && (member.killed()
+        self.script.is_struck(i)
+            && (member.is_powerless()
                 || member.took_off_s.is_none()
                 || is_finished(member.state())
-                || left_to_pilot(member))
+                || is_left_to_pilot(member))
     }
 
     /// Logs why links failed, and what the referee saw.
     fn log_losses(&mut self, result: &MissionResult) {
         let scenario = &self.mission.scenario;
         for (i, (member, vehicle)) in self.members.iter().zip(&result.vehicles).enumerate() {
-            if let (false, Some(text)) = (self.did_its_task(i, vehicle), member.link_trouble(self.t_s)) {
+            if let (false, Some(text)) = (self.has_completed_task(i, vehicle), member.link_trouble(self.t_s))
+            {
                 let (t_s, level) = (self.t_s as f32, Level::Error);
                 self.log.push(report::Event { t_s, vehicle: Some(vehicle.id), level, text });
             }
@@ -367,7 +373,7 @@ impl<'a> Run<'a> {
 }
 
 /// Whether a pilot has the vehicle: nobody knows for how long.
-fn left_to_pilot(member: &Member) -> bool {
+fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
     matches!(member.state(), State::PilotControl | State::PilotReturned)
 }
 
@@ -384,18 +390,18 @@ fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
 }
 
 fn vehicle_result(
-    member: &Member,
+    member: &SimulatedVehicle,
     flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
     flown_m: f64,
     nearest_goal_m: f32,
     now_s: f64,
 ) -> VehicleResult {
     let reached = nearest_goal_m <= REACHED_M;
-    let end = match (flight.task.flies(), member.state()) {
+    let end = match (flight.task.leaves_pad(), member.state()) {
         (false, _) => "no goal".to_owned(),
         // By its estimate the vehicle was at the goal.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
-        _ => member.end(),
+        _ => member.describe_end(),
     };
     let flight_time_s = member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
     VehicleResult {

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use planner_core::Point;
 use rand_pcg::Pcg32;
 
-use super::serial::unit;
+use super::serial::uniform_unit;
 
 /// Properties of the radio.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct RadioConfig {
 
 /// Failures of a station.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Cut {
+pub struct RadioOutage {
     /// The station sends nothing.
     pub tx: bool,
     /// The station hears nothing.
@@ -33,7 +33,7 @@ pub struct Cut {
 pub struct Radio {
     config: RadioConfig,
     rng: Pcg32,
-    cuts: Vec<Cut>,
+    cuts: Vec<RadioOutage>,
     under_way: Vec<VecDeque<(u64, Rc<[u8]>)>>,
     /// Packets that stations sent since the last call, if a gateway overhears.
     overheard: Option<Vec<Rc<[u8]>>>,
@@ -43,22 +43,22 @@ impl Radio {
     /// A silent radio with `stations` receivers.
     pub fn new(config: RadioConfig, stations: usize, seed: u64) -> Self {
         let under_way = (0..stations).map(|_| VecDeque::new()).collect();
-        let cuts = vec![Cut::default(); stations];
+        let cuts = vec![RadioOutage::default(); stations];
         Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way, overheard: None }
     }
 
-    /// Keeps the packets that stations send from now on, for [`Self::overheard`].
-    pub fn overhear(&mut self) {
+    /// Keeps the packets that stations send from now on, for [`Self::take_recorded`].
+    pub fn start_recording(&mut self) {
         self.overheard = Some(Vec::new());
     }
 
     /// Packets that stations sent since the last call, at once and without loss.
-    pub fn overheard(&mut self) -> Vec<Rc<[u8]>> {
+    pub fn take_recorded(&mut self) -> Vec<Rc<[u8]>> {
         self.overheard.as_mut().map(core::mem::take).unwrap_or_default()
     }
 
     /// Cuts a station off, or joins it again.
-    pub fn cut(&mut self, station: usize, cut: Cut) {
+    pub fn set_outage(&mut self, station: usize, cut: RadioOutage) {
         self.cuts[station] = cut;
     }
 
@@ -74,7 +74,7 @@ impl Radio {
         let hears_us = now_us + (self.config.delay_s * 1e6) as u64;
         for (to, queue) in self.under_way.iter_mut().enumerate() {
             let in_range = |from: usize| (places[from] - places[to]).norm() <= self.config.range_m;
-            let lost = self.config.loss > 0.0 && unit(&mut self.rng) < self.config.loss;
+            let lost = self.config.loss > 0.0 && uniform_unit(&mut self.rng) < self.config.loss;
             if from != Some(to) && from.is_none_or(in_range) && !lost && !self.cuts[to].rx {
                 queue.push_back((hears_us, Rc::clone(&packet)));
             }
@@ -109,8 +109,8 @@ mod tests {
     fn a_cut_station_does_not_send_or_does_not_hear() {
         let places = [Point::zeros(); 3];
         let mut radio = Radio::new(CONFIG, 3, 1);
-        radio.cut(0, Cut { tx: true, rx: false });
-        radio.cut(2, Cut { tx: false, rx: true });
+        radio.set_outage(0, RadioOutage { tx: true, rx: false });
+        radio.set_outage(2, RadioOutage { tx: false, rx: true });
         radio.broadcast(0, Some(0), &places, b"unheard");
         assert!(radio.receive(50_000, 1).is_none());
         radio.broadcast(0, Some(1), &places, b"heard");

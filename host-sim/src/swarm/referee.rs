@@ -63,7 +63,7 @@ pub struct Sample {
 }
 
 #[derive(Clone, Debug)]
-struct Watched {
+struct WatchedVehicle {
     id: u8,
     radius_m: f32,
     last: Option<Point>,
@@ -87,7 +87,7 @@ pub struct Referee<'a> {
     /// Uneven ground, of which the grid holds none.
     pub terrain: Option<&'a HeightGrid>,
     safety_distance_m: f32,
-    vehicles: Vec<Watched>,
+    vehicles: Vec<WatchedVehicle>,
     too_near: Vec<bool>,
     touching: Vec<bool>,
     recorded_s: f64,
@@ -121,7 +121,7 @@ impl<'a> Referee<'a> {
         safety_distance_m: f32,
         vehicles: &[(u8, f32)],
     ) -> Self {
-        let watched = |&(id, radius_m): &(u8, f32)| Watched {
+        let watched = |&(id, radius_m): &(u8, f32)| WatchedVehicle {
             id,
             radius_m,
             last: None,
@@ -156,7 +156,7 @@ impl<'a> Referee<'a> {
         }
     }
 
-    /// Looks at all vehicles at one physics step.
+    /// Checks all vehicles at one physics step.
     pub fn observe(&mut self, t_s: f64, seen: &[Observation]) {
         for (i, now) in seen.iter().enumerate() {
             self.watch_walls(i, t_s, now);

@@ -63,7 +63,7 @@ impl SerialLink {
     }
 
     /// Fault of the link over `lasted_s` seconds, if any, and a remedy.
-    pub fn trouble(&self, lasted_s: f64) -> Option<String> {
+    pub fn describe_fault(&self, lasted_s: f64) -> Option<String> {
         let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         let lost = share(self.overrun, self.offered);
         if lost > EXPLAINING_SHARE {
@@ -107,7 +107,7 @@ impl SerialLink {
             let sent = self.bytes.len() - data.len();
             let mut damaged = false;
             for byte in self.bytes.range_mut(sent..) {
-                if unit(&mut self.rng) < self.config.corruption {
+                if uniform_unit(&mut self.rng) < self.config.corruption {
                     *byte ^= 1 << (self.rng.next_u32() % 8);
                     damaged = true;
                 }
@@ -135,7 +135,7 @@ impl SerialLink {
     }
 
     /// Sets the share of bytes that arrive corrupted.
-    pub fn corrupt(&mut self, corruption: f64) {
+    pub fn set_corruption(&mut self, corruption: f64) {
         self.config.corruption = corruption;
     }
 
@@ -146,7 +146,7 @@ impl SerialLink {
 }
 
 /// A uniform number in 0…1.
-pub fn unit(rng: &mut Pcg32) -> f64 {
+pub fn uniform_unit(rng: &mut Pcg32) -> f64 {
     f64::from(rng.next_u32()) / (f64::from(u32::MAX) + 1.0)
 }
 

@@ -7,7 +7,7 @@ use planner_core::frames::enu_to_geodetic;
 use sim_autopilot as autopilot;
 
 use super::board::Board;
-use super::member::Member;
+use super::member::SimulatedVehicle;
 use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
 use crate::flash::DeskFlash;
@@ -23,7 +23,7 @@ const MIN_RANGE_M: f32 = 1.0;
 ///
 /// # Errors
 /// The configuration of a vehicle names what is wrong.
-pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
+pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicle>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let serial = SerialConfig {
@@ -46,7 +46,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             };
             let mut config = autopilot::Config {
                 system_id: vehicle.id,
-                personality: vehicle.personality,
+                autopilot: vehicle.personality,
                 world_origin: scenario.map.origin,
                 // EKF origin where the autopilot was switched on, unless the scenario says
                 // otherwise: no two vehicles share it.
@@ -65,20 +65,24 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 // The receiver set it, with the error that its heights have.
                 config.ekf_origin.alt_m += f64::from(config.height_error_m());
             }
-            let mut member =
-                Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
+            let mut member = SimulatedVehicle::new(
+                &config,
+                companion_config(mission, vehicle.id)?,
+                serial,
+                scenario.seed,
+            )?;
             member.autopilot.land_on_stream_loss();
             match &vehicle.companion {
                 Companion::InProcess { flash: None } => {}
                 Companion::InProcess { flash: Some(file) } => {
-                    member.keep_flash(DeskFlash::open(Some(file))?)?;
+                    member.attach_flash(DeskFlash::open(Some(file))?)?;
                 }
                 Companion::Url { autopilot, radio } => {
-                    member.put_on(Board::open(autopilot, radio.as_ref())?);
+                    member.attach_board(Board::open(autopilot, radio.as_ref())?);
                 }
                 Companion::Emulated { program, log } => {
                     let (roadmap, file) = (&mission.roadmap_file, &mission.mission_file);
-                    member.put_on(Board::emulate(program, log, roadmap, file)?);
+                    member.attach_board(Board::emulate(program, log, roadmap, file)?);
                 }
             }
             Ok(member)
@@ -89,7 +93,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
 /// The settings of the companion of one vehicle; the same whether it runs in a swarm simulation or alone.
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
-    let config = mission.mission_view().config(id);
+    let config = mission.mission_view().companion_config(id);
     let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
     // One plan may be flown by other rules and inside another fence than its mission file says.
     let scenario = &mission.scenario;

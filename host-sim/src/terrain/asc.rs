@@ -12,7 +12,7 @@ use crate::files;
 const FORMAT: &str = "an ESRI grid";
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
-    let length = files::regular(path)?;
+    let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
     }
@@ -20,13 +20,13 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let text = text.map_err(|_| TerrainError::malformed(FORMAT, &"it is not text"))?;
     let beside = path.with_extension("prj");
     let crs = match beside.is_file() {
-        true => system(&files::read_text(&beside)?)?,
+        true => parse_coordinate_system(&files::read_text(&beside)?)?,
         false => Crs::Unsaid,
     };
     parse(&text, crs)
 }
 
-fn system(text: &str) -> Result<Crs, TerrainError> {
+fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
     let system = System::wkt(text.trim())?;
     if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) {
         let hint = "heights of an .asc are metres, and those of a grid in feet may be feet: gdalwarp -t_srs to metres";

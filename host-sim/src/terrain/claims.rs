@@ -11,9 +11,9 @@ const MAX_CHUNKS: u32 = 1 << 22;
 const COMPRESSOR_RECORD: u64 = 22204;
 
 /// Whether no size that a reader would take memory for is beyond the file. It reads from the beginning again.
-pub(super) fn check<R: Read + Seek>(file: &mut R) -> io::Result<Result<(), &'static str>> {
+pub(super) fn check_declared_sizes<R: Read + Seek>(file: &mut R) -> io::Result<Result<(), &'static str>> {
     let length = file.seek(SeekFrom::End(0))?;
-    let outcome = sizes(file, length)?;
+    let outcome = check_sizes(file, length)?;
     file.seek(SeekFrom::Start(0))?;
     Ok(outcome)
 }
@@ -26,7 +26,7 @@ struct Numbers<'a, R> {
 
 impl<R: Read + Seek> Numbers<'_, R> {
     /// A number of so many bytes; 0 beyond the end, which readers find themselves.
-    fn at(&mut self, at: u64, bytes: u64) -> io::Result<u64> {
+    fn read_number(&mut self, at: u64, bytes: u64) -> io::Result<u64> {
         if at.checked_add(bytes).is_none_or(|end| end > self.length) {
             return Ok(0);
         }
@@ -38,16 +38,16 @@ impl<R: Read + Seek> Numbers<'_, R> {
 
     /// The bytes of a chunk's first return, and its layers, as the record of the compressor has them: none where chunks have
     /// no layers.
-    fn layers(&mut self) -> io::Result<Option<(u64, u64)>> {
-        let (mut at, count) = (self.at(94, 2)?, self.at(100, 4)?);
+    fn read_layers(&mut self) -> io::Result<Option<(u64, u64)>> {
+        let (mut at, count) = (self.read_number(94, 2)?, self.read_number(100, 4)?);
         for _ in 0..count.min(self.length / 54) {
-            let (id, size) = (self.at(at + 18, 2)?, self.at(at + 20, 2)?);
+            let (id, size) = (self.read_number(at + 18, 2)?, self.read_number(at + 20, 2)?);
             if id == COMPRESSOR_RECORD {
-                let items = self.at(at + 54 + 32, 2)?;
+                let items = self.read_number(at + 54 + 32, 2)?;
                 let (mut first, mut layers) = (0, 0);
                 for item in 0..items {
                     let item_at = at + 54 + 34 + 6 * item;
-                    let (kind, bytes) = (self.at(item_at, 2)?, self.at(item_at + 2, 2)?);
+                    let (kind, bytes) = (self.read_number(item_at, 2)?, self.read_number(item_at + 2, 2)?);
                     first += bytes;
                     layers += match kind {
                         10 => 9,
@@ -65,19 +65,20 @@ impl<R: Read + Seek> Numbers<'_, R> {
     }
 }
 
-fn sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'static str>> {
+fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'static str>> {
     let mut numbers = Numbers { file, length };
-    let (minor, returns_at, format) = (numbers.at(25, 1)?, numbers.at(96, 4)?, numbers.at(104, 1)?);
+    let (minor, returns_at, format) =
+        (numbers.read_number(25, 1)?, numbers.read_number(96, 4)?, numbers.read_number(104, 1)?);
     if returns_at > length {
         return Ok(Err("its returns begin beyond its end"));
     }
     if minor >= 4 {
-        let (mut at, count) = (numbers.at(235, 8)?, numbers.at(243, 4)?);
+        let (mut at, count) = (numbers.read_number(235, 8)?, numbers.read_number(243, 4)?);
         if count > length / 60 {
             return Ok(Err("it has more records than bytes"));
         }
         for _ in 0..count {
-            let size = numbers.at(at.saturating_add(20), 8)?;
+            let size = numbers.read_number(at.saturating_add(20), 8)?;
             match at.checked_add(60).and_then(|at| at.checked_add(size)).filter(|end| *end <= length) {
                 Some(end) => at = end,
                 None => return Ok(Err("a record behind its returns is longer than the file")),
@@ -87,22 +88,22 @@ fn sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'s
     if format & 0x80 == 0 {
         return Ok(Ok(()));
     }
-    let mut table_at = numbers.at(returns_at, 8)?;
+    let mut table_at = numbers.read_number(returns_at, 8)?;
     if table_at as i64 <= returns_at as i64 {
-        table_at = numbers.at(length.saturating_sub(8), 8)?;
+        table_at = numbers.read_number(length.saturating_sub(8), 8)?;
     }
-    let chunks = numbers.at(table_at.saturating_add(4), 4)?;
+    let chunks = numbers.read_number(table_at.saturating_add(4), 4)?;
     if chunks > u64::from(MAX_CHUNKS) || chunks > length || table_at > length {
         return Ok(Err("it has more chunks than bytes"));
     }
-    let Some((first, layers)) = numbers.layers()? else { return Ok(Ok(())) };
+    let Some((first, layers)) = numbers.read_layers()? else { return Ok(Ok(())) };
     let mut at = returns_at + 8;
     while at < table_at {
         // A return, a count, the size of each layer, the layers.
         let sizes_at = at + first + 4;
         at = sizes_at + 4 * layers;
         for layer in 0..layers {
-            at = at.saturating_add(numbers.at(sizes_at + 4 * layer, 4)?);
+            at = at.saturating_add(numbers.read_number(sizes_at + 4 * layer, 4)?);
         }
         if at > table_at {
             return Ok(Err("a chunk is longer than the file"));

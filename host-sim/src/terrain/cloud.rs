@@ -12,7 +12,7 @@ use planner_core::coverage::Flat;
 
 use super::crs::{Crs, System, wkt_height_unit_m};
 use super::error::TerrainError;
-use super::frame::{Frame, beside};
+use super::frame::{Frame, widened_window};
 use super::geokeys::GeoKeys;
 use super::grid::HeightGrid;
 use super::limits::MAX_BYTES;
@@ -32,14 +32,14 @@ const RETURNS_PER_BATCH: u64 = 4096;
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
 pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
-    let length = files::regular(path)?;
+    let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
     }
     decode(BufReader::new(File::open(path)?), frame)
 }
 
-fn bad(why: &impl ToString) -> TerrainError {
+fn malformed(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
@@ -47,28 +47,28 @@ pub(super) fn decode<R>(mut file: R, frame: &Frame<'_>) -> Result<HeightGrid, Te
 where
     R: Read + Seek + Send + Sync + 'static,
 {
-    claims::check(&mut file)?.map_err(|why| bad(&why))?;
-    let decoded = guard::caught(|| returns(file, frame));
-    decoded.unwrap_or_else(|| Err(bad(&"its returns are damaged")))
+    claims::check_declared_sizes(&mut file)?.map_err(|why| malformed(&why))?;
+    let decoded = guard::catch_panic(|| grid_of_returns(file, frame));
+    decoded.unwrap_or_else(|| Err(malformed(&"its returns are damaged")))
 }
 
-fn returns<R>(file: R, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError>
+fn grid_of_returns<R>(file: R, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError>
 where
     R: Read + Seek + Send + Sync + 'static,
 {
-    let mut reader = Reader::new(file).map_err(|error| bad(&error))?;
-    let (crs, unit_m) = system(reader.header())?;
+    let mut reader = Reader::new(file).map_err(|error| malformed(&error))?;
+    let (crs, unit_m) = coordinate_system(reader.header())?;
     crs.check(frame.metres)?;
-    let mut grid = empty(reader.header(), &crs, frame)?;
+    let mut grid = empty_grid(reader.header(), &crs, frame)?;
     let mut points = PointDataBuilder::new().for_header(reader.header()).build();
     let most = reader.header().number_of_points();
     let mut count = 0;
     while count < most {
         let read = reader
             .fill_points(RETURNS_PER_BATCH.min(most - count), &mut points)
-            .map_err(|error| bad(&error))?;
+            .map_err(|error| malformed(&error))?;
         if read == 0 {
-            return Err(bad(&format!("it has {count} returns, its header says {most}")));
+            return Err(malformed(&format!("it has {count} returns, its header says {most}")));
         }
         count += read;
         let places = points.x().zip(points.y()).zip(points.z()).zip(points.classification());
@@ -77,17 +77,17 @@ where
                 continue;
             }
             if let Some(place) = crs.to_mission(frame.origin, [x, y]) {
-                grid.raise(&place, (z * unit_m) as f32);
+                grid.raise_cell(&place, (z * unit_m) as f32);
             }
         }
     }
-    grid.bridge(BRIDGED_CELLS);
+    grid.fill_holes(BRIDGED_CELLS);
     Ok(grid)
 }
 
 /// Coordinate system of the file's numbers, and metres in a unit of height: heights without a unit
 /// of their own are in that of the places.
-fn system(header: &Header) -> Result<(Crs, f64), TerrainError> {
+fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
     let record = |id: u16| {
         let found =
             header.all_vlrs().find(|vlr| vlr.user_id.starts_with("LASF_Projection") && vlr.record_id == id);
@@ -113,7 +113,7 @@ fn system(header: &Header) -> Result<(Crs, f64), TerrainError> {
 }
 
 /// The grid that returns fall into.
-fn empty(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+fn empty_grid(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
     let bounds = header.bounds();
     let (low, high) = ([bounds.min.x, bounds.min.y], [bounds.max.x, bounds.max.y]);
     let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
@@ -129,6 +129,6 @@ fn empty(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, Te
     let cell_m = cell_m as f32;
     // The last return is in a cell too.
     let half = Flat::repeat(cell_m / 2.0);
-    let window = frame.window.map_or([low - half, high + half], |window| beside(window, cell_m));
+    let window = frame.window.map_or([low - half, high + half], |window| widened_window(window, cell_m));
     HeightGrid::new(window, cell_m)
 }

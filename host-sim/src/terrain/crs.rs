@@ -46,7 +46,8 @@ impl System {
         // The system of heights stands beside that of places: only the latter is parsed.
         let start = ["PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOGCS", "GEOGCRS", "GEODCRS"];
         let start = start.iter().find_map(|word| text.find(word)).ok_or_else(unusable)?;
-        let proj = proj4wkt::wkt_to_projstring(balanced(&text[start..])).map_err(|_| unusable())?;
+        let proj =
+            proj4wkt::wkt_to_projstring(up_to_closing_bracket(&text[start..])).map_err(|_| unusable())?;
         Self::proj(&proj, &name)
     }
 
@@ -151,13 +152,13 @@ pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
 /// Metres in a unit of height, as well-known text says it: none where it says nothing.
 pub(super) fn wkt_height_unit_m(text: &str) -> Option<f64> {
     let start = ["VERT_CS", "VERTCS", "VERTCRS"].iter().find_map(|word| text.find(word))?;
-    let part = balanced(&text[start..]);
+    let part = up_to_closing_bracket(&text[start..]);
     let unit = &part[part.rfind("UNIT[")?..];
     unit.split(',').nth(1)?.trim_matches([']', ' ']).parse().ok()
 }
 
 /// A text up to the bracket that closes its first one.
-fn balanced(text: &str) -> &str {
+fn up_to_closing_bracket(text: &str) -> &str {
     let mut depth = 0;
     for (at, c) in text.char_indices() {
         depth += i32::from(c == '[') - i32::from(c == ']');

@@ -1,11 +1,11 @@
-//! Why a file gives no heights.
+//! Reason why a file gives no heights.
 
 use thiserror::Error;
 
 use super::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted;
 
-/// Why a file gives no heights.
+/// Reason why a file gives no heights.
 #[derive(Debug, Error)]
 pub enum TerrainError {
     /// The file cannot be read.

@@ -18,7 +18,7 @@ const MIN_CELL_M: f32 = 2.0;
 /// away.
 const MIN_RISE_STEPS: f32 = 5.0;
 
-/// Why there is no field.
+/// Reason why there is no field.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
     /// The map has no height at this place, metres east and north.
@@ -72,7 +72,7 @@ impl FieldConfig {
 ///
 /// # Errors
 /// The map has a hole there, or heights that do not fit.
-pub fn field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldError> {
+pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldError> {
     let cell_m = config.least_cell_m().max(grid.cell_m());
     let [low, high] = config.area;
     let count = |side: f32| ((side / cell_m).ceil() + 1.0).max(2.0) as u16;
@@ -86,7 +86,7 @@ pub fn field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldEr
     for row in 0..rows {
         for column in 0..columns {
             let place = low + Flat::new(column as f32, row as f32) * cell_m;
-            let found = grid.highest(&(place - around), &(place + around));
+            let found = grid.heights_in_box(&(place - around), &(place + around));
             let height_m = match found.highest_m {
                 Some(height_m) if !found.holes => height_m,
                 _ => return Err(FieldError::Hole(place.x, place.y)),
@@ -100,14 +100,14 @@ pub fn field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldEr
     }
     // Along one of the axes: a slope across both is steeper by the square root of two.
     let most = (config.slope * cell_m / std::f32::consts::SQRT_2 / HEIGHT_STEP_M + 1e-3) as i32;
-    flatten(&mut nodes_dm, columns, most.clamp(1, i32::from(i16::MAX)));
+    limit_slope(&mut nodes_dm, columns, most.clamp(1, i32::from(i16::MAX)));
     let mut bytes = vec![0; shape.encoded_len()];
     field::write(&shape, &nodes_dm, &mut bytes).map_err(|_| FieldError::Shape)?;
     Ok(bytes)
 }
 
 /// Raises nodes until no two beside each other differ by more than `most`: a distance transform, in two passes.
-fn flatten(nodes_dm: &mut [i16], columns: usize, most: i32) {
+fn limit_slope(nodes_dm: &mut [i16], columns: usize, most: i32) {
     let raise = |nodes_dm: &mut [i16], own: usize, other: usize| {
         let least = (i32::from(nodes_dm[other]) - most).max(i32::from(i16::MIN)) as i16;
         nodes_dm[own] = nodes_dm[own].max(least);
@@ -149,14 +149,14 @@ mod tests {
         ) {
             let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
             for (index, height_m) in heights.iter().enumerate() {
-                grid.raise(&grid.middle([index % 40, index / 40]), *height_m);
+                grid.raise_cell(&grid.cell_centre([index % 40, index / 40]), *height_m);
             }
             let area = [Flat::new(-30.0, -20.0), Flat::new(35.0, 28.0)];
             let config = FieldConfig { area, reach_m, slope };
             if config.window()[0].amin() < -75.0 || config.window()[1].amax() > 75.0 {
                 return Ok(());
             }
-            let bytes = field(&grid, &config).unwrap();
+            let bytes = encode_field(&grid, &config).unwrap();
             let view = FieldView::parse(&bytes).unwrap();
             for [x, y, east, north] in places {
                 let at = area[0] + (area[1] - area[0]).component_mul(&Flat::new(x, y));
@@ -175,13 +175,13 @@ mod tests {
         let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
         for index in 0..1600 {
             if index != 20 * 40 + 22 {
-                grid.raise(&grid.middle([index % 40, index / 40]), 10.0);
+                grid.raise_cell(&grid.cell_centre([index % 40, index / 40]), 10.0);
             }
         }
         let area = [Flat::repeat(-20.0), Flat::repeat(20.0)];
         let config = FieldConfig { area, reach_m: 0.5, slope: 0.5 };
-        assert!(matches!(field(&grid, &config), Err(FieldError::Hole(..))));
-        grid.raise(&grid.middle([22, 20]), 4000.0);
-        assert_eq!(field(&grid, &config), Err(FieldError::High(4000.0)));
+        assert!(matches!(encode_field(&grid, &config), Err(FieldError::Hole(..))));
+        grid.raise_cell(&grid.cell_centre([22, 20]), 4000.0);
+        assert_eq!(encode_field(&grid, &config), Err(FieldError::High(4000.0)));
     }
 }

@@ -19,7 +19,7 @@ pub struct Frame<'a> {
 const WINDOW_BORDER_CELLS: f32 = 5.0;
 
 /// A window and the cells around it.
-pub(super) fn beside([low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
+pub(super) fn widened_window([low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
     let beyond = Flat::repeat(WINDOW_BORDER_CELLS * cell_m);
     [low - beyond, high + beyond]
 }

@@ -38,7 +38,7 @@ impl GeoKeys {
     }
 
     /// Whether a raster's place is that of its first cell's middle.
-    pub(super) fn points(&self) -> bool {
+    pub(super) fn is_pixel_point(&self) -> bool {
         self.get(RASTER) == Some(2)
     }
 

@@ -20,21 +20,21 @@ const FORMAT: &str = "a GeoTIFF";
 const MAX_CHUNK: usize = 1 << 27;
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
-    let length = files::regular(path)?;
+    let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
     }
     decode(BufReader::new(File::open(path)?))
 }
 
-fn bad(why: &impl ToString) -> TerrainError {
+fn malformed_file(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
 fn malformed(error: TiffError) -> TerrainError {
     match error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => error.into(),
-        other => bad(&other),
+        other => malformed_file(&other),
     }
 }
 
@@ -50,11 +50,11 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         return Err(TerrainError::TooManyCells(columns as u128 * rows as u128));
     }
     if columns == 0 || rows == 0 {
-        return Err(bad(&"it has no cells"));
+        return Err(malformed_file(&"it has no cells"));
     }
     match decoder.colortype().map_err(malformed)? {
         ColorType::Gray(_) => {}
-        other => return Err(bad(&format!("it has colours ({other:?}), not one height a cell"))),
+        other => return Err(malformed_file(&format!("it has colours ({other:?}), not one height a cell"))),
     }
     let keys = decoder.find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag).map_err(malformed)?;
     let keys = GeoKeys::new(&keys.unwrap_or_default());
@@ -73,8 +73,9 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let missing = decoder.find_tag(Tag::GdalNodata).map_err(malformed)?;
     let missing = missing.and_then(|value| value.into_string().ok());
     let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
-    let (corner, cell) = georeference(&mut decoder, keys.points())?;
-    let value_m = |value: f64| match missing.is_some_and(|missing| same(value, missing)) || !value.is_finite()
+    let (corner, cell) = georeference(&mut decoder, keys.is_pixel_point())?;
+    let value_m = |value: f64| match missing.is_some_and(|missing| is_missing_value(value, missing))
+        || !value.is_finite()
     {
         true => f32::NAN,
         false => (value * unit_m) as f32,
@@ -88,10 +89,12 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         let (own_wide, own_tall) = (own_wide as usize, own_tall as usize);
         let values = decoder.read_chunk(chunk as u32).map_err(malformed)?;
         let (left, top) = (chunk % across * wide, chunk / across * tall);
-        let mut values = numbers(values)?;
+        let mut values = values_as_f64(values)?;
         for row in top..(top + own_tall).min(rows) {
             for column in left..left + own_wide {
-                let Some(value) = values.next() else { return Err(bad(&"a part of it ends early")) };
+                let Some(value) = values.next() else {
+                    return Err(malformed_file(&"a part of it ends early"));
+                };
                 if column < columns {
                     heights_m[row * columns + column] = value_m(value);
                 }
@@ -102,7 +105,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
 }
 
 /// A float's missing value is written in decimals.
-fn same(value: f64, missing: f64) -> bool {
+fn is_missing_value(value: f64, missing: f64) -> bool {
     value == missing || value as f32 == missing as f32
 }
 
@@ -134,7 +137,7 @@ fn georeference<R: Read + Seek>(
         },
     };
     if !cell.iter().all(|side| *side > 0.0 && side.is_finite()) || !corner.iter().all(|at| at.is_finite()) {
-        return Err(bad(&"its cells have no size or place"));
+        return Err(malformed_file(&"its cells have no size or place"));
     }
     if points {
         corner = [corner[0] - cell[0] / 2.0, corner[1] + cell[1] / 2.0];
@@ -142,7 +145,7 @@ fn georeference<R: Read + Seek>(
     Ok((corner, cell))
 }
 
-fn numbers(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, TerrainError> {
+fn values_as_f64(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, TerrainError> {
     Ok(match values {
         DecodingResult::U8(v) => Box::new(v.into_iter().map(f64::from)),
         DecodingResult::I8(v) => Box::new(v.into_iter().map(f64::from)),
@@ -152,6 +155,6 @@ fn numbers(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, Terr
         DecodingResult::I32(v) => Box::new(v.into_iter().map(f64::from)),
         DecodingResult::F32(v) => Box::new(v.into_iter().map(f64::from)),
         DecodingResult::F64(v) => Box::new(v.into_iter()),
-        _ => return Err(bad(&"its heights are no numbers of 8, 16, 32 or 64 bits")),
+        _ => return Err(malformed_file(&"its heights are no numbers of 8, 16, 32 or 64 bits")),
     })
 }

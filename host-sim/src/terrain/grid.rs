@@ -63,12 +63,12 @@ impl HeightGrid {
     }
 
     /// The middle of a cell.
-    pub fn middle(&self, [column, row]: [usize; 2]) -> Flat {
+    pub fn cell_centre(&self, [column, row]: [usize; 2]) -> Flat {
         self.low + Flat::new(column as f32 + 0.5, row as f32 + 0.5) * self.cell_m
     }
 
     /// Height of the cell.
-    pub fn height(&self, [column, row]: [usize; 2]) -> Option<f32> {
+    pub fn cell_height(&self, [column, row]: [usize; 2]) -> Option<f32> {
         let height_m = *self.heights_m.get(row * self.size[0] + column)?;
         (column < self.size[0] && !height_m.is_nan()).then_some(height_m)
     }
@@ -89,7 +89,7 @@ impl HeightGrid {
         let [column, row] = self.cell_of(place)?;
         match self.middles_m.get(row * self.size[0] + column) {
             Some(height_m) => (!height_m.is_nan()).then_some(*height_m),
-            None => self.height([column, row]),
+            None => self.cell_height([column, row]),
         }
     }
 
@@ -99,7 +99,7 @@ impl HeightGrid {
     }
 
     /// Content of the cells that a box touches.
-    pub fn highest(&self, low: &Flat, high: &Flat) -> Heights {
+    pub fn heights_in_box(&self, low: &Flat, high: &Flat) -> Heights {
         let index = |at: f32, from: f32| ((at - from) / self.cell_m).floor();
         let mut found = Heights::default();
         let mut ranges = [(0, 0); 2];
@@ -116,7 +116,7 @@ impl HeightGrid {
         }
         for row in ranges[1].0..=ranges[1].1 {
             for column in ranges[0].0..=ranges[0].1 {
-                match self.height([column, row]) {
+                match self.cell_height([column, row]) {
                     Some(height_m) => {
                         let highest_m = found.highest_m.map_or(height_m, |other| other.max(height_m));
                         found.highest_m = Some(highest_m);
@@ -129,7 +129,7 @@ impl HeightGrid {
     }
 
     /// The heights above another zero.
-    pub fn above(mut self, zero_m: f64) -> Self {
+    pub fn relative_to(mut self, zero_m: f64) -> Self {
         for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;
         }
@@ -143,7 +143,7 @@ impl HeightGrid {
     }
 
     /// Raises the cell of a place to a height; whether the place is in the grid.
-    pub(super) fn raise(&mut self, place: &Flat, height_m: f32) -> bool {
+    pub(super) fn raise_cell(&mut self, place: &Flat, height_m: f32) -> bool {
         let Some([column, row]) = self.cell_of(place) else { return false };
         let own = &mut self.heights_m[row * self.size[0] + column];
         // The greater, and a hole takes any.
@@ -152,18 +152,18 @@ impl HeightGrid {
     }
 
     /// Gives holes that lie between cells with heights, at most `reach` away on both sides, the greatest height so near.
-    pub(super) fn bridge(&mut self, reach: usize) {
+    pub(super) fn fill_holes(&mut self, reach: usize) {
         let before = self.clone();
         let [columns, rows] = self.size;
         for row in 0..rows {
             for column in 0..columns {
-                if before.height([column, row]).is_some() {
+                if before.cell_height([column, row]).is_some() {
                     continue;
                 }
                 let known = |range: std::ops::RangeInclusive<usize>, fixed: usize, across: bool| {
                     range
                         .into_iter()
-                        .any(|k| before.height(if across { [k, fixed] } else { [fixed, k] }).is_some())
+                        .any(|k| before.cell_height(if across { [k, fixed] } else { [fixed, k] }).is_some())
                 };
                 let (left, right) = (column.saturating_sub(reach), (column + reach).min(columns - 1));
                 let (down, up) = (row.saturating_sub(reach), (row + reach).min(rows - 1));
@@ -171,7 +171,7 @@ impl HeightGrid {
                 let along = known(down..=row, column, false) && known(row..=up, column, false);
                 if across || along {
                     let near = (down..=up).flat_map(|r| (left..=right).map(move |c| [c, r]));
-                    let highest = near.filter_map(|cell| before.height(cell)).reduce(f32::max);
+                    let highest = near.filter_map(|cell| before.cell_height(cell)).reduce(f32::max);
                     self.heights_m[row * columns + column] = highest.unwrap_or(f32::NAN);
                 }
             }

@@ -9,7 +9,7 @@ thread_local! {
 }
 
 /// Result of `decode`; none where it panics.
-pub(super) fn caught<T>(decode: impl FnOnce() -> T) -> Option<T> {
+pub(super) fn catch_panic<T>(decode: impl FnOnce() -> T) -> Option<T> {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = take_hook();

@@ -26,7 +26,7 @@ mod tests;
 use std::path::Path;
 
 pub use self::error::TerrainError;
-pub use self::field::{FieldConfig, FieldError, field};
+pub use self::field::{FieldConfig, FieldError, encode_field};
 pub use self::frame::Frame;
 pub use self::grid::{HeightGrid, Heights};
 pub use self::limits::{MAX_BYTES, MAX_CELLS};

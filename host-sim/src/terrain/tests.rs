@@ -79,7 +79,7 @@ proptest! {
         prop_assert_eq!(grid.cell_m(), cell);
         for (row, heights) in rows.iter().rev().enumerate() {
             for (column, height_m) in heights.iter().enumerate() {
-                prop_assert_eq!(grid.height_at(&grid.middle([column, row])), *height_m);
+                prop_assert_eq!(grid.height_at(&grid.cell_centre([column, row])), *height_m);
             }
         }
         for [x, y, wide, tall] in boxes {
@@ -100,7 +100,7 @@ proptest! {
                 }
             }
             want.holes |= (0..2).any(|a| low[a] < corner[a] || high[a] > corner[a] + sides[a]);
-            prop_assert_eq!(grid.highest(&low, &high), want);
+            prop_assert_eq!(grid.heights_in_box(&low, &high), want);
         }
     }
 
@@ -128,7 +128,7 @@ proptest! {
                     let at = [corner[0] + (column as f64 + s) * cell, corner[1] - (row as f64 + t) * cell];
                     let place = raster.crs.to_mission(&origin, at).unwrap();
                     let reach = Flat::repeat(grid.cell_m());
-                    let near = grid.highest(&(place - reach), &(place + reach));
+                    let near = grid.heights_in_box(&(place - reach), &(place + reach));
                     if value != 99.0 {
                         prop_assert!(near.highest_m.unwrap() >= value * unit_m - 1e-3);
                     }
@@ -152,15 +152,15 @@ proptest! {
         let mut grid = HeightGrid::new([Flat::zeros(), Flat::repeat(10.0)], 1.0).unwrap();
         for (index, height) in known.iter().enumerate() {
             if let Some(height) = height {
-                grid.raise(&Flat::new((index % 10) as f32 + 0.5, (index / 10) as f32 + 0.5), f32::from(*height));
+                grid.raise_cell(&Flat::new((index % 10) as f32 + 0.5, (index / 10) as f32 + 0.5), f32::from(*height));
             }
         }
         let before = grid.clone();
-        grid.bridge(2);
+        grid.fill_holes(2);
         for row in 0..10usize {
             for column in 0..10usize {
-                let (own, was) = (grid.height([column, row]), before.height([column, row]));
-                let at = |c: i64, r: i64| before.height([usize::try_from(c).ok()?, usize::try_from(r).ok()?]);
+                let (own, was) = (grid.cell_height([column, row]), before.cell_height([column, row]));
+                let at = |c: i64, r: i64| before.cell_height([usize::try_from(c).ok()?, usize::try_from(r).ok()?]);
                 let (c, r) = (column as i64, row as i64);
                 let between = [(1, 0), (0, 1)].iter().any(|(dx, dy)| {
                     let side = |sign: i64| (1..=2).any(|k| at(c + sign * k * dx, r + sign * k * dy).is_some());

@@ -3,29 +3,43 @@
 //! A settled column is taken out of the running by moving its price to minus infinity and its distance to infinity, so
 //! the inner loop has no test for it: its reduced costs come out infinite. Both are kept aside and put back at the end.
 
-use super::costs::Costs;
-use super::state::{Paths, SIMD_LANES, State, UNASSIGNED};
+use super::costs::CostMatrix;
+use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 
-/// Serves the free row number `k`. False if no path leads to a free column.
-pub(super) fn from_one(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, k: usize) -> bool {
+/// Augments the matching from free row `k`. Returns false if no path leads to a free column.
+pub(super) fn augment_from_row(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    paths: &mut AugmentingPaths<'_>,
+    k: usize,
+) -> bool {
     let row = state.free[k];
     paths.distance.fill(f64::INFINITY);
-    let least = relax(costs.row(row, state.row), state.price, 0.0, row, paths);
-    shortest(costs, state, paths, least)
+    let least = relax_columns(costs.row_costs(row, state.row), state.price, 0.0, row, paths);
+    augment_shortest_path(costs, state, paths, least)
 }
 
-/// Adds one pair, from whichever free row is cheapest. False if no path is left.
-pub(super) fn from_all(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> bool {
+/// Augments the matching by the cheapest path from any free row. Returns false if there is no path.
+pub(super) fn augment_from_free_rows(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    paths: &mut AugmentingPaths<'_>,
+) -> bool {
     paths.distance.fill(f64::INFINITY);
     let mut least = f64::INFINITY;
     for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == UNASSIGNED) {
-        least = relax(costs.row(row, state.row), state.price, 0.0, row, paths);
+        least = relax_columns(costs.row_costs(row, state.row), state.price, 0.0, row, paths);
     }
-    shortest(costs, state, paths, least)
+    augment_shortest_path(costs, state, paths, least)
 }
 
 /// Settles columns from the distances of the sources, updates the prices and flips the path.
-fn shortest(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, mut least: f64) -> bool {
+fn augment_shortest_path(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    paths: &mut AugmentingPaths<'_>,
+    mut least: f64,
+) -> bool {
     // Columns at one distance are settled together and wait in `settled[done..queued]`: integer costs have many.
     let (mut done, mut queued) = (0, 0);
     let mut next = least;
@@ -36,9 +50,9 @@ fn shortest(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, mut
                 break None;
             }
             let from = queued;
-            match nearest(paths.distance, state.row_of, least, &mut paths.settled[from..]) {
-                Nearest::Free(col) => break Some(col),
-                Nearest::Taken(count) => queued += count,
+            match nearest_columns(paths.distance, state.row_of, least, &mut paths.settled[from..]) {
+                NearestColumns::Free(col) => break Some(col),
+                NearestColumns::Taken(count) => queued += count,
             }
             for k in from..queued {
                 let at = usize::from(paths.settled[k]);
@@ -48,19 +62,20 @@ fn shortest(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, mut
         }
         let col = paths.settled[done];
         let row = state.row_of[usize::from(col)];
-        let offset = f64::from(costs.at(row, col)) - paths.settled_price[done] - paths.settled_distance[done];
-        next = relax(costs.row(row, state.row), state.price, offset, row, paths);
+        let offset =
+            f64::from(costs.cost_at(row, col)) - paths.settled_price[done] - paths.settled_distance[done];
+        next = relax_columns(costs.row_costs(row, state.row), state.price, offset, row, paths);
         done += 1;
     };
     for k in 0..queued {
         let rise = if end.is_some() { paths.settled_distance[k] - least } else { 0.0 };
         state.price[usize::from(paths.settled[k])] = paths.settled_price[k] + rise;
     }
-    end.map(|col| flip(state, paths.previous, col)).is_some()
+    end.map(|col| flip_augmenting_path(state, paths.previous, col)).is_some()
 }
 
 /// `distance = min(distance, cost - price - offset)` over all columns; returns the least distance.
-fn relax(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut Paths<'_>) -> f64 {
+fn relax_columns(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut AugmentingPaths<'_>) -> f64 {
     let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
     let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
     let (distances, distance_rest) = paths.distance.as_chunks_mut::<SIMD_LANES>();
@@ -99,7 +114,7 @@ fn relax(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut Paths<'
     least.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
-enum Nearest {
+enum NearestColumns {
     /// A free column: the end of a path.
     Free(u16),
     /// Number of taken columns that were queued.
@@ -107,7 +122,7 @@ enum Nearest {
 }
 
 /// The columns at distance `least`: a free one if there is any, else all of them into `queue`.
-fn nearest(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> Nearest {
+fn nearest_columns(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> NearestColumns {
     let mut count = 0;
     let mut offer = |first: usize, distances: &[f64]| {
         for (k, _) in distances.iter().enumerate().filter(|(_, d)| **d == least) {
@@ -125,31 +140,31 @@ fn nearest(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> N
         if distances.iter().fold(false, |any, &d| any | (d == least))
             && let Some(free) = offer(chunk * SIMD_LANES, distances)
         {
-            return Nearest::Free(free);
+            return NearestColumns::Free(free);
         }
     }
     match offer(distance.len() - rest.len(), rest) {
-        Some(free) => Nearest::Free(free),
-        None => Nearest::Taken(count),
+        Some(free) => NearestColumns::Free(free),
+        None => NearestColumns::Taken(count),
     }
 }
 
-/// Gives each column on the path to the row it was reached from.
-fn flip(state: &mut State<'_>, previous: &[u16], end: u16) {
+/// Assigns each column on the path to the row from which the search reached it.
+fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u16) {
     let mut col = end;
     while col != UNASSIGNED {
         let row = previous[usize::from(col)];
         let released = state.col_of[usize::from(row)];
-        state.join(row, col);
+        state.match_pair(row, col);
         col = released;
     }
 }
 
 /// Adds one pair by the path from any free row whose largest cost is least; returns that cost. `None` if no path is left.
-pub(super) fn from_all_bottleneck(
-    costs: &Costs<'_>,
-    state: &mut State<'_>,
-    paths: &mut Paths<'_>,
+pub(super) fn augment_bottleneck(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    paths: &mut AugmentingPaths<'_>,
 ) -> Option<f32> {
     // The path to a settled column is final: its distance moves to infinity so that it is not chosen again, and
     // `settled_price` keeps it from being reached again.
@@ -157,8 +172,8 @@ pub(super) fn from_all_bottleneck(
     done.fill(0.0);
     paths.distance.fill(f64::INFINITY);
     for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == UNASSIGNED) {
-        relax_largest(
-            costs.row(row, state.row),
+        relax_by_largest_cost(
+            costs.row_costs(row, state.row),
             f64::NEG_INFINITY,
             row,
             done,
@@ -171,27 +186,27 @@ pub(super) fn from_all_bottleneck(
         if least == f64::INFINITY {
             return None;
         }
-        match nearest(paths.distance, state.row_of, least, paths.settled) {
-            Nearest::Free(col) => {
-                flip(state, paths.previous, col);
+        match nearest_columns(paths.distance, state.row_of, least, paths.settled) {
+            NearestColumns::Free(col) => {
+                flip_augmenting_path(state, paths.previous, col);
                 return Some(least as f32);
             }
-            Nearest::Taken(count) => {
+            NearestColumns::Taken(count) => {
                 for &col in &paths.settled[..count] {
                     done[usize::from(col)] = 1.0;
                     paths.distance[usize::from(col)] = f64::INFINITY;
                 }
                 for &col in &paths.settled[..count] {
                     let row = state.row_of[usize::from(col)];
-                    let line = costs.row(row, state.row);
-                    relax_largest(line, least, row, done, paths.distance, paths.previous);
+                    let line = costs.row_costs(row, state.row);
+                    relax_by_largest_cost(line, least, row, done, paths.distance, paths.previous);
                 }
             }
         }
     }
 }
 
-fn relax_largest(
+fn relax_by_largest_cost(
     line: &[f32],
     so_far: f64,
     row: u16,

@@ -1,6 +1,6 @@
 //! The cost matrix, checked.
 
-/// Why an assignment was refused.
+/// Reason why an assignment was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignmentError {
     /// The matrix has no rows or no columns.
@@ -28,7 +28,7 @@ pub enum AssignmentError {
 }
 
 /// A checked cost matrix, seen so that `rows <= cols`. Costs above `limit` count as infinite.
-pub(super) struct Costs<'a> {
+pub(super) struct CostMatrix<'a> {
     pub(super) data: &'a [f32],
     pub(super) rows: usize,
     pub(super) cols: usize,
@@ -36,7 +36,7 @@ pub(super) struct Costs<'a> {
     pub(super) limit: f32,
 }
 
-impl<'a> Costs<'a> {
+impl<'a> CostMatrix<'a> {
     pub(super) fn new(data: &'a [f32], rows: usize, cols: usize) -> Result<Self, AssignmentError> {
         if rows == 0 || cols == 0 {
             return Err(AssignmentError::Empty);
@@ -60,15 +60,15 @@ impl<'a> Costs<'a> {
     }
 
     #[inline]
-    pub(super) fn at(&self, row: u16, col: u16) -> f32 {
+    pub(super) fn cost_at(&self, row: u16, col: u16) -> f32 {
         let (row, col) = (usize::from(row), usize::from(col));
         let cost = self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
         if cost <= self.limit { cost } else { f32::INFINITY }
     }
 
-    /// One row, in place where it lies so in memory, else copied into `buffer`.
+    /// The costs of one row: a slice of the matrix if it is stored by rows, else a copy in `buffer`.
     #[inline]
-    pub(super) fn row<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
+    pub(super) fn row_costs<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
         let row = usize::from(row);
         if !self.transposed && self.limit == f32::INFINITY {
             return &self.data[row * self.cols..][..self.cols];

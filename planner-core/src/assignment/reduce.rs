@@ -1,7 +1,7 @@
 //! The cheap first phases of Jonker–Volgenant: most rows find their column here.
 
-use super::costs::Costs;
-use super::state::{Paths, SIMD_LANES, State, UNASSIGNED};
+use super::costs::CostMatrix;
+use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 
 /// Columns of a large matrix that are reduced together: four cache lines of each row.
 const BLOCK_COLUMNS: usize = 64;
@@ -9,7 +9,11 @@ const BLOCK_COLUMNS: usize = 64;
 /// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left over), then two
 /// rounds of augmenting row reduction. Returns how many rows are left in `state.free`, or `None` if some row or, in a
 /// square matrix, some column has no finite cost, so that not every row can be served.
-pub(super) fn free_rows(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> Option<usize> {
+pub(super) fn reduce_to_free_rows(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    paths: &mut AugmentingPaths<'_>,
+) -> Option<usize> {
     let mut left = if costs.rows == costs.cols {
         reduce_columns(costs, state, paths)?
     } else {
@@ -28,9 +32,13 @@ pub(super) fn free_rows(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Pa
 
 /// Each column is priced at its least cost and given to that row, if the row has none; then a row that is the least of
 /// one column only moves its slack into that column's price.
-fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> Option<usize> {
+fn reduce_columns(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    paths: &mut AugmentingPaths<'_>,
+) -> Option<usize> {
     // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a large matrix, the fewer
-    // cache misses. A small one has no room for so many.
+    // cache misses. A small matrix has fewer columns than that.
     match costs.cols {
         0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
         SIMD_LANES..BLOCK_COLUMNS => cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous),
@@ -45,7 +53,7 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
         let row = paths.previous[usize::from(col)];
         paths.settled[usize::from(row)] += 1;
         if state.col_of[usize::from(row)] == UNASSIGNED {
-            state.join(row, col);
+            state.match_pair(row, col);
         }
     }
     let mut left = 0;
@@ -59,7 +67,7 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
                 let own = usize::from(state.col_of[usize::from(row)]);
                 // At minus infinity the own column cannot be the least of the others.
                 let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
-                let slack = least_reduced(costs.row(row, state.row), state.price);
+                let slack = least_reduced_cost(costs.row_costs(row, state.row), state.price);
                 state.price[own] = if slack < f64::INFINITY { price - slack } else { price };
             }
             _ => {}
@@ -68,14 +76,19 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
     Some(left)
 }
 
-fn cheapest_rows_by<const K: usize>(costs: &Costs<'_>, price: &mut [f64], least_row: &mut [u16]) {
+fn cheapest_rows_by<const K: usize>(costs: &CostMatrix<'_>, price: &mut [f64], least_row: &mut [u16]) {
     for first in (0..costs.cols).step_by(K) {
         cheapest_rows::<K>(costs, first.min(costs.cols - K), price, least_row);
     }
 }
 
 /// Least cost and first cheapest row of `K` columns of a square matrix, which is never transposed.
-fn cheapest_rows<const K: usize>(costs: &Costs<'_>, first: usize, price: &mut [f64], least_row: &mut [u16]) {
+fn cheapest_rows<const K: usize>(
+    costs: &CostMatrix<'_>,
+    first: usize,
+    price: &mut [f64],
+    least_row: &mut [u16],
+) {
     let (mut least, mut rows) = ([f32::INFINITY; K], [0_u32; K]);
     for (row, line) in (0..).zip(costs.data.chunks_exact(costs.cols)) {
         let Some(line) = line[first..].first_chunk::<K>() else { return };
@@ -91,7 +104,7 @@ fn cheapest_rows<const K: usize>(costs: &Costs<'_>, first: usize, price: &mut [f
     }
 }
 
-fn least_reduced(line: &[f32], price: &[f64]) -> f64 {
+fn least_reduced_cost(line: &[f32], price: &[f64]) -> f64 {
     let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
     let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
     let mut least = [f64::INFINITY; SIMD_LANES];
@@ -107,14 +120,14 @@ fn least_reduced(line: &[f32], price: &[f64]) -> f64 {
 
 /// Every free row takes its cheapest column, whose price falls until the second cheapest is as good; the row that held
 /// it is served next, or is left for an augmenting path where no price moved. Returns the rows left free.
-fn reduce_rows(costs: &Costs<'_>, state: &mut State<'_>, rows_in: usize) -> Option<usize> {
+fn reduce_rows(costs: &CostMatrix<'_>, state: &mut MatchingState<'_>, rows_in: usize) -> Option<usize> {
     let (mut at, mut left) = (0, 0);
     // Rows chase one another for as long as prices fall; this bounds the work.
     let mut budget = rows_in * costs.cols;
     while at < rows_in {
         let row = state.free[at];
         at += 1;
-        let two = Two::cheapest(costs.row(row, state.row), state.price);
+        let two = TwoCheapestColumns::of_row(costs.row_costs(row, state.row), state.price);
         if two.least == f64::INFINITY {
             return None;
         }
@@ -145,27 +158,27 @@ fn reduce_rows(costs: &Costs<'_>, state: &mut State<'_>, rows_in: usize) -> Opti
                 left += 1;
             }
         }
-        state.join(row, col);
+        state.match_pair(row, col);
     }
     Some(left)
 }
 
 /// The two cheapest columns of a row by reduced cost.
-struct Two {
+struct TwoCheapestColumns {
     least: f64,
     second: f64,
     col: u16,
     second_col: u16,
 }
 
-impl Two {
-    fn cheapest(line: &[f32], price: &[f64]) -> Self {
+impl TwoCheapestColumns {
+    fn of_row(line: &[f32], price: &[f64]) -> Self {
         let mut two =
             Self { least: f64::INFINITY, second: f64::INFINITY, col: UNASSIGNED, second_col: UNASSIGNED };
         // The first few decide the second cheapest roughly; after them most chunks hold nothing below it, which eight
         // subtractions and compares tell without a branch within.
         let head = line.len().min(2 * SIMD_LANES);
-        two.offer(0, &line[..head], &price[..head]);
+        two.update_cheapest(0, &line[..head], &price[..head]);
         let (lines, line_rest) = line[head..].as_chunks::<SIMD_LANES>();
         let (prices, price_rest) = price[head..].as_chunks::<SIMD_LANES>();
         for (chunk, (line, price)) in lines.iter().zip(prices).enumerate() {
@@ -174,15 +187,15 @@ impl Two {
                 below |= u64::from(f64::from(line[lane]) - price[lane] < two.second);
             }
             if below != 0 {
-                two.offer(head + chunk * SIMD_LANES, line, price);
+                two.update_cheapest(head + chunk * SIMD_LANES, line, price);
             }
         }
-        two.offer(line.len() - line_rest.len(), line_rest, price_rest);
+        two.update_cheapest(line.len() - line_rest.len(), line_rest, price_rest);
         two
     }
 
     #[inline]
-    fn offer(&mut self, first: usize, line: &[f32], price: &[f64]) {
+    fn update_cheapest(&mut self, first: usize, line: &[f32], price: &[f64]) {
         for (k, (&cost, &price)) in line.iter().zip(price).enumerate() {
             let (value, col) = (f64::from(cost) - price, (first + k) as u16);
             if value < self.second {

@@ -6,8 +6,8 @@ pub(super) const UNASSIGNED: u16 = u16::MAX;
 /// registers.
 pub(super) const SIMD_LANES: usize = 8;
 
-/// Dual prices and the matching so far, sides swapped so that there are never more rows than columns.
-pub(super) struct State<'w> {
+/// Dual prices and the matching so far. The matrix is transposed where it has more rows than columns.
+pub(super) struct MatchingState<'w> {
     pub(super) price: &'w mut [f64],
     pub(super) row_of: &'w mut [u16],
     pub(super) col_of: &'w mut [u16],
@@ -17,21 +17,21 @@ pub(super) struct State<'w> {
     pub(super) free: &'w mut [u16],
 }
 
-impl State<'_> {
+impl MatchingState<'_> {
     pub(super) fn reset(&mut self) {
         self.price.fill(0.0);
         self.row_of.fill(UNASSIGNED);
         self.col_of.fill(UNASSIGNED);
     }
 
-    pub(super) fn join(&mut self, row: u16, col: u16) {
+    pub(super) fn match_pair(&mut self, row: u16, col: u16) {
         self.row_of[usize::from(col)] = row;
         self.col_of[usize::from(row)] = col;
     }
 }
 
 /// Scratch of one search, a slot for each column.
-pub(super) struct Paths<'w> {
+pub(super) struct AugmentingPaths<'w> {
     pub(super) distance: &'w mut [f64],
     pub(super) previous: &'w mut [u16],
     /// Columns settled, in order, with their price and distance.

@@ -86,7 +86,7 @@ fn solve_checked<const N: usize>(
     let mut out = vec![None; rows];
     let result = match objective {
         Objective::Total => assign(costs, rows, cols, ws, &mut out),
-        Objective::Makespan => bottleneck(costs, rows, cols, ws, &mut out),
+        Objective::Makespan => assign_bottleneck(costs, rows, cols, ws, &mut out),
     };
     let result = result.unwrap();
     check_assignment(costs, cols, &out, result);
@@ -153,7 +153,7 @@ fn bad_input_is_refused_by_name() {
     let mut refuse = |costs: &[f32], rows, cols, out: usize| {
         let out = &mut [None; CAPACITY + 1][..out];
         let total = assign(costs, rows, cols, &mut ws, out);
-        assert_eq!(total, bottleneck(costs, rows, cols, &mut ws, out));
+        assert_eq!(total, assign_bottleneck(costs, rows, cols, &mut ws, out));
         total.unwrap_err()
     };
     assert_eq!(refuse(&[], 0, 3, 0), AssignmentError::Empty);

@@ -1,4 +1,4 @@
-//! The area: polygons to photograph, holes in them, and zones that nobody enters; checked before anything is computed.
+//! The area: polygons to photograph, holes in them, and zones that no vehicle may enter; checked before anything is computed.
 //!
 //! Vertices of all rings lie in one slice, ring after ring, the first vertex of a ring not repeated. Which way a ring
 //! turns does not matter: a place is in the area if it is inside an odd number of outer rings and holes. Cost: O(n²) in
@@ -36,7 +36,7 @@ pub struct Ring {
     pub kind: RingKind,
 }
 
-/// Why rings are no area. Numbers are indices of rings and of vertices, from 0.
+/// Reason why rings do not form an area. Numbers are indices of rings and of vertices, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AreaError {
     /// The area has no outer ring.
@@ -134,7 +134,7 @@ impl<'a> Area<'a> {
         self.rings.iter().any(|ring| ring.kind == RingKind::NoFly)
     }
 
-    /// Vertices of one ring; none of one that there is not.
+    /// Vertices of one ring; empty for an index beyond the last ring.
     pub fn ring(&self, index: usize) -> &'a [Flat] {
         let Some(ring) = self.rings.get(index) else { return &[] };
         let start = index.checked_sub(1).map_or(0, |before| usize::from(self.rings[before].end));
@@ -142,31 +142,35 @@ impl<'a> Area<'a> {
     }
 
     /// Each ring's kind and vertices.
-    pub(super) fn each(&self) -> impl Iterator<Item = (RingKind, &'a [Flat])> + Clone + use<'a> {
+    pub(super) fn rings_with_kind(&self) -> impl Iterator<Item = (RingKind, &'a [Flat])> + Clone + use<'a> {
         let area = *self;
         area.rings.iter().enumerate().map(move |(i, ring)| (ring.kind, area.ring(i)))
     }
 
     /// Edges of the outer rings and of the holes, as their two ends.
     pub(super) fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
-        self.each().filter(|(kind, _)| *kind != RingKind::NoFly).flat_map(|(_, ring)| edges_of(ring))
+        self.rings_with_kind()
+            .filter(|(kind, _)| *kind != RingKind::NoFly)
+            .flat_map(|(_, ring)| edges_of(ring))
     }
 
     /// Edges of the no-fly zones.
     pub(super) fn no_fly_edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
-        self.each().filter(|(kind, _)| *kind == RingKind::NoFly).flat_map(|(_, ring)| edges_of(ring))
+        self.rings_with_kind()
+            .filter(|(kind, _)| *kind == RingKind::NoFly)
+            .flat_map(|(_, ring)| edges_of(ring))
     }
 
     /// Whether a place is to be photographed: inside outer rings and holes an odd number of times. No-fly zones are not
     /// looked at.
-    pub fn holds(&self, place: &Flat) -> bool {
-        let rings = self.each().filter(|(kind, _)| *kind != RingKind::NoFly);
+    pub fn contains(&self, place: &Flat) -> bool {
+        let rings = self.rings_with_kind().filter(|(kind, _)| *kind != RingKind::NoFly);
         rings.filter(|(_, ring)| is_inside(ring, place)).count() % 2 == 1
     }
 
     /// Whether a place is inside a no-fly zone.
-    pub fn forbids(&self, place: &Flat) -> bool {
-        self.each().any(|(kind, ring)| kind == RingKind::NoFly && is_inside(ring, place))
+    pub fn is_in_no_fly_zone(&self, place: &Flat) -> bool {
+        self.rings_with_kind().any(|(kind, ring)| kind == RingKind::NoFly && is_inside(ring, place))
     }
 
     fn check_shape(&self) -> Result<(), AreaError> {
@@ -200,7 +204,7 @@ impl<'a> Area<'a> {
 
     fn check_duplicates(&self) -> Result<(), AreaError> {
         let mut start = 0;
-        for (_, ring) in self.each() {
+        for (_, ring) in self.rings_with_kind() {
             if let Some(k) = edges_of(ring).position(|(a, b)| (b - a).amax() < SAME_VERTEX_M) {
                 return Err(AreaError::Duplicate { vertex: (start + (k + 1) % ring.len()) as u16 });
             }
@@ -212,9 +216,9 @@ impl<'a> Area<'a> {
     fn check_sizes(&self) -> Result<(), AreaError> {
         // A strip as long as half its border and a millimetre wide.
         let is_flat = |(_, ring): (_, &[Flat])| {
-            fabs(signed_area(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
+            fabs(doubled_signed_area(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
         };
-        match self.each().position(is_flat) {
+        match self.rings_with_kind().position(is_flat) {
             Some(ring) => Err(AreaError::NoArea { ring: ring as u16 }),
             None => Ok(()),
         }
@@ -222,9 +226,9 @@ impl<'a> Area<'a> {
 
     fn check_crossings(&self) -> Result<(), AreaError> {
         let mut start = 0;
-        for (i, (kind, ring)) in self.each().enumerate() {
+        for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
             for (k, (a, b)) in edges_of(ring).enumerate() {
-                if edges_of(ring).skip(k + 1).any(|(c, d)| cross(&a, &b, &c, &d)) {
+                if edges_of(ring).skip(k + 1).any(|(c, d)| segments_cross(&a, &b, &c, &d)) {
                     return Err(AreaError::SelfCrossing { vertex: (start + k) as u16 });
                 }
             }
@@ -232,8 +236,8 @@ impl<'a> Area<'a> {
             if kind == RingKind::NoFly {
                 continue;
             }
-            for (j, (other, far)) in self.each().enumerate().skip(i + 1) {
-                let meets = |(a, b): (Flat, Flat)| edges_of(far).any(|(c, d)| cross(&a, &b, &c, &d));
+            for (j, (other, far)) in self.rings_with_kind().enumerate().skip(i + 1) {
+                let meets = |(a, b): (Flat, Flat)| edges_of(far).any(|(c, d)| segments_cross(&a, &b, &c, &d));
                 if other != RingKind::NoFly && edges_of(ring).any(meets) {
                     return Err(AreaError::RingsCross { ring: i as u16, other: j as u16 });
                 }
@@ -244,15 +248,15 @@ impl<'a> Area<'a> {
 
     /// Rings that do not cross lie inside or outside each other as any of their inner places does.
     fn check_nesting(&self) -> Result<(), AreaError> {
-        for (i, (kind, ring)) in self.each().enumerate() {
+        for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
             if kind == RingKind::NoFly {
                 continue;
             }
-            let inner = inner_place(ring);
+            let inner = interior_point(ring);
             let around = |(j, (other, far)): (usize, (RingKind, &[Flat]))| {
                 j != i && other == RingKind::Outer && is_inside(far, &inner)
             };
-            let inside = self.each().enumerate().any(around);
+            let inside = self.rings_with_kind().enumerate().any(around);
             match kind {
                 RingKind::Outer if inside => return Err(AreaError::OuterInside { ring: i as u16 }),
                 RingKind::Hole if !inside => return Err(AreaError::HoleOutside { ring: i as u16 }),
@@ -270,9 +274,9 @@ pub(super) fn edges_of(ring: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + Cl
 }
 
 /// Twice the usual: positive where the ring turns left. f64, since it is a difference of large numbers.
-pub(super) fn signed_area(ring: &[Flat]) -> f64 {
+pub(super) fn doubled_signed_area(ring: &[Flat]) -> f64 {
     let base = ring[0];
-    let twice: f64 = edges_of(ring).map(|(a, b)| cross_f64(&(a - base), &(b - base))).sum();
+    let twice: f64 = edges_of(ring).map(|(a, b)| cross_product(&(a - base), &(b - base))).sum();
     twice / 2.0
 }
 
@@ -280,7 +284,7 @@ fn perimeter(ring: &[Flat]) -> f64 {
     edges_of(ring).map(|(a, b)| f64::from((b - a).norm())).sum()
 }
 
-fn cross_f64(a: &Flat, b: &Flat) -> f64 {
+fn cross_product(a: &Flat, b: &Flat) -> f64 {
     f64::from(a.x) * f64::from(b.y) - f64::from(a.y) * f64::from(b.x)
 }
 
@@ -293,7 +297,7 @@ pub(super) fn is_inside(ring: &[Flat], place: &Flat) -> bool {
 }
 
 /// A place inside a ring: the middle of the longest stretch of a line across it that misses every vertex.
-fn inner_place(ring: &[Flat]) -> Flat {
+fn interior_point(ring: &[Flat]) -> Flat {
     let (low, high) = ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
         (libm::fminf(low, v.y), libm::fmaxf(high, v.y))
     });
@@ -317,7 +321,7 @@ fn inner_place(ring: &[Flat]) -> Flat {
 }
 
 /// Whether the segments `a b` and `c d` cross, each reaching at least [`MIN_CROSSING_M`] beyond the other.
-fn cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
+fn segments_cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
     let apart = |p: f32, q: f32, r: f32, s: f32| {
         libm::fmaxf(p, q) < libm::fminf(r, s) || libm::fmaxf(r, s) < libm::fminf(p, q)
     };
@@ -326,8 +330,8 @@ fn cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
     }
     let beyond = |from: &Flat, to: &Flat, p: &Flat, q: &Flat| {
         let along = to - from;
-        let length = sqrt(cross_f64(&along, &Flat::new(-along.y, along.x)));
-        let (p, q) = (cross_f64(&along, &(p - from)), cross_f64(&along, &(q - from)));
+        let length = sqrt(cross_product(&along, &Flat::new(-along.y, along.x)));
+        let (p, q) = (cross_product(&along, &(p - from)), cross_product(&along, &(q - from)));
         p * q < 0.0 && libm::fmin(fabs(p), fabs(q)) > MIN_CROSSING_M * length
     };
     beyond(a, b, c, d) && beyond(c, d, a, b)

@@ -2,10 +2,10 @@
 //!
 //! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad, and down. What is to be kept off is
 //! walked around: a visibility graph over the zones' corners ([`Transit::corners`]) and eight corners around either end of
-//! each [`KeepOff`] that reaches the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer leaves no way, the same at the height at which the
+//! each [`KeepOutZone`] that reaches the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer leaves no way, the same at the height at which the
 //! vehicle hovers. Aside: the nearest of places on rings around it, straight there.
 //!
-//! No leg leaves the request's fence. ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOff`]s.
+//! No leg leaves the request's fence. ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOutZone`]s.
 
 use heapless::Vec;
 use libm::{ceilf, cosf, fabsf, fminf, sinf};
@@ -13,7 +13,7 @@ use libm::{ceilf, cosf, fabsf, fminf, sinf};
 use super::Flat;
 use super::transit::Transit;
 use crate::Point;
-use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOff};
+use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone};
 use crate::field::FieldView;
 use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::search::SearchError;
@@ -38,22 +38,22 @@ const MAX_SIDESTEP_RINGS: usize = 20;
 /// Directions on each ring in which a landing place aside is sought.
 const SIDESTEP_DIRECTIONS: usize = 16;
 
-/// Zones, ground and things that no leg meets.
-struct Clear<'a, 't, const N: usize> {
+/// No-fly zones, ground and obstacles that legs keep clear of.
+struct FreeSpace<'a, 't, const N: usize> {
     transit: &'a Transit<'t, N>,
     field: Option<FieldView<'a>>,
-    obstacles: &'a [KeepOff],
+    obstacles: &'a [KeepOutZone],
     here: Point,
     fence: Option<(Point, Point)>,
 }
 
-impl<const N: usize> Clear<'_, '_, N> {
-    fn leg(&self, a: &Point, b: &Point) -> bool {
-        let touches = |obstacle: &KeepOff| obstacle.solid(&self.here).touches(a, b);
-        // A box holds what is between two places in it; where the vehicle is it may have strayed beyond.
+impl<const N: usize> FreeSpace<'_, '_, N> {
+    fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
+        let touches = |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
+        // A box holds what is between two places in it; where the vehicle is it may have deviated beyond.
         self.is_inside(b)
-            && self.transit.is_clear(&a.xy(), &b.xy())
-            && self.is_high(a, b)
+            && self.transit.is_line_clear(&a.xy(), &b.xy())
+            && self.is_above_field(a, b)
             && !self.obstacles.iter().any(touches)
     }
 
@@ -61,8 +61,8 @@ impl<const N: usize> Clear<'_, '_, N> {
         self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
-    /// Whether a leg keeps above the field, looked at half a node apart.
-    fn is_high(&self, a: &Point, b: &Point) -> bool {
+    /// Whether a leg stays above the height field, checked at samples half a node apart.
+    fn is_above_field(&self, a: &Point, b: &Point) -> bool {
         let (Some(field), step) = (&self.field, b - a) else { return true };
         let length_m = step.xy().norm();
         if length_m < SAME_CORNER_M {
@@ -76,42 +76,43 @@ impl<const N: usize> Clear<'_, '_, N> {
     }
 }
 
-/// The way to the goal ([`Goal::Home`]), or aside, that keeps off all `obstacles`, above the field and out of the zones that `transit` knows, written to `out`. Of an
-/// obstacle that is nearer already the distance is shortened.
+/// The way to the goal ([`Goal::Home`]), or aside, that keeps clear of all `obstacles`, above the field and out of the
+/// zones that `transit` knows, written to `out`. Of an obstacle that is nearer already the distance is shortened.
 ///
 /// # Errors
-/// Why there is none.
-pub fn plan<const N: usize, const W: usize>(
+/// Reason why there is none.
+pub fn plan_detour<const N: usize, const W: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,
-    obstacles: &mut [KeepOff],
+    obstacles: &mut [KeepOutZone],
     out: &mut Path<W>,
 ) -> Result<(), DetourError> {
     request.check().map_err(DetourError::Config)?;
-    obstacles.iter().try_for_each(KeepOff::check).map_err(DetourError::Config)?;
+    obstacles.iter().try_for_each(KeepOutZone::check).map_err(DetourError::Config)?;
     let Goal::Home { over, layer_m } = request.goal else {
         return Err(DetourError::Search(SearchError::NoPath));
     };
-    detour::shorten(obstacles, &request.here);
-    let clear = Clear { transit, field, obstacles, here: request.here, fence: request.fence };
-    let from = |points: &[Point], out: &mut Path<W>| write(request, points, out).map_err(DetourError::Path);
+    detour::shrink_zones(obstacles, &request.here);
+    let clear = FreeSpace { transit, field, obstacles, here: request.here, fence: request.fence };
+    let from =
+        |points: &[Point], out: &mut Path<W>| write_path(request, points, out).map_err(DetourError::Path);
     if request.aside {
-        let place = aside(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
+        let place = nearest_reachable_place(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
         return from(&[place], out);
     }
-    let mut graph = Graph::EMPTY;
+    let mut graph = VisibilityGraph::EMPTY;
     for height_m in [layer_m, request.here.z] {
         let level = |place: &Point| Point::new(place.x, place.y, height_m);
         let (up, down) = (level(&request.here), level(&over));
-        if !clear.leg(&request.here, &up) {
+        if !clear.is_leg_free(&request.here, &up) {
             continue;
         }
-        if !clear.leg(&down, &over) {
+        if !clear.is_leg_free(&down, &over) {
             return Err(DetourError::GoalBlocked);
         }
         let mut points = Vec::<Point, W>::new();
-        if graph.search(&clear, &up, &down, &mut points)? {
+        if graph.find_shortest_path(&clear, &up, &down, &mut points)? {
             points.push(over).map_err(|_| DetourError::Path(PathError::PathFull))?;
             return from(&points, out);
         }
@@ -119,19 +120,19 @@ pub fn plan<const N: usize, const W: usize>(
     Err(DetourError::Search(SearchError::NoPath))
 }
 
-/// As [`plan`], as the plan of one vehicle that leaves the others' plan: only the path of that plan
+/// As [`plan_detour`], as the plan of one vehicle that leaves the others' plan: only the path of that plan
 /// counts; the plan has no gates.
 ///
 /// # Errors
-/// Why there is none.
-pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
+/// Reason why there is none.
+pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,
-    obstacles: &mut [KeepOff],
+    obstacles: &mut [KeepOutZone],
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), DetourError> {
-    plan(transit, field, request, obstacles, &mut out.path)?;
+    plan_detour(transit, field, request, obstacles, &mut out.path)?;
     out.task = Task::Goto(0);
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();
@@ -139,8 +140,8 @@ pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
-/// The nearest place to rest at that is reached straight.
-fn aside<const N: usize>(clear: &Clear<'_, '_, N>) -> Option<Point> {
+/// The nearest free place that a straight leg reaches.
+fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Option<Point> {
     let here = clear.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
     let place = |i: usize| {
@@ -148,33 +149,34 @@ fn aside<const N: usize>(clear: &Clear<'_, '_, N>) -> Option<Point> {
         here + Point::new(cosf(angle), sinf(angle), 0.0) * far_m
     };
     let rests = |place: &Point| {
-        !clear.transit.forbids(&place.xy()) && !clear.obstacles.iter().any(|obstacle| obstacle.holds(place))
+        !clear.transit.is_in_no_fly_zone(&place.xy())
+            && !clear.obstacles.iter().any(|obstacle| obstacle.contains(place))
     };
     (0..MAX_SIDESTEP_RINGS * SIDESTEP_DIRECTIONS)
         .map(place)
-        .find(|place| rests(place) && clear.leg(&here, place))
+        .find(|place| rests(place) && clear.is_leg_free(&here, place))
 }
 
-/// Places at one height, and the shortest ways found to them so far.
-struct Graph {
+/// Nodes at one height, with the shortest distances found to them so far.
+struct VisibilityGraph {
     places: Vec<Flat, MAX_PLACES>,
-    far_m: [f32; MAX_PLACES],
-    before: [u16; MAX_PLACES],
-    ended: [bool; MAX_PLACES],
+    distance_m: [f32; MAX_PLACES],
+    previous: [u16; MAX_PLACES],
+    settled: [bool; MAX_PLACES],
 }
 
-impl Graph {
+impl VisibilityGraph {
     const EMPTY: Self = Self {
         places: Vec::new(),
-        far_m: [0.0; MAX_PLACES],
-        before: [0; MAX_PLACES],
-        ended: [false; MAX_PLACES],
+        distance_m: [0.0; MAX_PLACES],
+        previous: [0; MAX_PLACES],
+        settled: [false; MAX_PLACES],
     };
 
     /// The shortest way between two places of one height: all its points but the first, none where it stays. Whether there is one.
-    fn search<const N: usize, const W: usize>(
+    fn find_shortest_path<const N: usize, const W: usize>(
         &mut self,
-        clear: &Clear<'_, '_, N>,
+        clear: &FreeSpace<'_, '_, N>,
         from: &Point,
         to: &Point,
         points: &mut Vec<Point, W>,
@@ -184,40 +186,43 @@ impl Graph {
         /// Index of the path's end in the visibility graph.
         const END_NODE: usize = 1;
         let height_m = from.z;
-        self.gather(clear, from, to);
+        self.collect_nodes(clear, from, to);
         let level = |place: &Flat| Point::new(place.x, place.y, height_m);
-        self.far_m.fill(f32::INFINITY);
-        self.ended.fill(false);
-        self.far_m[START_NODE] = 0.0;
+        self.distance_m.fill(f32::INFINITY);
+        self.settled.fill(false);
+        self.distance_m[START_NODE] = 0.0;
         loop {
-            let open = (0..self.places.len()).filter(|&i| !self.ended[i] && self.far_m[i].is_finite());
-            let whole = |i: usize| self.far_m[i] + (self.places[i] - to.xy()).norm();
+            let open = (0..self.places.len()).filter(|&i| !self.settled[i] && self.distance_m[i].is_finite());
+            let whole = |i: usize| self.distance_m[i] + (self.places[i] - to.xy()).norm();
             let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else { return Ok(false) };
             if next == END_NODE {
                 break;
             }
-            self.ended[next] = true;
+            self.settled[next] = true;
             let place = level(&self.places[next]);
             for i in 0..self.places.len() {
-                let far_m = self.far_m[next] + (self.places[i] - place.xy()).norm();
+                let far_m = self.distance_m[next] + (self.places[i] - place.xy()).norm();
                 // A look costs more than the sum: only at what would be shorter.
-                if !self.ended[i] && far_m < self.far_m[i] && clear.leg(&place, &level(&self.places[i])) {
-                    (self.far_m[i], self.before[i]) = (far_m, next as u16);
+                if !self.settled[i]
+                    && far_m < self.distance_m[i]
+                    && clear.is_leg_free(&place, &level(&self.places[i]))
+                {
+                    (self.distance_m[i], self.previous[i]) = (far_m, next as u16);
                 }
             }
         }
         let mut at = END_NODE;
         while at != START_NODE {
             points.push(level(&self.places[at])).map_err(|_| DetourError::Path(PathError::PathFull))?;
-            at = usize::from(self.before[at]);
+            at = usize::from(self.previous[at]);
         }
         points.push(*from).map_err(|_| DetourError::Path(PathError::PathFull))?;
         points.reverse();
         Ok(true)
     }
 
-    /// Both ends, corners of zones, and corners around what reaches this height: as many as there is room for.
-    fn gather<const N: usize>(&mut self, clear: &Clear<'_, '_, N>, from: &Point, to: &Point) {
+    /// Collects both ends, corners of zones, and corners around obstacles at this height, up to the capacity.
+    fn collect_nodes<const N: usize>(&mut self, clear: &FreeSpace<'_, '_, N>, from: &Point, to: &Point) {
         self.places.clear();
         let mut add = |place: Flat| _ = self.places.push(place);
         add(from.xy());
@@ -240,7 +245,7 @@ impl Graph {
                 for i in 0..CORNERS_PER_END {
                     let angle = i as f32 * step;
                     let place = end.xy() + Flat::new(cosf(angle), sinf(angle)) * far_m;
-                    if !clear.transit.forbids(&place) {
+                    if !clear.transit.is_in_no_fly_zone(&place) {
                         add(place);
                     }
                 }
@@ -249,7 +254,7 @@ impl Graph {
     }
 }
 
-fn write<const W: usize>(
+fn write_path<const W: usize>(
     request: &DetourRequest,
     points: &[Point],
     out: &mut Path<W>,

@@ -26,7 +26,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
         let delays = work.vehicles.iter().map(|vehicle| work.altitude_delay_s(vehicle, layer));
         delays.fold(f32::INFINITY, fminf)
     };
-    let mut longest = Largest::new();
+    let mut longest = LargestValues::new();
     let mut furthest_s: f32 = 0.0;
     let mut nearest_m = [f32::INFINITY; MAX_VEHICLES];
     for lane in work.tracks.lanes() {
@@ -42,15 +42,15 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
             }
             furthest_s = fmaxf(furthest_s, least_s);
             if k > 0 {
-                longest.take(step);
+                longest.insert(step);
             }
         }
     }
     for pair in work.tracks.lanes().windows(2) {
-        longest.take(pair[1].start_m - pair[0].start_m - pair[0].length_m());
+        longest.insert(pair[1].start_m - pair[0].start_m - pair[0].length_m());
     }
     let nearest_m = &mut nearest_m[..work.vehicles.len()];
-    sort::by(nearest_m, f32::total_cmp);
+    sort::sort_by(nearest_m, f32::total_cmp);
     let (mut ground_m, mut delay_s, mut least_s) = (work.tracks.length_m(), 0.0, f32::INFINITY);
     for (flying, near) in nearest_m.iter().enumerate() {
         ground_m += near - if flying > 0 { longest.values[flying - 1] } else { 0.0 };
@@ -61,17 +61,17 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
     Ok(fmaxf(least_s, furthest_s + vertical(1)))
 }
 
-/// The largest of many numbers, falling.
-struct Largest {
+/// The largest values inserted so far, in falling order.
+struct LargestValues {
     values: [f32; MAX_VEHICLES],
 }
 
-impl Largest {
+impl LargestValues {
     fn new() -> Self {
         Self { values: [0.0; MAX_VEHICLES] }
     }
 
-    fn take(&mut self, value: f32) {
+    fn insert(&mut self, value: f32) {
         let at = self.values.partition_point(|held| *held >= value);
         if at < MAX_VEHICLES {
             self.values[at..].rotate_right(1);

@@ -6,21 +6,21 @@
 use super::CoverageError;
 use super::tracks::{Lane, Tracks};
 use super::transit::Transit;
-use crate::flight::Range;
+use crate::flight::WaypointRange;
 
-/// Sets `left` to the lanes without these waypoints. Ranges are in rising order and do not overlap. The number that a
-/// waypoint had before is [`original`].
+/// Sets `remaining_lanes` to the lanes without these waypoints. Ranges are in rising order and do not overlap. The number that a
+/// waypoint had before is [`original_waypoint_number`].
 ///
 /// # Errors
 /// [`CoverageError::Setting`] for ranges that are out of order, [`CoverageError::LanesFull`],
 /// [`CoverageError::NothingToCover`] where all is done, [`CoverageError::Unreachable`].
-pub fn left<const L: usize, const N: usize>(
+pub fn remaining_lanes<const L: usize, const N: usize>(
     tracks: &Tracks<L>,
-    done: &[Range],
+    done: &[WaypointRange],
     transit: &Transit<'_, N>,
     left: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    if !in_order(done) || done.last().is_some_and(|range| range.end > tracks.waypoint_count()) {
+    if !is_sorted_disjoint(done) || done.last().is_some_and(|range| range.end > tracks.waypoint_count()) {
         return Err(CoverageError::Setting("done"));
     }
     left.lanes.clear();
@@ -29,24 +29,29 @@ pub fn left<const L: usize, const N: usize>(
         let end = lane.first + lane.count;
         let mut from = lane.first;
         for range in done.iter().filter(|range| range.first < end && range.end > lane.first) {
-            keep(lane, from, range.first.max(lane.first), left)?;
+            push_lane_part(lane, from, range.first.max(lane.first), left)?;
             from = range.end.min(end);
         }
-        keep(lane, from, end, left)?;
+        push_lane_part(lane, from, end, left)?;
     }
     if left.lanes.is_empty() {
         return Err(CoverageError::NothingToCover);
     }
-    left.measure(transit)
+    left.measure_lengths(transit)
 }
 
 /// Whether ranges are in rising order and do not overlap.
-pub(super) fn in_order(done: &[Range]) -> bool {
+pub(super) fn is_sorted_disjoint(done: &[WaypointRange]) -> bool {
     done.iter().all(|range| range.first <= range.end)
         && done.windows(2).all(|pair| pair[0].end <= pair[1].first)
 }
 
-fn keep<const L: usize>(lane: &Lane, from: u32, end: u32, left: &mut Tracks<L>) -> Result<(), CoverageError> {
+fn push_lane_part<const L: usize>(
+    lane: &Lane,
+    from: u32,
+    end: u32,
+    left: &mut Tracks<L>,
+) -> Result<(), CoverageError> {
     if from >= end {
         return Ok(());
     }
@@ -62,7 +67,7 @@ fn keep<const L: usize>(lane: &Lane, from: u32, end: u32, left: &mut Tracks<L>) 
 }
 
 /// The number that waypoint `number` of what is left had on the whole path: the greatest there is where it had none.
-pub fn original(done: &[Range], number: u32) -> u32 {
+pub fn original_waypoint_number(done: &[WaypointRange], number: u32) -> u32 {
     let mut whole = number;
     for range in done.iter().filter(|range| range.first < range.end) {
         if whole < range.first {

@@ -16,7 +16,7 @@ pub const MAX_EXACT_VEHICLES: usize = 10;
 /// Relative resolution to which the mission time T is found.
 pub const TIME_RESOLUTION: f32 = 1e-5;
 
-/// Memory lent: lengths by [`Workspace::lengths`].
+/// Memory lent: lengths by [`Workspace::required_lengths`].
 pub struct Workspace<'a> {
     /// Ways from every vehicle's place to every waypoint, and from there home.
     pub ways_m: &'a mut [f32],
@@ -28,7 +28,7 @@ pub struct Workspace<'a> {
 
 impl Workspace<'_> {
     /// Lengths of the three for so many vehicles and waypoints: the greatest number there is where no memory has so much.
-    pub fn lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
+    pub fn required_lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
         let vehicles = vehicles.min(MAX_EXACT_VEHICLES);
         let reaches = (vehicles * vehicles).saturating_mul(waypoints.saturating_add(1));
         [(2 * vehicles).saturating_mul(waypoints), reaches, 1 << (2 * vehicles)]
@@ -39,7 +39,7 @@ impl Workspace<'_> {
 ///
 /// # Errors
 /// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`]; [`CoverageError::WorkspaceTooSmall`].
-pub fn exact<const L: usize, const N: usize, const K: usize>(
+pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     ws: &mut Workspace<'_>,
     pack: &mut PackWorkspace<K>,
@@ -50,22 +50,22 @@ pub fn exact<const L: usize, const N: usize, const K: usize>(
     if count > MAX_EXACT_VEHICLES {
         return Err(CoverageError::Vehicles);
     }
-    let [ways, reaches, states] = Workspace::lengths(count, waypoints);
+    let [ways, reaches, states] = Workspace::required_lengths(count, waypoints);
     if ws.ways_m.len() < ways || ws.reaches.len() < reaches || ws.states.len() < states {
         return Err(CoverageError::WorkspaceTooSmall);
     }
     // The division that BINPAT finds is possible; a division in no time is not.
     binpat(work, pack, out)?;
-    let mut table = Table { work, ws, count, waypoints };
-    table.measure();
+    let mut table = DivisionTable { work, ws, count, waypoints };
+    table.fill_lengths();
     let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + TIME_RESOLUTION));
-    if table.reach(high) {
-        table.read(out);
+    if table.fill_states(high) {
+        table.write_plan(out);
     }
     while high - low > high * TIME_RESOLUTION {
         let middle = low + (high - low) / 2.0;
-        if table.reach(middle) {
-            table.read(out);
+        if table.fill_states(middle) {
+            table.write_plan(out);
             high = libm::fminf(middle, out.max_cost_s());
         } else {
             low = middle;
@@ -74,15 +74,15 @@ pub fn exact<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
-struct Table<'t, 'w, 'm, const L: usize, const N: usize> {
+struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
     work: &'t Work<'w, L, N>,
     ws: &'t mut Workspace<'m>,
     count: usize,
     waypoints: usize,
 }
 
-impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
-    fn measure(&mut self) {
+impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
+    fn fill_lengths(&mut self) {
         for (v, vehicle) in self.work.vehicles.iter().enumerate() {
             for i in 0..self.waypoints {
                 let Some(place) = self.work.tracks.waypoint(i as u32) else { continue };
@@ -99,16 +99,16 @@ impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
     }
 
     /// Whether a vehicle can photograph `from` up to before `end` over `most_m` of ground.
-    fn fits(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
+    fn is_within_length(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
         let to = &self.ws.ways_m[2 * v * self.waypoints..][..self.waypoints];
         let home = &self.ws.ways_m[(2 * v + 1) * self.waypoints..][..self.waypoints];
-        let along = |i: usize| self.work.tracks.along_m(i as u32);
+        let along = |i: usize| self.work.tracks.distance_to_waypoint_m(i as u32);
         let transit = libm::fminf(to[from] + home[end - 1], to[end - 1] + home[from]);
         along(end - 1) - along(from) + transit <= most_m
     }
 
     /// Fills the states for T = `time_s`; whether everything is done.
-    fn reach(&mut self, time_s: f32) -> bool {
+    fn fill_states(&mut self, time_s: f32) -> bool {
         let (count, waypoints) = (self.count, self.waypoints);
         for v in 0..count {
             let vehicle = self.work.vehicles[v];
@@ -118,7 +118,7 @@ impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
                 let mut end = 0;
                 for from in 0..waypoints {
                     end = end.max(from);
-                    while end < waypoints && self.fits(v, from, end + 1, most_m) {
+                    while end < waypoints && self.is_within_length(v, from, end + 1, most_m) {
                         end += 1;
                     }
                     self.ws.reaches[(v * count + layer) * (waypoints + 1) + from] = end as u32;
@@ -142,18 +142,18 @@ impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
                 }
             }
         }
-        self.whole().is_some()
+        self.complete_state().is_some()
     }
 
     /// The state with the fewest vehicles in which everything is done.
-    fn whole(&self) -> Option<usize> {
+    fn complete_state(&self) -> Option<usize> {
         let all = |state: &usize| self.ws.states[*state].0 as usize == self.waypoints;
         (0..1usize << (2 * self.count)).filter(all).min_by_key(|state| state.count_ones())
     }
 
     /// The plan that the states hold.
-    fn read<const K: usize>(&self, out: &mut Plan<K>) {
-        let Some(mut state) = self.whole() else { return };
+    fn write_plan<const K: usize>(&self, out: &mut Plan<K>) {
+        let Some(mut state) = self.complete_state() else { return };
         let (count, sets) = (self.count, 1usize << self.count);
         let stride = self.waypoints + 1;
         out.routes.clear();
@@ -163,7 +163,7 @@ impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
             state = ((state / sets) & !(1 << v)) * sets + ((state % sets) & !(1 << layer));
             let first = self.ws.states[state].0;
             debug_assert_eq!(self.ws.reaches[usize::from(step) * stride + first as usize], end);
-            let (ground_m, heading) = self.work.ground_m(&self.work.vehicles[v], first, end);
+            let (ground_m, heading) = self.work.ground_distance_m(&self.work.vehicles[v], first, end);
             let route = Route {
                 vehicle: v as u8,
                 first,

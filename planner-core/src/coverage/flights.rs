@@ -12,8 +12,8 @@ use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use super::{Flat, divide};
 use crate::Point;
-use crate::field::follow::Following;
-use crate::flight::{Flight, Look, Path, PathError, Photographs, Range, Task, Trigger};
+use crate::field::follow::TerrainFollowing;
+use crate::flight::{Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
@@ -23,7 +23,7 @@ pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
 /// Longest path, metres: vehicles report their progress to each other in 16 bits, in decimetres.
 pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 
-/// A vehicle of the mission, beside what it is packed by.
+/// A vehicle's pad and vertical profile, beside the data that packing uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pad {
     /// Id of the vehicle, unique in the swarm.
@@ -37,100 +37,102 @@ pub struct Pad {
     /// Height of that over the ground there, metres.
     pub descent_m: f32,
     /// Whether it is in the air: without a route it flies home.
-    pub aloft: bool,
+    pub airborne: bool,
 }
 
-/// How pictures are taken.
+/// Settings of the camera during a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Manner {
+pub struct CaptureSettings {
     /// Greatest distance from one picture to the next, metres.
     pub waypoint_m: f32,
     /// Heading of the vehicles.
-    pub look: Look,
+    pub heading_mode: HeadingMode,
     /// Trigger of the pictures.
     pub trigger: Trigger,
 }
 
 /// Inputs of flights beside the routes.
 #[derive(Clone, Copy, Debug)]
-pub struct Swarm<'a> {
+pub struct FlightInputs<'a> {
     /// The vehicles, in the order of [`Work::vehicles`].
     pub pads: &'a [Pad],
-    /// How pictures are taken.
-    pub manner: Manner,
+    /// Settings of the camera during a flight.
+    pub capture: CaptureSettings,
     /// Clearance that every leg is taken to have, metres: there are no walls.
     pub clearance_m: f32,
     /// Separation and nominal speeds; each vehicle's own are those of [`Work::vehicles`].
     pub schedule: ScheduleConfig,
     /// Most gates of one vehicle.
-    pub gates_most: usize,
+    pub max_gates: usize,
     /// Waypoints of the area that the lanes leave out, in rising order.
-    pub done: &'a [Range],
+    pub photographed: &'a [WaypointRange],
     /// Layers that are not free, a bit each.
-    pub layers_held: u64,
+    pub held_layers: u64,
     /// Surface that lanes, and paths between them, follow where the ground is not level: all below
     /// the lowest layer.
-    pub following: Option<Following<'a>>,
+    pub following: Option<TerrainFollowing<'a>>,
 }
 
 /// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there. Of a route
-/// with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`], a flight is the first stretch ([`Photographs::goes_on`]): as many lanes as leave
-/// room for the way home. What is left is for the next division ([`super::losses`]).
+/// with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`], a flight is the first stretch ([`PicturePlan::goes_on`]): as many lanes as leave
+/// room for the path home. What is left is for the next division ([`super::losses`]).
 ///
 /// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a vehicle that cannot be kept
 /// apart from the others, [`PlanError::Terminals`] where pads, vehicles, routes and lanes do not belong together,
 /// [`PlanError::Config`] for a setting, [`PlanError::BadTask`] for a vehicle's, [`PlanError::SameId`].
-pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+pub fn plan_flights<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     work: &Work<'_, L, N>,
     routes: &Plan<K>,
-    swarm: &Swarm<'_>,
+    swarm: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
-    check(work, &routes.routes, swarm)?;
+    check_inputs(work, &routes.routes, swarm)?;
     out.flights.clear();
     let used = |layer: u8| routes.routes.iter().any(|route| route.layer == layer);
-    let mut layers = free_layers(swarm.layers_held).filter(|layer| !used(*layer));
+    let mut layers = free_layers(swarm.held_layers).filter(|layer| !used(*layer));
     for (index, pad) in swarm.pads.iter().enumerate() {
         let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
-            Some(route) => flight(work, route, swarm, pad),
-            None if pad.aloft => {
+            Some(route) => route_flight(work, route, swarm, pad),
+            None if pad.airborne => {
                 // Cannot fail: there are more layers than vehicles.
-                homeward(work, layers.next().unwrap_or(u8::MAX), &work.vehicles[index], swarm, pad)
+                flight_home(work, layers.next().unwrap_or(u8::MAX), &work.vehicles[index], swarm, pad)
             }
-            None => grounded(pad),
+            None => grounded_flight(pad),
         };
         let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
-    depart(swarm, ws, out)?;
+    schedule_departures(swarm, ws, out)?;
     for (index, flight) in out.flights.iter().enumerate() {
-        schedule::merged_m(&swarm.schedule, &out.flights, index, swarm.gates_most, ws)
+        schedule::gate_merge_distance_m(&swarm.schedule, &out.flights, index, swarm.max_gates, ws)
             .map_err(|e| PlanError::Schedule(flight.id, e))?;
     }
-    out.seal(&swarm.schedule);
+    out.set_crc(&swarm.schedule);
     Ok(())
 }
 
-/// Whether every number is one that can be planned with, and all belong together.
-fn check<const L: usize, const N: usize>(
+/// Checks that every number is valid and that the inputs are consistent.
+fn check_inputs<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     routes: &[Route],
-    swarm: &Swarm<'_>,
+    swarm: &FlightInputs<'_>,
 ) -> Result<(), PlanError> {
     swarm.schedule.check().map_err(PlanError::Config)?;
     let settings = [
         ("mission_m", work.heights.mission_m),
         ("layer_m", work.heights.layer_m),
-        ("waypoint_m", swarm.manner.waypoint_m),
+        ("waypoint_m", swarm.capture.waypoint_m),
     ];
     crate::all_positive(&settings).map_err(PlanError::Config)?;
     let all = work.tracks.waypoint_count();
     let within = |route: &Route| {
         route.first < route.end && route.end <= all && usize::from(route.vehicle) < work.vehicles.len()
     };
-    if swarm.pads.len() != work.vehicles.len() || !routes.iter().all(within) || !divide::in_order(swarm.done)
+    if swarm.pads.len() != work.vehicles.len()
+        || !routes.iter().all(within)
+        || !divide::is_sorted_disjoint(swarm.photographed)
     {
         return Err(PlanError::Terminals);
     }
@@ -163,8 +165,8 @@ pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
 
 /// The vehicle that flies longest leaves first, each other one as early as those before it allow. One that they leave no
 /// departure goes before all of them, and the search begins again.
-fn depart<const V: usize, const W: usize>(
-    swarm: &Swarm<'_>,
+fn schedule_departures<const V: usize, const W: usize>(
+    swarm: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
@@ -172,13 +174,13 @@ fn depart<const V: usize, const W: usize>(
     let mut order: Vec<(bool, f32, u16), V> = Vec::new();
     for (flight, i) in out.flights.iter().zip(0..) {
         // Cannot overflow: one entry a flight.
-        let _ = order.push((flight.task.flies(), flight.lasts_s(cfg), i));
+        let _ = order.push((flight.task.leaves_pad(), flight.duration_s(cfg), i));
     }
     // Whoever stays on its pad is there before all others.
-    sort::by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
+    sort::sort_by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
     let stay = order.iter().filter(|(flies, ..)| !flies).count();
     let mut tries = order.len();
-    while let Err((place, error)) = depart_in_order(cfg, &order, ws, out) {
+    while let Err((place, error)) = schedule_in_order(cfg, &order, ws, out) {
         tries = tries.saturating_sub(1);
         if tries == 0 || place == stay || error != ScheduleError::Blocked {
             return Err(PlanError::Schedule(out.flights[usize::from(order[place].2)].id, error));
@@ -189,7 +191,7 @@ fn depart<const V: usize, const W: usize>(
 }
 
 /// Lets vehicles leave in this order; the place of the first that cannot.
-fn depart_in_order<const V: usize, const W: usize>(
+fn schedule_in_order<const V: usize, const W: usize>(
     cfg: &ScheduleConfig,
     order: &[(bool, f32, u16)],
     ws: &mut ScheduleWorkspace,
@@ -207,12 +209,12 @@ fn depart_in_order<const V: usize, const W: usize>(
     Ok(())
 }
 
-fn at(place: &Flat, height_m: f32) -> Point {
+fn point_at_height(place: &Flat, height_m: f32) -> Point {
     Point::new(place.x, place.y, height_m)
 }
 
-/// A vehicle that stays on its pad.
-fn grounded<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
+/// The flight of a vehicle that stays on its pad.
+fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
     path.push(pad.start, 0.0)?;
     let Pad { id, climb_m, .. } = *pad;
@@ -223,77 +225,87 @@ fn grounded<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
         climb_m,
         descent_m: 0.0,
         depart_s: 0.0,
-        piece_m: MAX_TIMED_SEGMENT_M,
+        segment_m: MAX_TIMED_SEGMENT_M,
     })
 }
 
 /// A path under construction.
-struct Draft<'a, const N: usize, const W: usize> {
+struct FlightPathBuilder<'a, const N: usize, const W: usize> {
     path: Path<W>,
     transit: &'a Transit<'a, N>,
     clearance_m: f32,
-    following: Option<Following<'a>>,
+    following: Option<TerrainFollowing<'a>>,
     /// Place that the flight has reached.
     here: Point,
 }
 
-impl<'a, const N: usize, const W: usize> Draft<'a, N, W> {
+impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     /// Above a pad.
-    fn begin<const L: usize>(work: &Work<'a, L, N>, swarm: &Swarm<'a>, pad: &Pad) -> Result<Self, PathError> {
-        let Swarm { clearance_m, following, .. } = *swarm;
+    fn start_above_pad<const L: usize>(
+        work: &Work<'a, L, N>,
+        swarm: &FlightInputs<'a>,
+        pad: &Pad,
+    ) -> Result<Self, PathError> {
+        let FlightInputs { clearance_m, following, .. } = *swarm;
         let mut draft =
             Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start };
-        draft.to(pad.start)?;
+        draft.add_straight_leg(pad.start)?;
         Ok(draft)
     }
 
-    /// Flies straight to a place; the index of its waypoint.
-    fn to(&mut self, place: Point) -> Result<usize, PathError> {
+    /// Appends a straight leg to a place. Returns the index of its waypoint.
+    fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
         self.path.push(place, self.clearance_m)?;
         self.here = place;
         self.path.last().ok_or(PathError::NotFinite)
     }
 
     /// The corners of the way around no-fly zones, and its end.
-    fn way(&self, to: &Flat) -> impl Iterator<Item = Flat> + use<N, W> {
+    fn corners_around_zones(&self, to: &Flat) -> impl Iterator<Item = Flat> + use<N, W> {
         let mut corners: Vec<Flat, N> = Vec::new();
         // The plan has a finite length, so there is a way between all that it joins.
-        if self.transit.way(&self.here.xy(), to, &mut corners).is_err() {
+        if self.transit.shortest_path(&self.here.xy(), to, &mut corners).is_err() {
             corners.clear();
         }
         corners.into_iter().chain([*to])
     }
 
-    /// Flies there around no-fly zones, all at one height.
-    fn around(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
-        self.way(to).try_for_each(|corner| self.to(at(&corner, height_m)).map(|_| ()))
+    /// Appends legs around no-fly zones, all at one height.
+    fn add_legs_around_zones(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
+        self.corners_around_zones(to)
+            .try_for_each(|corner| self.add_straight_leg(point_at_height(&corner, height_m)).map(|_| ()))
     }
 
-    /// Comes down to where the first lane begins, which leads to `end`; the index of that waypoint.
-    fn down(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
+    /// Appends the descent to the start of the first lane, which leads to `end`. Returns the index of that waypoint.
+    fn descend_to_lane(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
         let here = self.here.xy();
-        let begin = self.following.map_or(at(&here, mission_m), |following| following.begin(&here, end));
-        self.to(begin)
+        let begin = self
+            .following
+            .map_or(point_at_height(&here, mission_m), |following| following.start_point(&here, end));
+        self.add_straight_leg(begin)
     }
 
-    /// Flies there straight as low as pictures are taken; the index of its waypoint.
-    fn low(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
-        let Some(following) = self.following else { return self.to(at(to, mission_m)) };
+    /// Appends a straight leg at the height of pictures. Returns the index of its waypoint.
+    fn add_picture_leg(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
+        let Some(following) = self.following else {
+            return self.add_straight_leg(point_at_height(to, mission_m));
+        };
         let here = self.here;
-        following.to(&here, to, |corner| self.to(corner).map(|_| ()))?;
+        following.corners_to(&here, to, |corner| self.add_straight_leg(corner).map(|_| ()))?;
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// As `low`, around no-fly zones.
-    fn low_around(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
-        self.way(to).try_for_each(|corner| self.low(&corner, mission_m).map(|_| ()))?;
+    /// As `add_picture_leg`, around no-fly zones.
+    fn add_picture_legs_around_zones(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
+        self.corners_around_zones(to)
+            .try_for_each(|corner| self.add_picture_leg(&corner, mission_m).map(|_| ()))?;
         self.path.last().ok_or(PathError::NotFinite)
     }
 }
 
 /// How long a leg takes that is flown no faster than `most_mps` and from rest to rest: at its corners a vehicle nearly
 /// stops. Seconds.
-fn leg_s(length_m: f32, most_mps: f32) -> f32 {
+fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     if length_m * PLANNED_ACCEL_MPS2 > most_mps * most_mps {
         length_m / most_mps + most_mps / PLANNED_ACCEL_MPS2
     } else {
@@ -302,36 +314,42 @@ fn leg_s(length_m: f32, most_mps: f32) -> f32 {
 }
 
 /// The first and the last waypoint of a lane that are the route's.
-fn part_of(lane: &Lane, route: &Route) -> (u32, u32) {
+fn lane_part_of_route(lane: &Lane, route: &Route) -> (u32, u32) {
     (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
 }
 
 /// Heading of a vehicle on this route. A lane of one waypoint has no direction of its own: with the heading along the path, such a
 /// route keeps the direction of the other lanes all the way.
-fn look<const L: usize, const N: usize>(work: &Work<'_, L, N>, route: &Route, swarm: &Swarm<'_>) -> Look {
+fn heading_mode<const L: usize, const N: usize>(
+    work: &Work<'_, L, N>,
+    route: &Route,
+    swarm: &FlightInputs<'_>,
+) -> HeadingMode {
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let alone = |lane: usize| {
         let lane = work.tracks.lanes().get(lane);
-        lane.is_some_and(|lane| matches!(part_of(lane, route), (begin, end) if begin == end))
+        lane.is_some_and(|lane| matches!(lane_part_of_route(lane, route), (begin, end) if begin == end))
     };
-    let along = work.tracks.along();
-    match swarm.manner.look {
-        Look::Ahead if lanes.into_iter().any(alone) => Look::Fixed(libm::atan2f(along.y, along.x)),
+    let along = work.tracks.lane_direction();
+    match swarm.capture.heading_mode {
+        HeadingMode::Ahead if lanes.into_iter().any(alone) => {
+            HeadingMode::Fixed(libm::atan2f(along.y, along.x))
+        }
         look => look,
     }
 }
 
-/// The flight of one route, or of its first stretch.
-fn flight<const L: usize, const N: usize, const W: usize>(
+/// The flight of one route, or of its first part if the whole route does not fit.
+fn route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
-    swarm: &Swarm<'_>,
+    swarm: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
     let mut most = work.tracks.lane_of(route.end - 1) - work.tracks.lane_of(route.first) + 1;
     loop {
         let mut laid = 0;
-        let error = match stretch(work, route, swarm, pad, (most, &mut laid)) {
+        let error = match partial_route_flight(work, route, swarm, pad, (most, &mut laid)) {
             Ok(flight) if flight.path.length_m() <= MAX_PATH_LENGTH_M => return Ok(flight),
             Ok(flight) => {
                 laid = (most as f32 * MAX_PATH_LENGTH_M / flight.path.length_m()) as usize;
@@ -347,91 +365,91 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     }
 }
 
-/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the way home.
-fn stretch<const L: usize, const N: usize, const W: usize>(
+/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the path home.
+fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
-    swarm: &Swarm<'_>,
+    swarm: &FlightInputs<'_>,
     pad: &Pad,
     (most, laid): (usize, &mut usize),
 ) -> Result<Flight<W>, PathError> {
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
-    let Manner { waypoint_m, trigger, .. } = swarm.manner;
-    let look = look(work, route, swarm);
-    let done = swarm.done.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
+    let CaptureSettings { waypoint_m, trigger, .. } = swarm.capture;
+    let look = heading_mode(work, route, swarm);
+    let done = swarm.photographed.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
     let area = work.tracks.waypoint_count().saturating_add(done);
     let backward = route.heading == Heading::Backward;
-    let mut photographs = Photographs::new(waypoint_m, look, trigger).of_area(area, backward);
+    let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, backward);
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
-    let mut draft = Draft::begin(work, swarm, pad)?;
-    draft.to(at(&vehicle.place, layer_m))?;
-    draft.around(&place(route.ends().0)?, layer_m)?;
+    let mut draft = FlightPathBuilder::start_above_pad(work, swarm, pad)?;
+    draft.add_straight_leg(point_at_height(&vehicle.place, layer_m))?;
+    draft.add_legs_around_zones(&place(route.end_waypoints().0)?, layer_m)?;
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let (low, high) = (*lanes.start(), *lanes.end());
     photographs.goes_on = most <= high - low;
     for lane in lanes.take(most) {
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
-        let (begin, end) = part_of(lane, route);
-        let first = divide::original(swarm.done, begin);
-        let waypoints = Range { first, end: first.saturating_add(end + 1 - begin) };
+        let (begin, end) = lane_part_of_route(lane, route);
+        let first = divide::original_waypoint_number(swarm.photographed, begin);
+        let waypoints = WaypointRange { first, end: first.saturating_add(end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let (begin, end) = (place(begin)?, place(end)?);
         let from = match *laid {
-            0 => draft.down(&end, mission_m)?,
-            _ => draft.low_around(&begin, mission_m)?,
+            0 => draft.descend_to_lane(&end, mission_m)?,
+            _ => draft.add_picture_legs_around_zones(&begin, mission_m)?,
         };
-        let to = draft.low(&end, mission_m)?;
-        photographs.mark(from, to, waypoints)?;
+        let to = draft.add_picture_leg(&end, mission_m)?;
+        photographs.add_stretch(from, to, waypoints)?;
         *laid += 1;
     }
-    land(draft, &WayHome { layer_m, vehicle, photographs }, swarm, pad)
+    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
 }
 
 /// The flight home of a vehicle in the air that has no route: it photographs nothing.
-fn homeward<const L: usize, const N: usize, const W: usize>(
+fn flight_home<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     layer: u8,
     vehicle: &Vehicle,
-    swarm: &Swarm<'_>,
+    swarm: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let Manner { waypoint_m, look, trigger } = swarm.manner;
+    let CaptureSettings { waypoint_m, heading_mode: look, trigger } = swarm.capture;
     let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
-    let draft = Draft::begin(work, swarm, pad)?;
-    let photographs = Photographs::new(waypoint_m, look, trigger);
-    land(draft, &WayHome { layer_m, vehicle, photographs }, swarm, pad)
+    let draft = FlightPathBuilder::start_above_pad(work, swarm, pad)?;
+    let photographs = PicturePlan::new(waypoint_m, look, trigger);
+    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
 }
 
-/// A vehicle's way home.
-struct WayHome<'a> {
+/// A vehicle's path home.
+struct ReturnInputs<'a> {
     /// Layer of the flight.
     layer_m: f32,
     vehicle: &'a Vehicle,
     /// Pictures taken by then.
-    photographs: Photographs,
+    photographs: PicturePlan,
 }
 
 /// Ends a flight: up, home in the layer, down, and labelled.
-fn land<const N: usize, const W: usize>(
-    mut draft: Draft<'_, N, W>,
-    way_home: &WayHome<'_>,
-    swarm: &Swarm<'_>,
+fn finish_with_return<const N: usize, const W: usize>(
+    mut draft: FlightPathBuilder<'_, N, W>,
+    way_home: &ReturnInputs<'_>,
+    swarm: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let WayHome { layer_m, vehicle, photographs } = *way_home;
-    draft.to(at(&draft.here.xy(), layer_m))?;
-    draft.around(&vehicle.home, layer_m)?;
-    draft.to(at(&vehicle.home, pad.end_z_m))?;
+    let ReturnInputs { layer_m, vehicle, photographs } = *way_home;
+    draft.add_straight_leg(point_at_height(&draft.here.xy(), layer_m))?;
+    draft.add_legs_around_zones(&vehicle.home, layer_m)?;
+    draft.add_straight_leg(point_at_height(&vehicle.home, pad.end_z_m))?;
     let mut path = draft.path;
     let seconds = |from: &Point, to: &Point| {
         let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
         let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
-        leg_s(way_m, vehicle.cruise_mps) + leg_s(libm::fabsf(up_m), z_mps)
+        leg_duration_s(way_m, vehicle.cruise_mps) + leg_duration_s(libm::fabsf(up_m), z_mps)
     };
-    path.label_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
+    path.label_times_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
     let mut flight = Flight {
         id: pad.id,
         task: Task::Photograph(photographs),
@@ -439,8 +457,8 @@ fn land<const N: usize, const W: usize>(
         climb_m: pad.climb_m,
         descent_m: pad.descent_m,
         depart_s: 0.0,
-        piece_m: MAX_TIMED_SEGMENT_M,
+        segment_m: MAX_TIMED_SEGMENT_M,
     };
-    flight.fit_pieces();
+    flight.fit_segment_length();
     Ok(flight)
 }

@@ -73,7 +73,7 @@ impl Camera {
     }
 
     /// Both sides of the picture on the ground for each metre of height, the longer last.
-    fn sides(&self) -> [f32; 2] {
+    fn ground_sides_per_m(&self) -> [f32; 2] {
         let [a, b] = match *self {
             Self::Diagonal { fov_deg, aspect } => {
                 let short = 2.0 * tanf(fov_deg.to_radians() / 2.0) / sqrtf(1.0 + aspect * aspect);
@@ -93,7 +93,7 @@ impl Camera {
         if !(height_m > 0.0 && height_m.is_finite()) {
             return Err(CoverageError::Setting("height_m"));
         }
-        let [along, across] = self.sides();
+        let [along, across] = self.ground_sides_per_m();
         Ok(Footprint { along_m: along * height_m, across_m: across * height_m })
     }
 

@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::CoverageError;
 
-/// From, to.
+/// Lower and upper end.
 pub(super) type Span = [f32; 2];
 
 /// A set of numbers: at most `N` intervals.
@@ -48,7 +48,7 @@ impl<const N: usize> Intervals<N> {
         self.spans.retain(|[from, to]| to - from >= least);
     }
 
-    /// Takes an interval out of the set; its ends stay.
+    /// Removes the interior of an interval from the set; the interval's end points stay.
     pub(super) fn remove(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
         let mut i = self.spans.partition_point(|span| span[1] <= from);
         while i < self.spans.len() && self.spans[i][0] < to {

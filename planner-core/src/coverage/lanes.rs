@@ -12,7 +12,7 @@ const MAX_WAYPOINTS: f32 = (1 << 24) as f32;
 
 /// Inputs of lanes, besides the area.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pattern {
+pub struct LanePattern {
     /// Footprint and spacings.
     pub spacing: Spacing,
     /// Direction of the lanes, degrees from east to the left; the one of least width where absent.
@@ -20,13 +20,13 @@ pub struct Pattern {
     /// Distance beyond the area's edge at which lanes begin and end, metres.
     pub margin_m: f32,
     /// Most changes of the lanes' order whose length is compared; each costs a few distances.
-    pub looks: u32,
+    pub search_steps: u32,
 }
 
 /// One lane. Waypoint `k` lies `k / (count − 1)` of the way from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
-    /// Begin of the lane.
+    /// Start of the lane.
     pub from: Flat,
     /// End of the lane.
     pub to: Flat,
@@ -48,15 +48,15 @@ impl Lane {
 
     /// Waypoint `k` of it, from 0: the last one for numbers beyond.
     pub fn waypoint(&self, k: u32) -> Flat {
-        if self.count < 2 { self.from } else { self.from + (self.to - self.from) * self.share(k) }
+        if self.count < 2 { self.from } else { self.from + (self.to - self.from) * self.fraction_at(k) }
     }
 
-    fn share(&self, k: u32) -> f32 {
+    fn fraction_at(&self, k: u32) -> f32 {
         if self.count < 2 { 0.0 } else { k.min(self.count - 1) as f32 / (self.count - 1) as f32 }
     }
 
-    /// Turns the lane round.
-    pub(super) fn turn(&mut self) {
+    /// Reverses the direction of the lane.
+    pub(super) fn reverse(&mut self) {
         core::mem::swap(&mut self.from, &mut self.to);
     }
 }
@@ -75,7 +75,7 @@ impl<const L: usize> Tracks<L> {
     }
 
     /// The direction along the lanes, of length 1; 0 where there are none.
-    pub fn along(&self) -> Flat {
+    pub fn lane_direction(&self) -> Flat {
         self.along
     }
 
@@ -107,13 +107,13 @@ impl<const L: usize> Tracks<L> {
     }
 
     /// Length of the path up to a waypoint, metres: up to the last one for numbers beyond.
-    pub fn along_m(&self, number: u32) -> f32 {
+    pub fn distance_to_waypoint_m(&self, number: u32) -> f32 {
         let Some(lane) = self.lanes.get(self.lane_of(number)) else { return 0.0 };
-        lane.start_m + lane.length_m() * lane.share(number - lane.first)
+        lane.start_m + lane.length_m() * lane.fraction_at(number - lane.first)
     }
 
-    /// Numbers the waypoints and measures the way.
-    pub(super) fn number<const N: usize>(
+    /// Numbers the waypoints and computes the lengths along the path.
+    pub(super) fn number_waypoints<const N: usize>(
         &mut self,
         spacing: &Spacing,
         transit: &Transit<'_, N>,
@@ -126,11 +126,14 @@ impl<const L: usize> Tracks<L> {
             lane.count =
                 if lane.length_m() < super::area::SAME_VERTEX_M { 1 } else { fmaxf(steps, 1.0) as u32 + 1 };
         }
-        self.measure(transit)
+        self.measure_lengths(transit)
     }
 
-    /// Numbers waypoints that each lane has already, and measures the way.
-    pub(super) fn measure<const N: usize>(&mut self, transit: &Transit<'_, N>) -> Result<(), CoverageError> {
+    /// Numbers the waypoints that each lane already has, and computes the lengths along the path.
+    pub(super) fn measure_lengths<const N: usize>(
+        &mut self,
+        transit: &Transit<'_, N>,
+    ) -> Result<(), CoverageError> {
         let (mut first, mut start_m) = (0, 0.0);
         let mut before: Option<Flat> = None;
         for lane in &mut self.lanes {

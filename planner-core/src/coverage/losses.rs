@@ -1,29 +1,29 @@
 //! The division after a loss: what is left of the area goes to the vehicles that fly on, from where they hold.
 //!
 //! Beyond CPP, which has this as future work. It is BINPAT over what is left ([`super::divide`]), a pure function of the plan
-//! before it and of what all vehicles agree on, their [`Fate`]s: every vehicle computes the same bits. A further loss is
+//! before it and of what all vehicles agree on, their [`VehicleStatus`]s: every vehicle computes the same bits. A further loss is
 //! divided from the division before.
 
 use heapless::Vec;
 
 use super::divide;
-use super::flights::{self, Pad, Swarm};
+use super::flights::{self, FlightInputs, Pad};
 use super::lanes::Tracks;
 use super::pack::{self, PackWorkspace, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use super::{CoverageError, Flat};
-use crate::flight::{Done, Range, Task};
+use crate::flight::{Task, WaypointRange, WaypointSet};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::ScheduleWorkspace;
 
 /// Most separate ranges of waypoints that are done.
 const MAX_DONE_RANGES: usize = 128;
 
-/// State of one vehicle that all agree on before the area is divided again.
+/// State of one vehicle. All vehicles agree on it before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Fate {
+pub struct VehicleStatus {
     /// Whether it flies on.
-    pub lives: bool,
+    pub alive: bool,
     /// Place along its path up to which the pictures are the vehicle's own, taken or promised,
     /// metres. A vehicle that lives holds there; at 0 it still stands on its pad. Of a vehicle that
     /// does not live the last picture is taken again: it may be missing. Infinite: the vehicle took
@@ -33,25 +33,25 @@ pub struct Fate {
 
 /// Memory lent for areas of at most `L` lanes and `K` vehicles.
 pub struct Workspace<const L: usize, const K: usize> {
-    done: Done<MAX_DONE_RANGES>,
-    left: Tracks<L>,
+    done: WaypointSet<MAX_DONE_RANGES>,
+    remaining: Tracks<L>,
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
     rest: Plan<K>,
     /// Layers of vehicles that left: they may be on their way home there.
-    held: u64,
+    held_layers: u64,
 }
 
 impl<const L: usize, const K: usize> Workspace<L, K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
-            done: Done::new(),
-            left: Tracks::new(),
+            done: WaypointSet::new(),
+            remaining: Tracks::new(),
             vehicles: Vec::new(),
             pads: Vec::new(),
             rest: Plan::new(),
-            held: 0,
+            held_layers: 0,
         }
     }
 
@@ -60,18 +60,18 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
     /// done.
     ///
     /// # Errors
-    /// Those of [`divide::left`]; [`CoverageError::LanesFull`] for too many ranges.
-    pub fn begin<'a, const N: usize>(
+    /// Those of [`divide::remaining_lanes`]; [`CoverageError::LanesFull`] for too many ranges.
+    pub fn start_plan<'a, const N: usize>(
         &'a mut self,
         tracks: &'a Tracks<L>,
         transit: &Transit<'_, N>,
-        done: &[Range],
-    ) -> Result<(&'a Tracks<L>, &'a [Range]), CoverageError> {
+        done: &[WaypointRange],
+    ) -> Result<(&'a Tracks<L>, &'a [WaypointRange]), CoverageError> {
         self.done.clear();
-        self.held = 0;
+        self.held_layers = 0;
         let all = tracks.waypoint_count();
         for range in done {
-            let range = Range { first: range.first, end: range.end.min(all) };
+            let range = WaypointRange { first: range.first, end: range.end.min(all) };
             self.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }
         if self.done.count() == all {
@@ -80,12 +80,12 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
         if self.done.is_empty() {
             return Ok((tracks, &[]));
         }
-        divide::left(tracks, self.done.ranges(), transit, &mut self.left)?;
-        Ok((&self.left, self.done.ranges()))
+        divide::remaining_lanes(tracks, self.done.ranges(), transit, &mut self.remaining)?;
+        Ok((&self.remaining, self.done.ranges()))
     }
 
     /// Waypoints that are done or promised, in rising order, by their numbers on the whole path.
-    pub fn done(&self) -> &[Range] {
+    pub fn done(&self) -> &[WaypointRange] {
         self.done.ranges()
     }
 }
@@ -102,12 +102,12 @@ pub struct Loss<'a, const L: usize, const N: usize> {
     /// The division before: the lanes of the whole area, all vehicles.
     pub work: &'a Work<'a, L, N>,
     /// Inputs of the flights.
-    pub swarm: &'a Swarm<'a>,
+    pub swarm: &'a FlightInputs<'a>,
     /// State of each vehicle.
-    pub fates: &'a [Fate],
+    pub fates: &'a [VehicleStatus],
 }
 
-/// Why there is no division.
+/// Reason why there is no division.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Error {
     /// The area.
@@ -131,9 +131,9 @@ impl From<PlanError> for Error {
 /// Divides what is left. `routes` are those of the plan before, `out` has its flights; afterwards both are those of the division.
 ///
 /// # Errors
-/// Those of [`divide::left`], [`pack::binpat`] and [`flights::plan`]; [`CoverageError::Vehicles`] where fates, routes and
+/// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`]; [`CoverageError::Vehicles`] where fates, routes and
 /// vehicles do not belong together; [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
-pub fn redivide<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+pub fn redivide_work<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
     pack: &mut PackWorkspace<K>,
@@ -153,20 +153,25 @@ pub fn redivide<const L: usize, const N: usize, const K: usize, const V: usize, 
     if !fates.iter().all(|fate| fate.along_m >= 0.0) {
         return Err(CoverageError::Setting("along_m").into());
     }
-    note_done(fates, ws, out)?;
-    place(loss, ws, out)?;
-    for route in routes.routes.iter().filter(|route| !fates[usize::from(route.vehicle)].lives) {
-        ws.held |= layer_bit(route.layer);
+    add_done_waypoints(fates, ws, out)?;
+    set_start_places(loss, ws, out)?;
+    for route in routes.routes.iter().filter(|route| !fates[usize::from(route.vehicle)].alive) {
+        ws.held_layers |= layer_bit(route.layer);
     }
     routes.routes.clear();
-    match divide::left(work.tracks, ws.done.ranges(), work.transit, &mut ws.left) {
-        Ok(()) => share_out(work, fates, ws, pack, routes)?,
+    match divide::remaining_lanes(work.tracks, ws.done.ranges(), work.transit, &mut ws.remaining) {
+        Ok(()) => divide_among_survivors(work, fates, ws, pack, routes)?,
         Err(CoverageError::NothingToCover) => {}
         Err(error) => return Err(error.into()),
     }
-    let work = Work { tracks: &ws.left, vehicles: &ws.vehicles, ..*work };
-    let swarm = Swarm { pads: &ws.pads, done: ws.done.ranges(), layers_held: ws.held, ..*swarm };
-    Ok(flights::plan(&work, routes, &swarm, schedule, out)?)
+    let work = Work { tracks: &ws.remaining, vehicles: &ws.vehicles, ..*work };
+    let swarm = FlightInputs {
+        pads: &ws.pads,
+        photographed: ws.done.ranges(),
+        held_layers: ws.held_layers,
+        ..*swarm
+    };
+    Ok(flights::plan_flights(&work, routes, &swarm, schedule, out)?)
 }
 
 /// The bit of a layer.
@@ -174,26 +179,26 @@ const fn layer_bit(layer: u8) -> u64 {
     1u64.wrapping_shl(layer as u32)
 }
 
-/// Adds what each vehicle has done, or keeps, to what was done before.
-fn note_done<const L: usize, const K: usize, const V: usize, const W: usize>(
-    fates: &[Fate],
+/// Adds the waypoints that each vehicle has photographed, or keeps as its commitment, to the earlier ones.
+fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: usize>(
+    fates: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
     for (fate, flight) in fates.iter().zip(&before.flights) {
         let Task::Photograph(photographs) = &flight.task else { continue };
-        let taken = photographs.taken_by(&flight.path, fate.along_m);
-        let sure = fate.lives || fate.along_m.is_infinite();
+        let taken = photographs.taken_count(&flight.path, fate.along_m);
+        let sure = fate.alive || fate.along_m.is_infinite();
         let count = if sure { taken } else { taken.saturating_sub(1) };
-        for range in photographs.shown(&flight.path, Range { first: 0, end: count }) {
+        for range in photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: count }) {
             ws.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }
     }
     Ok(())
 }
 
-/// Place from which each vehicle goes on.
-fn place<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+/// Sets the place from which each vehicle continues.
+fn set_start_places<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
@@ -204,8 +209,9 @@ fn place<const L: usize, const N: usize, const K: usize, const V: usize, const W
     for (index, (vehicle, pad)) in work.vehicles.iter().zip(swarm.pads).enumerate() {
         let (mut vehicle, mut pad) = (*vehicle, *pad);
         let (fate, flight) = (&fates[index], &before.flights[index]);
-        pad.aloft = fate.lives && (fate.along_m > 0.0 || flight.climb_m == 0.0) && flight.task.flies();
-        if pad.aloft {
+        pad.airborne =
+            fate.alive && (fate.along_m > 0.0 || flight.climb_m == 0.0) && flight.task.leaves_pad();
+        if pad.airborne {
             pad.start = flight.path.point_at(fate.along_m).ok_or(CoverageError::Vehicles)?;
             pad.climb_m = 0.0;
             vehicle.place = Flat::new(pad.start.x, pad.start.y);
@@ -216,23 +222,23 @@ fn place<const L: usize, const N: usize, const K: usize, const V: usize, const W
     Ok(())
 }
 
-/// Gives what is left to those that live.
-fn share_out<const L: usize, const N: usize, const K: usize>(
+/// Divides the remaining work among the vehicles that are alive.
+fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    fates: &[Fate],
+    fates: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
     pack: &mut PackWorkspace<K>,
     routes: &mut Plan<K>,
 ) -> Result<(), CoverageError> {
-    let living = || fates.iter().enumerate().filter(|(_, fate)| fate.lives).map(|(index, _)| index);
+    let living = || fates.iter().enumerate().filter(|(_, fate)| fate.alive).map(|(index, _)| index);
     let mut survivors: Vec<Vehicle, K> = living().map(|index| ws.vehicles[index]).collect();
     if survivors.iter().all(|vehicle| vehicle.weight == 0.0) {
         survivors.iter_mut().for_each(|vehicle| vehicle.weight = 1.0);
     }
-    pack::binpat(&Work { tracks: &ws.left, vehicles: &survivors, ..*work }, pack, &mut ws.rest)?;
+    pack::binpat(&Work { tracks: &ws.remaining, vehicles: &survivors, ..*work }, pack, &mut ws.rest)?;
     for route in &ws.rest.routes {
         let vehicle = living().nth(usize::from(route.vehicle)).ok_or(CoverageError::Vehicles)?;
-        let layer = flights::free_layers(ws.held).nth(usize::from(route.layer).saturating_sub(1));
+        let layer = flights::free_layers(ws.held_layers).nth(usize::from(route.layer).saturating_sub(1));
         let layer = layer.ok_or(CoverageError::Vehicles)?;
         let route = Route { vehicle: vehicle as u8, layer, ..*route };
         routes.routes.push(route).map_err(|_| CoverageError::Vehicles)?;

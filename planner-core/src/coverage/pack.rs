@@ -21,15 +21,15 @@ use crate::assignment::{AssignmentWorkspace, assign};
 /// One vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
-    /// Begin of the vehicle's transit to the first waypoint.
+    /// Start of the vehicle's transit to the first waypoint.
     pub place: Flat,
     /// End of the vehicle's transit home.
     pub home: Flat,
-    /// Speed over ground, metres a second.
+    /// Speed over ground, m/s.
     pub cruise_mps: f32,
-    /// Speed of climb (V_a in the paper), metres a second.
+    /// Speed of climb (V_a in the paper), m/s.
     pub climb_mps: f32,
-    /// Speed of descent (V_d in the paper), metres a second.
+    /// Speed of descent (V_d in the paper), m/s.
     pub descend_mps: f32,
     /// W_k: its share of the work is this by the sum of all.
     pub weight: f32,
@@ -46,14 +46,14 @@ pub struct Heights {
 
 /// Definition of a track: the smallest part of the path that goes to one vehicle as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
+pub enum TrackUnit {
     /// A lane: the simple back-and-forth pattern, SIMPLE-BINPAT.
     Lane,
     /// A waypoint and the way to it: the sampled pattern, BINPAT.
     Waypoint,
 }
 
-/// Which way a route is flown.
+/// Direction in which a route is flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heading {
     /// In rising order of the waypoints' numbers.
@@ -85,7 +85,7 @@ pub struct Route {
 
 impl Route {
     /// The waypoint that is flown to first, and the last one. A route has one at least.
-    pub fn ends(&self) -> (u32, u32) {
+    pub fn end_waypoints(&self) -> (u32, u32) {
         let last = self.end.saturating_sub(1);
         match self.heading {
             Heading::Forward => (self.first, last),
@@ -132,7 +132,7 @@ pub struct PackWorkspace<const K: usize> {
 }
 
 impl<const K: usize> PackWorkspace<K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         assert!(K * K <= 1024, "the cost matrix has room for 32 vehicles");
         Self {
@@ -170,7 +170,7 @@ pub struct Work<'a, const L: usize, const N: usize> {
     /// Heights.
     pub heights: Heights,
     /// Definition of a track.
-    pub unit: Unit,
+    pub unit: TrackUnit,
 }
 
 impl<const L: usize, const N: usize> Work<'_, L, N> {
@@ -222,8 +222,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     }
 
     /// A vehicle's way over ground for waypoints `first` up to before `end`, in the better direction.
-    pub(super) fn ground_m(&self, vehicle: &Vehicle, first: u32, end: u32) -> (f32, Heading) {
-        let inside = self.tracks.along_m(end - 1) - self.tracks.along_m(first);
+    pub(super) fn ground_distance_m(&self, vehicle: &Vehicle, first: u32, end: u32) -> (f32, Heading) {
+        let inside = self.tracks.distance_to_waypoint_m(end - 1) - self.tracks.distance_to_waypoint_m(first);
         let forward = self.transit_m(vehicle, first, end - 1);
         let backward = if vehicle.place == vehicle.home {
             // The same transits the other way round.
@@ -252,14 +252,14 @@ pub fn binpat<const L: usize, const N: usize, const K: usize>(
         *share = vehicle.weight;
     }
     let alike = work.vehicles.iter().all(|vehicle| vehicle.weight == work.vehicles[0].weight);
-    pack(work, if alike { Bins::Anyone } else { Bins::SameWeight }, ws, out)
+    pack_routes(work, if alike { BinEligibility::Anyone } else { BinEligibility::SameWeight }, ws, out)
 }
 
 /// BINPAT by shares that were found before (POWELL's W): any vehicle may take any bin.
 ///
 /// # Errors
 /// See [`Work::check`]; [`CoverageError::Setting`] for shares that are not one a vehicle, finite, at least 0 and not all 0.
-pub fn by_shares<const L: usize, const N: usize, const K: usize>(
+pub fn binpat_with_shares<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     shares: &[f32],
     ws: &mut PackWorkspace<K>,
@@ -272,22 +272,22 @@ pub fn by_shares<const L: usize, const N: usize, const K: usize>(
         return Err(CoverageError::Setting("shares"));
     }
     ws.shares[..shares.len()].copy_from_slice(shares);
-    pack(work, Bins::Anyone, ws, out)
+    pack_routes(work, BinEligibility::Anyone, ws, out)
 }
 
-/// Which vehicles a bin may go to.
+/// Vehicles that may receive a bin.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Bins {
+pub(super) enum BinEligibility {
     /// Any.
     Anyone,
     /// Bins that were filled by equal weights.
     SameWeight,
 }
 
-/// Cuts, assigns, layers, by `ws.shares`.
-pub(super) fn pack<const L: usize, const N: usize, const K: usize>(
+/// Cuts the path into bins by `ws.shares`, assigns the bins to vehicles, and sets the layers.
+pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    bins: Bins,
+    bins: BinEligibility,
     ws: &mut PackWorkspace<K>,
     out: &mut Plan<K>,
 ) -> Result<(), CoverageError> {
@@ -299,7 +299,7 @@ pub(super) fn pack<const L: usize, const N: usize, const K: usize>(
 }
 
 /// CBinPack: `ends[k]` becomes the number after bin `k`'s last waypoint.
-pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: Unit, shares: &[f32], ends: &mut [u32]) {
+pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: TrackUnit, shares: &[f32], ends: &mut [u32]) {
     let whole: f32 = shares.iter().sum();
     let total_m = tracks.length_m();
     let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
@@ -310,7 +310,7 @@ pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: Unit, shares: &[f32], 
         if k >= last {
             end = tracks.waypoint_count();
         } else if *share > 0.0 {
-            (end, packed_m) = fill(tracks, unit, end, packed_m + total_m * share / whole);
+            (end, packed_m) = fill_bin(tracks, unit, end, packed_m + total_m * share / whole);
         }
         *slot = end;
     }
@@ -318,7 +318,7 @@ pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: Unit, shares: &[f32], 
 
 /// Puts tracks from waypoint `from` on into a bin that is full at `full_m` along the path: the number after its last
 /// waypoint, and how far along the path that is.
-fn fill<const L: usize>(tracks: &Tracks<L>, unit: Unit, from: u32, full_m: f32) -> (u32, f32) {
+fn fill_bin<const L: usize>(tracks: &Tracks<L>, unit: TrackUnit, from: u32, full_m: f32) -> (u32, f32) {
     let lanes = tracks.lanes();
     // The lane in which the bin gets full.
     let lane = lanes.partition_point(|lane| lane.start_m + lane.length_m() <= full_m);
@@ -329,8 +329,8 @@ fn fill<const L: usize>(tracks: &Tracks<L>, unit: Unit, from: u32, full_m: f32) 
     };
     let (fits, more) = match (unit, lanes.get(lane)) {
         (_, None) => return before(lane),
-        (Unit::Lane, Some(_)) => (before(lane), before(lane + 1)),
-        (Unit::Waypoint, Some(inside)) => {
+        (TrackUnit::Lane, Some(_)) => (before(lane), before(lane + 1)),
+        (TrackUnit::Waypoint, Some(inside)) => {
             let step_m = inside.length_m() / fmaxf((inside.count - 1) as f32, 1.0);
             let into_m = full_m - inside.start_m;
             if into_m < 0.0 {
@@ -346,13 +346,17 @@ fn fill<const L: usize>(tracks: &Tracks<L>, unit: Unit, from: u32, full_m: f32) 
     let nearer = more.1 - full_m < full_m - fits.1;
     let best = if nearer { more } else { fits };
     // A bin never gives back what the one before it holds.
-    if best.0 >= from { best } else { (from, if from > 0 { tracks.along_m(from - 1) } else { 0.0 }) }
+    if best.0 >= from {
+        best
+    } else {
+        (from, if from > 0 { tracks.distance_to_waypoint_m(from - 1) } else { 0.0 })
+    }
 }
 
 /// Gives each bin that holds something to the vehicle for which the sum of all transits is least.
 fn assign_bins<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    bins: Bins,
+    bins: BinEligibility,
     ws: &mut PackWorkspace<K>,
     out: &mut Plan<K>,
 ) -> Result<(), CoverageError> {
@@ -375,10 +379,10 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
             cost_m: 0.0,
             cost_s: 0.0,
         };
-        let inside = work.tracks.along_m(end - 1) - work.tracks.along_m(start);
+        let inside = work.tracks.distance_to_waypoint_m(end - 1) - work.tracks.distance_to_waypoint_m(start);
         for vehicle in work.vehicles {
-            let may = bins == Bins::Anyone || vehicle.weight == work.vehicles[k].weight;
-            let ground = work.ground_m(vehicle, start, end).0;
+            let may = bins == BinEligibility::Anyone || vehicle.weight == work.vehicles[k].weight;
+            let ground = work.ground_distance_m(vehicle, start, end).0;
             let _ = ws.transits_m.push(if may { ground - inside } else { f32::INFINITY });
         }
         out.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
@@ -393,7 +397,8 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
     for (row, route) in out.routes.iter_mut().enumerate() {
         let vehicle = usize::from(ws.columns[row].ok_or(CoverageError::Unreachable)?);
         route.vehicle = vehicle as u8;
-        (route.ground_m, route.heading) = work.ground_m(&work.vehicles[vehicle], route.first, route.end);
+        (route.ground_m, route.heading) =
+            work.ground_distance_m(&work.vehicles[vehicle], route.first, route.end);
         if !route.ground_m.is_finite() {
             return Err(CoverageError::Unreachable);
         }

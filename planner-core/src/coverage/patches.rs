@@ -19,62 +19,63 @@ const STRIP_HALVINGS: u32 = 3;
 /// Parts into which a strip is cut.
 const STRIP_PARTS: u32 = 1 << STRIP_HALVINGS;
 
-/// Lays the lanes that are missing.
-pub(super) fn lay<const L: usize, const V: usize>(
+/// Adds lanes for the parts that no lane covers yet.
+pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     ws: &mut Workspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    for strip in (0..strips.count).filter(|strip| meets_zone(strips, strips.span(*strip))) {
-        let [low, high] = strips.span(strip);
+    for strip in (0..strips.count).filter(|strip| overlaps_no_fly_zone(strips, strips.strip_borders(*strip)))
+    {
+        let [low, high] = strips.strip_borders(strip);
         for parts in (1..=STRIP_HALVINGS).map(|halving| 1 << halving) {
             let wide = (high - low) / parts as f32;
             for part in 0..parts {
                 let from = low + part as f32 * wide;
                 let span = [from, from + wide];
-                need_left(strips, span, out, ws)?;
-                strips.lay(strip as u16, strips.middle(span), ws, out)?;
+                compute_uncovered(strips, span, out, ws)?;
+                strips.lay_lanes(strip as u16, strips.centre_line(span), ws, out)?;
             }
         }
         let wide = (high - low) / STRIP_PARTS as f32;
         for part in 0..STRIP_PARTS {
             let from = low + part as f32 * wide;
-            lay_beside(strips, strip as u16, [from, from + wide], ws, out)?;
-            lay_pictures(strips, strip as u16, [from, from + wide], ws, out)?;
+            lay_lanes_beside(strips, strip as u16, [from, from + wide], ws, out)?;
+            lay_single_pictures(strips, strip as u16, [from, from + wide], ws, out)?;
         }
     }
     Ok(())
 }
 
 /// Lays lanes on both sides of an eighth, the nearest first, until nothing is left of it.
-fn lay_beside<const L: usize, const V: usize>(
+fn lay_lanes_beside<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     strip: u16,
     span: Span,
     ws: &mut Workspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    for v in lines(strips, span, 1) {
-        need_left(strips, span, out, ws)?;
-        if ws.need.spans().is_empty() {
+    for v in candidate_lines(strips, span, 1) {
+        compute_uncovered(strips, span, out, ws)?;
+        if ws.needed.spans().is_empty() {
             break;
         }
-        strips.lay(strip, v, ws, out)?;
+        strips.lay_lanes(strip, v, ws, out)?;
     }
     Ok(())
 }
 
 /// Takes single pictures of what no line through it or beside it reaches: a wedge between two zones.
-fn lay_pictures<const L: usize, const V: usize>(
+fn lay_single_pictures<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     strip: u16,
     span: Span,
     ws: &mut Workspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    for v in lines(strips, span, 0) {
-        need_left(strips, span, out, ws)?;
-        let Some(&need) = ws.need.spans().first() else { break };
+    for v in candidate_lines(strips, span, 0) {
+        compute_uncovered(strips, span, out, ws)?;
+        let Some(&need) = ws.needed.spans().first() else { break };
         strips.lay_picture(strip, v, need, ws, out)?;
     }
     Ok(())
@@ -82,25 +83,25 @@ fn lay_pictures<const L: usize, const V: usize>(
 
 /// Lines beside the middle of an eighth, half an eighth apart, from number `first` on; as far as pictures along them
 /// show all of it.
-fn lines(strips: &Strips<'_>, span: Span, first: u32) -> impl Iterator<Item = f32> {
-    let (middle, half) = (strips.middle(span), (span[1] - span[0]) / 2.0);
+fn candidate_lines(strips: &Strips<'_>, span: Span, first: u32) -> impl Iterator<Item = f32> {
+    let (middle, half) = (strips.centre_line(span), (span[1] - span[0]) / 2.0);
     let both = move |step: u32| [-1.0, 1.0].map(|side| middle + side * half * step as f32);
-    (first..=STRIP_PARTS).flat_map(both).take_while(move |v| reaches(strips, *v, span))
+    (first..=STRIP_PARTS).flat_map(both).take_while(move |v| covers_band(strips, *v, span))
 }
 
 /// Whether pictures along the line `v` show all between two other `v`, and a little more.
-fn reaches(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
+fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
     let spacing = strips.pattern.spacing;
     let across = spacing.footprint.across_m;
-    let spare = fmaxf(across - strips.wide, 0.0) / 2.0;
+    let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
     let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
     v - low <= reach && high - v <= reach
 }
 
 /// Whether a no-fly zone comes between two `v`.
-fn meets_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
-    strips.area.each().filter(|(kind, _)| *kind == RingKind::NoFly).any(|(_, ring)| {
-        let across = ring.iter().map(|corner| strips.rotated(corner).1);
+fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
+    strips.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly).any(|(_, ring)| {
+        let across = ring.iter().map(|corner| strips.to_lane_frame(corner).1);
         let (first, last) = across
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), v| (fminf(first, v), fmaxf(last, v)));
         first <= high + ZONE_CLEARANCE_M && last >= low - ZONE_CLEARANCE_M
@@ -108,22 +109,22 @@ fn meets_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
 }
 
 /// `ws.need` becomes what no lane shows yet of the strip's part between two `v`, and no zone holds.
-fn need_left<const L: usize, const V: usize>(
+fn compute_uncovered<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     span: Span,
     tracks: &Tracks<L>,
     ws: &mut Workspace<V>,
 ) -> Result<(), CoverageError> {
-    strips.need(span, ws)?;
-    strips.without_zones(span, ws)?;
-    let along = strips.reach();
+    strips.compute_needed(span, ws)?;
+    strips.subtract_no_fly_zones(span, ws)?;
+    let along = strips.picture_half_width();
     for lane in tracks.lanes() {
-        let ((from, v), (to, _)) = (strips.rotated(&lane.from), strips.rotated(&lane.to));
-        if reaches(strips, v, span) {
-            ws.need.remove([fminf(from, to) - along, fmaxf(from, to) + along])?;
+        let ((from, v), (to, _)) = (strips.to_lane_frame(&lane.from), strips.to_lane_frame(&lane.to));
+        if covers_band(strips, v, span) {
+            ws.needed.remove([fminf(from, to) - along, fmaxf(from, to) + along])?;
         }
     }
     // Intervals that rounding left over are dropped.
-    ws.need.drop_shorter(strips.wide / 100.0);
+    ws.needed.drop_shorter(strips.strip_width_m / 100.0);
     Ok(())
 }

@@ -8,16 +8,16 @@
 //! [`super::pack::cbinpack`]. The start is BINPAT with equal shares, and the best plan seen is kept: never worse than that.
 
 use super::CoverageError;
-use super::pack::{Bins, PackWorkspace, Plan, Work, pack};
+use super::pack::{BinEligibility, PackWorkspace, Plan, Work, pack_routes};
 
-/// How long POWELL looks.
+/// Settings of POWELL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    /// Packings looked at, at most.
+pub struct PowellConfig {
+    /// Greatest number of packings that are evaluated.
     pub evaluations: u32,
 }
 
-impl Config {
+impl PowellConfig {
     /// Configuration of the plans that `host-sim` makes.
     pub const USUAL: Self = Self { evaluations: 4000 };
 }
@@ -34,18 +34,18 @@ pub struct Workspace<const K: usize> {
     /// Workspace of the packings.
     pub pack: PackWorkspace<K>,
     best: [f32; K],
-    here: [f32; K],
+    current: [f32; K],
     directions: [[f32; K]; K],
     plan: Plan<K>,
 }
 
 impl<const K: usize> Workspace<K> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             pack: PackWorkspace::new(),
             best: [0.0; K],
-            here: [0.0; K],
+            current: [0.0; K],
             directions: [[0.0; K]; K],
             plan: Plan::new(),
         }
@@ -64,57 +64,58 @@ impl<const K: usize> Default for Workspace<K> {
 /// As [`super::pack::binpat`].
 pub fn powell<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    config: &Config,
+    config: &PowellConfig,
     ws: &mut Workspace<K>,
     out: &mut Plan<K>,
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     let count = work.vehicles.len();
-    let mut search = Search { work, left: config.evaluations.max(1), least: f32::INFINITY, ws, out };
+    let mut search =
+        ShareSearch { work, evaluations_left: config.evaluations.max(1), least_cost: f32::INFINITY, ws, out };
     let weights = work.vehicles.iter().map(|vehicle| vehicle.weight);
     let largest = weights.clone().fold(0.0, libm::fmaxf);
-    for (share, weight) in search.ws.here.iter_mut().zip(weights) {
+    for (share, weight) in search.ws.current.iter_mut().zip(weights) {
         *share = weight / largest;
     }
-    let mut cost = search.cost()?;
+    let mut cost = search.evaluate()?;
     search.reset(count);
     loop {
         let before = cost;
-        let from = search.ws.here;
+        let from = search.ws.current;
         let (mut largest, mut at) = (0.0, 0);
         for k in 0..count {
             let line = search.ws.directions[k];
-            let found = search.along(&line, count, cost)?;
+            let found = search.line_search(&line, count, cost)?;
             if cost - found > largest {
                 (largest, at) = (cost - found, k);
             }
             cost = found;
         }
         // The whole step takes the place of the direction that gained most.
-        let mut whole = search.ws.here;
+        let mut whole = search.ws.current;
         whole.iter_mut().zip(from).for_each(|(to, from)| *to -= from);
         if whole[..count].iter().any(|step| *step != 0.0) {
-            cost = search.along(&whole, count, cost)?;
+            cost = search.line_search(&whole, count, cost)?;
             search.ws.directions[at] = whole;
         }
-        if search.left == 0 || before - cost <= before * MIN_ROUND_GAIN {
+        if search.evaluations_left == 0 || before - cost <= before * MIN_ROUND_GAIN {
             break;
         }
     }
-    let Search { ws, .. } = search;
+    let ShareSearch { ws, .. } = search;
     ws.pack.shares = ws.best;
     Ok(())
 }
 
-struct Search<'s, 'w, const L: usize, const N: usize, const K: usize> {
+struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
     work: &'s Work<'w, L, N>,
-    left: u32,
-    least: f32,
+    evaluations_left: u32,
+    least_cost: f32,
     ws: &'s mut Workspace<K>,
     out: &'s mut Plan<K>,
 }
 
-impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
+impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K> {
     fn reset(&mut self, count: usize) {
         for (k, line) in self.ws.directions[..count].iter_mut().enumerate() {
             line.fill(0.0);
@@ -122,32 +123,32 @@ impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
         }
     }
 
-    /// max C_k of the shares `here`; the best plan is kept.
-    fn cost(&mut self) -> Result<f32, CoverageError> {
-        self.left = self.left.saturating_sub(1);
+    /// max C_k of the shares `current`; the best plan is kept.
+    fn evaluate(&mut self) -> Result<f32, CoverageError> {
+        self.evaluations_left = self.evaluations_left.saturating_sub(1);
         let ws = &mut *self.ws;
-        if ws.here[..self.work.vehicles.len()].iter().all(|share| *share <= 0.0) {
+        if ws.current[..self.work.vehicles.len()].iter().all(|share| *share <= 0.0) {
             return Ok(f32::INFINITY);
         }
-        ws.pack.shares = ws.here;
-        pack(self.work, Bins::Anyone, &mut ws.pack, &mut ws.plan)?;
+        ws.pack.shares = ws.current;
+        pack_routes(self.work, BinEligibility::Anyone, &mut ws.pack, &mut ws.plan)?;
         let cost = ws.plan.max_cost_s();
-        if cost < self.least {
-            self.least = cost;
-            ws.best = ws.here;
+        if cost < self.least_cost {
+            self.least_cost = cost;
+            ws.best = ws.current;
             self.out.routes.clone_from(&ws.plan.routes);
         }
         Ok(cost)
     }
 
-    /// The least cost along a line through `here`, inside the box; `here` moves there.
-    fn along(&mut self, line: &[f32; K], count: usize, cost: f32) -> Result<f32, CoverageError> {
-        let from = self.ws.here;
-        let Some((low, high)) = range(&from[..count], &line[..count]) else { return Ok(cost) };
+    /// The least cost along a line through `current`, inside the box; `current` moves there.
+    fn line_search(&mut self, line: &[f32; K], count: usize, cost: f32) -> Result<f32, CoverageError> {
+        let from = self.ws.current;
+        let Some((low, high)) = range_in_box(&from[..count], &line[..count]) else { return Ok(cost) };
         let mut best = (cost, 0.0);
         let step = (high - low) / LINE_POINTS as f32;
         for k in 0..=LINE_POINTS {
-            self.look(&from, line, low + step * k as f32, &mut best)?;
+            self.evaluate_at(&from, line, low + step * k as f32, &mut best)?;
         }
         let mut step = step;
         for _ in 0..STEP_HALVINGS {
@@ -155,34 +156,34 @@ impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
             let middle = best.1;
             for at in [middle - step, middle + step] {
                 if (low..=high).contains(&at) {
-                    self.look(&from, line, at, &mut best)?;
+                    self.evaluate_at(&from, line, at, &mut best)?;
                 }
             }
         }
-        self.step(&from, line, best.1);
+        self.move_along(&from, line, best.1);
         Ok(best.0)
     }
 
-    fn look(
+    fn evaluate_at(
         &mut self,
         from: &[f32; K],
         line: &[f32; K],
         at: f32,
         best: &mut (f32, f32),
     ) -> Result<(), CoverageError> {
-        if self.left == 0 {
+        if self.evaluations_left == 0 {
             return Ok(());
         }
-        self.step(from, line, at);
-        let cost = self.cost()?;
+        self.move_along(from, line, at);
+        let cost = self.evaluate()?;
         if cost < best.0 {
             *best = (cost, at);
         }
         Ok(())
     }
 
-    fn step(&mut self, from: &[f32; K], line: &[f32; K], at: f32) {
-        for (share, (from, line)) in self.ws.here.iter_mut().zip(from.iter().zip(line)) {
+    fn move_along(&mut self, from: &[f32; K], line: &[f32; K], at: f32) {
+        for (share, (from, line)) in self.ws.current.iter_mut().zip(from.iter().zip(line)) {
             *share = (from + line * at).clamp(0.0, 1.0);
         }
     }
@@ -190,7 +191,7 @@ impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
 
 /// Range in which the line may be followed back and forth inside the box; none for a line of no
 /// length.
-fn range(from: &[f32], line: &[f32]) -> Option<(f32, f32)> {
+fn range_in_box(from: &[f32], line: &[f32]) -> Option<(f32, f32)> {
     let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
     for (from, step) in from.iter().zip(line).filter(|(_, step)| **step != 0.0) {
         let (a, b) = (-from / step, (1.0 - from) / step);

@@ -11,21 +11,21 @@ use crate::sort;
 
 /// Lanes run along `along`; they are counted along `across`, a quarter turn to the left of it. Both have length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Direction {
+pub struct LaneDirection {
     /// Along the lanes.
     pub along: Flat,
     /// Vector from lane to lane.
     pub across: Flat,
 }
 
-impl Direction {
+impl LaneDirection {
     /// Lanes at an angle, degrees from east to the left.
     pub fn at_deg(angle_deg: f32) -> Self {
         let (sin, cos) = libm::sincosf(angle_deg.to_radians());
-        Self::of(Flat::new(cos, sin))
+        Self::along_vector(Flat::new(cos, sin))
     }
 
-    fn of(along: Flat) -> Self {
+    fn along_vector(along: Flat) -> Self {
         Self { along, across: Flat::new(-along.y, along.x) }
     }
 }
@@ -38,15 +38,15 @@ impl Direction {
 pub fn least_width<const V: usize>(
     area: &Area<'_>,
     hull: &mut Vec<Flat, V>,
-) -> Result<Direction, CoverageError> {
+) -> Result<LaneDirection, CoverageError> {
     convex_hull(area, hull)?;
     let n = hull.len();
-    let mut best = (f32::INFINITY, Direction::of(Flat::new(1.0, 0.0)));
+    let mut best = (f32::INFINITY, LaneDirection::along_vector(Flat::new(1.0, 0.0)));
     let mut far = 1;
     for i in 0..n {
         let (from, to) = (hull[i], hull[(i + 1) % n]);
         let Some(along) = (to - from).try_normalize(0.0) else { continue };
-        let direction = Direction::of(along);
+        let direction = LaneDirection::along_vector(along);
         let height = |k: usize| direction.across.dot(&(hull[k % n] - from));
         // Around the hull the furthest corner only moves on, n steps in all for all sides.
         if i == 0 {
@@ -68,10 +68,10 @@ pub fn least_width<const V: usize>(
 fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Result<(), CoverageError> {
     hull.clear();
     let mut sorted: Vec<Flat, V> = Vec::new();
-    for (_, ring) in area.each().filter(|(kind, _)| *kind == RingKind::Outer) {
+    for (_, ring) in area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::Outer) {
         sorted.extend_from_slice(ring).map_err(|_| AreaError::AreaFull)?;
     }
-    sort::by(&mut sorted, |a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    sort::sort_by(&mut sorted, |a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let count = sorted.len();
     // The lower side from left to right, then the upper one back.
     let mut side = 0;

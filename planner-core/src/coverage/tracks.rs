@@ -3,7 +3,7 @@
 //! Source: CPP §3.2.1, Fig. 4. The area is cut into strips as wide as the lane spacing or a little less, all alike. In
 //! each strip the lane runs along the middle. It reaches from border to border along that line, and further where the
 //! strip's area would else lie beyond the last picture. "Simple" and "sampled" patterns are the same lanes: the first
-//! packs whole lanes, the second waypoints ([`super::pack::Unit`]).
+//! packs whole lanes, the second waypoints ([`super::pack::TrackUnit`]).
 //!
 //! Frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes · vertices), and the order of the
 //! lanes ([`super::order`]).
@@ -13,10 +13,10 @@ use super::area::{Area, AreaError};
 use super::order;
 use super::patches;
 use super::strips::Strips;
-use super::sweep::{Direction, least_width};
+use super::sweep::{LaneDirection, least_width};
 use super::transit::Transit;
 
-pub use super::lanes::{Lane, Pattern, Tracks};
+pub use super::lanes::{Lane, LanePattern, Tracks};
 pub use super::strips::Workspace;
 
 /// Lanes over an area, in the order in which they are flown.
@@ -25,7 +25,7 @@ pub use super::strips::Workspace;
 /// Settings that are wrong, memory that is too small, [`CoverageError::NothingToCover`].
 pub fn build<const L: usize, const V: usize, const N: usize>(
     area: &Area<'_>,
-    pattern: &Pattern,
+    pattern: &LanePattern,
     transit: &Transit<'_, N>,
     ws: &mut Workspace<V>,
     out: &mut Tracks<L>,
@@ -38,7 +38,7 @@ pub fn build<const L: usize, const V: usize, const N: usize>(
         return Err(AreaError::AreaFull.into());
     }
     let direction = match pattern.angle_deg {
-        Some(angle) if angle.is_finite() => Direction::at_deg(angle),
+        Some(angle) if angle.is_finite() => LaneDirection::at_deg(angle),
         Some(_) => return Err(CoverageError::Setting("angle_deg")),
         None => least_width(area, &mut ws.hull)?,
     };
@@ -46,16 +46,16 @@ pub fn build<const L: usize, const V: usize, const N: usize>(
     out.lanes.clear();
     out.along = direction.along;
     for strip in 0..strips.count {
-        let span = strips.span(strip);
-        strips.need(span, ws)?;
-        strips.lay(strip as u16, strips.middle(span), ws, out)?;
+        let span = strips.strip_borders(strip);
+        strips.compute_needed(span, ws)?;
+        strips.lay_lanes(strip as u16, strips.centre_line(span), ws, out)?;
     }
     if area.has_no_fly() {
-        patches::lay(&strips, ws, out)?;
+        patches::lay_missing_lanes(&strips, ws, out)?;
     }
     if out.lanes.is_empty() {
         return Err(CoverageError::NothingToCover);
     }
-    order::sort(&mut out.lanes, transit, pattern.looks);
-    out.number(&pattern.spacing, transit)
+    order::order_lanes(&mut out.lanes, transit, pattern.search_steps);
+    out.number_waypoints(&pattern.spacing, transit)
 }

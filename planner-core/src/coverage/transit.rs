@@ -7,7 +7,7 @@
 use heapless::Vec;
 use libm::fminf;
 
-use super::area::{Area, RingKind, signed_area};
+use super::area::{Area, RingKind, doubled_signed_area};
 use super::{CoverageError, Flat};
 
 /// Distance that paths and lanes keep from no-fly zones, metres: more than rounding, less than any
@@ -31,15 +31,15 @@ impl<const N: usize> Transit<'_, N> {
 }
 
 impl<'a, const N: usize> Transit<'a, N> {
-    /// Learns an area's no-fly zones.
+    /// Builds the graph from the area's no-fly zones.
     ///
     /// # Errors
     /// [`CoverageError::NoFlyFull`] where they have more than `N` outward corners.
-    pub fn learn(&mut self, area: Area<'a>) -> Result<(), CoverageError> {
+    pub fn set_area(&mut self, area: Area<'a>) -> Result<(), CoverageError> {
         self.area = area;
         self.corners.clear();
-        for (_, ring) in area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
-            let left = signed_area(ring) > 0.0;
+        for (_, ring) in area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly) {
+            let left = doubled_signed_area(ring) > 0.0;
             for (i, corner) in ring.iter().enumerate() {
                 let (before, after) = (ring[(i + ring.len() - 1) % ring.len()], ring[(i + 1) % ring.len()]);
                 let (into, out) = ((corner - before).normalize(), (after - corner).normalize());
@@ -51,23 +51,24 @@ impl<'a, const N: usize> Transit<'a, N> {
                 let outward = (into - out).try_normalize(1e-6);
                 let Some(outward) = outward else { continue };
                 let half = libm::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
-                let far = ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_of(half), 0.25), 4.0);
+                let far = ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_from_sin(half), 0.25), 4.0);
                 let place = corner + outward * far;
-                if !area.forbids(&place) {
+                if !area.is_in_no_fly_zone(&place) {
                     self.corners.push(place).map_err(|_| CoverageError::NoFlyFull)?;
                 }
             }
         }
-        self.measure();
+        self.compute_distances();
         Ok(())
     }
 
-    fn measure(&mut self) {
+    fn compute_distances(&mut self) {
         let n = self.corners.len();
         for i in 0..n {
             for j in 0..n {
                 let (a, b) = (self.corners[i], self.corners[j]);
-                self.between_m[i][j] = if self.is_clear(&a, &b) { (b - a).norm() } else { f32::INFINITY };
+                self.between_m[i][j] =
+                    if self.is_line_clear(&a, &b) { (b - a).norm() } else { f32::INFINITY };
             }
             self.between_m[i][i] = 0.0;
         }
@@ -91,12 +92,12 @@ impl<'a, const N: usize> Transit<'a, N> {
     }
 
     /// Whether a place is in a no-fly zone.
-    pub fn forbids(&self, place: &Flat) -> bool {
-        self.area.forbids(place)
+    pub fn is_in_no_fly_zone(&self, place: &Flat) -> bool {
+        self.area.is_in_no_fly_zone(place)
     }
 
-    /// Whether a straight way meets no no-fly zone.
-    pub fn is_clear(&self, from: &Flat, to: &Flat) -> bool {
+    /// Whether a straight line stays outside all no-fly zones.
+    pub fn is_line_clear(&self, from: &Flat, to: &Flat) -> bool {
         let (low, high) = (from.inf(to), from.sup(to));
         let meets = |(a, b): (Flat, Flat)| {
             let (c, d) = (a.inf(&b), a.sup(&b));
@@ -111,14 +112,14 @@ impl<'a, const N: usize> Transit<'a, N> {
         !self.area.no_fly_edges().any(meets)
     }
 
-    /// The length of the shortest way; infinite where there is none.
+    /// Length of the shortest path; infinite where there is none.
     pub fn distance_m(&self, from: &Flat, to: &Flat) -> f32 {
-        if self.is_clear(from, to) {
+        if self.is_line_clear(from, to) {
             return (to - from).norm();
         }
         let mut ends: Vec<(usize, f32), N> = Vec::new();
         for (i, corner) in self.corners.iter().enumerate() {
-            if self.is_clear(corner, to) {
+            if self.is_line_clear(corner, to) {
                 let _ = ends.push((i, (to - corner).norm()));
             }
         }
@@ -128,7 +129,7 @@ impl<'a, const N: usize> Transit<'a, N> {
             let rest = ends.iter().map(|&(j, last)| self.between_m[i][j] + last);
             let whole = first + rest.fold(f32::INFINITY, fminf);
             // A look costs more than the sums: only at what would be shorter.
-            if whole < least && self.is_clear(from, corner) {
+            if whole < least && self.is_line_clear(from, corner) {
                 least = whole;
             }
         }
@@ -139,15 +140,20 @@ impl<'a, const N: usize> Transit<'a, N> {
     ///
     /// # Errors
     /// [`CoverageError::Unreachable`] where there is none.
-    pub fn way(&self, from: &Flat, to: &Flat, corners: &mut Vec<Flat, N>) -> Result<(), CoverageError> {
+    pub fn shortest_path(
+        &self,
+        from: &Flat,
+        to: &Flat,
+        corners: &mut Vec<Flat, N>,
+    ) -> Result<(), CoverageError> {
         corners.clear();
         let mut here = *from;
         // Each step is to a corner from which the rest is shorter: no more steps than corners.
-        while !self.is_clear(&here, to) {
+        while !self.is_line_clear(&here, to) {
             let mut best = (f32::INFINITY, None);
             for corner in self.corners.iter().filter(|corner| **corner != here) {
                 let whole = (corner - here).norm() + self.distance_m(corner, to);
-                if whole < best.0 && self.is_clear(&here, corner) {
+                if whole < best.0 && self.is_line_clear(&here, corner) {
                     best = (whole, Some(*corner));
                 }
             }
@@ -165,6 +171,6 @@ impl<const N: usize> Default for Transit<'_, N> {
 }
 
 /// The cosine from the sine of an angle of at most 90°.
-fn cos_of(sine: f32) -> f32 {
+fn cos_from_sin(sine: f32) -> f32 {
     libm::sqrtf(libm::fmaxf(1.0 - sine * sine, 0.0))
 }

@@ -30,23 +30,23 @@ fn request() -> DetourRequest {
     }
 }
 
-fn at(place: Point, radius_m: f32) -> KeepOff {
-    KeepOff { from: place, to: place, radius_m, nature: Nature::Solid }
+fn at(place: Point, radius_m: f32) -> KeepOutZone {
+    KeepOutZone { from: place, to: place, radius_m, kind: ZoneKind::Static }
 }
 
-fn landing(from: Point) -> KeepOff {
-    KeepOff { to: Point::new(from.x, from.y, 0.0), nature: Nature::Landing, ..at(from, 2.0) }
+fn landing(from: Point) -> KeepOutZone {
+    KeepOutZone { to: Point::new(from.x, from.y, 0.0), kind: ZoneKind::Descending, ..at(from, 2.0) }
 }
 
 /// Plans, and holds the path against what every path must keep: it begins here, joins nodes and ends at one.
-fn planned(request: &DetourRequest, obstacles: &[KeepOff]) -> Result<StdVec<Point>, DetourError> {
+fn planned(request: &DetourRequest, obstacles: &[KeepOutZone]) -> Result<StdVec<Point>, DetourError> {
     let edges = EDGES.map(|(a, b)| Edge { a: a.min(b), b: a.max(b), clearance_m: 1.5 });
     let mut edges = edges.to_vec();
     edges.sort_by_key(|edge| (edge.a, edge.b));
     let bytes = encode(&header(1, 1), &NODES, &edges);
     let view = RoadmapView::parse(&bytes).unwrap();
     let (mut ws, mut out) = (Box::new(SearchWorkspace::<8>::new()), Path::<8>::new());
-    plan(&view, request, &mut obstacles.to_vec(), &mut ws, &mut Vec::<u16, 8>::new(), &mut out)?;
+    plan_detour(&view, request, &mut obstacles.to_vec(), &mut ws, &mut Vec::<u16, 8>::new(), &mut out)?;
     let points: StdVec<Point> = out.waypoints().iter().map(|w| w.position).collect();
     assert_eq!(points[0], request.here);
     assert!(points[1..].iter().all(|p| NODES.contains(p)), "{points:?}");
@@ -87,7 +87,7 @@ fn aside_is_the_nearest_node_that_nobody_lands_on() {
     assert_eq!(points.last(), Some(&NODES[0]), "{points:?}");
     let taken = planned(&aside, &[down, at(NODES[0], 1.0)]).unwrap();
     assert_ne!(taken.last(), Some(&NODES[0]), "somebody is there");
-    let everywhere = KeepOff { radius_m: 40.0, ..down };
+    let everywhere = KeepOutZone { radius_m: 40.0, ..down };
     assert_eq!(planned(&aside, &[everywhere]), Err(DetourError::Search(SearchError::NoPath)));
 }
 
@@ -112,7 +112,8 @@ fn a_path_is_blocked_by_what_is_ahead_of_it_only() {
         path.push(point, 1.5).unwrap();
     }
     let far = Point::new(0.0, 50.0, 0.0);
-    let between = |ahead: Range<f32>, place: Point| is_blocked(&path, ahead, 4.0, 4.0, &far, &at(place, 1.0));
+    let between =
+        |ahead: Range<f32>, place: Point| is_path_blocked(&path, ahead, 4.0, 4.0, &far, &at(place, 1.0));
     let blocked = |along_m: f32, place: Point| between(along_m..f32::INFINITY, place);
     assert!(blocked(1.0, Point::new(6.0, 0.5, 5.0)) && !blocked(7.5, Point::new(6.0, 0.5, 5.0)));
     assert!(!blocked(1.0, Point::new(6.0, 1.5, 5.0)), "beside it");
@@ -132,9 +133,9 @@ proptest::proptest! {
         radius_m in 0.0f32..3.0,
     ) {
         let point = |i: usize| Point::new(c[3 * i], c[3 * i + 1], c[3 * i + 2]);
-        let off = KeepOff { from: point(0), to: point(1), radius_m, nature: Nature::Solid };
+        let off = KeepOutZone { from: point(0), to: point(1), radius_m, kind: ZoneKind::Static };
         let (a, b) = (point(2), point(3));
         let apart = segments_distance_sq((&a, &b), (&off.from, &off.to));
-        proptest::prop_assert_eq!(off.touches(&a, &b), apart < radius_m * radius_m);
+        proptest::prop_assert_eq!(off.intersects(&a, &b), apart < radius_m * radius_m);
     }
 }

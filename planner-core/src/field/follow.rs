@@ -3,7 +3,7 @@
 //! Method: the cone of slopes that stay between both at each sample so far; where the next sample closes it, a corner
 //! before that one, as high as can be where the ground rises and as low where it falls. Each corner lies in the tunnel,
 //! and the field is nowhere steeper than the path may be: so the next sample can always be reached. Samples are half a
-//! node apart. Cost: one look at the field a sample.
+//! node apart. Cost: one lookup of the field for each sample.
 
 use libm::{ceilf, fmaxf, fminf};
 
@@ -16,7 +16,7 @@ const MAX_LEG_SAMPLES: f32 = 65_536.0;
 
 /// Height that a path keeps from the field.
 #[derive(Clone, Copy, Debug)]
-pub struct Following<'a> {
+pub struct TerrainFollowing<'a> {
     /// The field.
     pub field: FieldView<'a>,
     /// At least so high above it, metres.
@@ -27,7 +27,7 @@ pub struct Following<'a> {
     pub slope: f32,
 }
 
-impl Following<'_> {
+impl TerrainFollowing<'_> {
     /// The least height of a path at a place, metres.
     pub fn lowest_m(&self, place: &Flat) -> f32 {
         self.field.height_at(place) + self.height_m
@@ -38,14 +38,14 @@ impl Following<'_> {
         self.field.highest_m() + self.height_m + self.tolerance_m
     }
 
-    /// Begin of a path to `to` with the fewest corners, and of those the lowest.
-    pub fn begin(&self, from: &Flat, to: &Flat) -> Point {
+    /// Start of a path to `corners_to` with the fewest corners, and of those the lowest.
+    pub fn start_point(&self, from: &Flat, to: &Flat) -> Point {
         let low_m = self.lowest_m(from);
         let mut best = (usize::MAX, low_m);
         for share in [0.0, 0.5, 1.0] {
             let height_m = low_m + share * self.tolerance_m;
             let mut count = 0;
-            let counted: Result<(), ()> = self.to(&Point::new(from.x, from.y, height_m), to, |_| {
+            let counted: Result<(), ()> = self.corners_to(&Point::new(from.x, from.y, height_m), to, |_| {
                 count += 1;
                 Ok(())
             });
@@ -56,11 +56,11 @@ impl Following<'_> {
         Point::new(from.x, from.y, best.1)
     }
 
-    /// The corners of a path from a point between the field and the tolerance, the last of them at `to`.
+    /// The corners of a path from a point between the field and the tolerance, the last of them at `corners_to`.
     ///
     /// # Errors
     /// What `corner` says.
-    pub fn to<E>(
+    pub fn corners_to<E>(
         &self,
         from: &Point,
         to: &Flat,
@@ -94,18 +94,18 @@ impl Following<'_> {
             }
             let slope = if own.0 > cone.1 { cone.1 } else { cone.0 };
             let at = sample - 1;
-            z_m = self.between(z_m + slope * (at - last) as f32 * step_m, floor_m);
+            z_m = self.clamp_to_tunnel(z_m + slope * (at - last) as f32 * step_m, floor_m);
             let place = place(at);
             corner(Point::new(place.x, place.y, z_m))?;
             (last, cone) = (at, (-steep, steep));
         }
         // The lowest end there is.
-        z_m = self.between(z_m + cone.0 * (count - last) as f32 * step_m, floor_m);
+        z_m = self.clamp_to_tunnel(z_m + cone.0 * (count - last) as f32 * step_m, floor_m);
         corner(Point::new(to.x, to.y, z_m))
     }
 
     /// A height in the tunnel: rounding leaves it by little.
-    fn between(&self, z_m: f32, low_m: f32) -> f32 {
+    fn clamp_to_tunnel(&self, z_m: f32, low_m: f32) -> f32 {
         fminf(fmaxf(z_m, low_m), low_m + self.tolerance_m)
     }
 }

@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::follow::Following;
+use super::follow::TerrainFollowing;
 use super::*;
 use crate::Point;
 
@@ -71,11 +71,11 @@ proptest! {
         let shape = FieldShape { low: Flat::zeros(), cell_m: 5.0, columns: 12, rows: 9 };
         let bytes = field(&shape, &nodes);
         let slope = f32::from(most) * HEIGHT_STEP_M / 5.0 * core::f32::consts::SQRT_2;
-        let following = Following { field: FieldView::parse(&bytes).unwrap(), height_m: 30.0, tolerance_m, slope };
+        let following = TerrainFollowing { field: FieldView::parse(&bytes).unwrap(), height_m: 30.0, tolerance_m, slope };
         let [from, to] = ends.map(|[x, y]| Flat::new(x, y));
-        let begin = following.begin(&from, &to);
+        let begin = following.start_point(&from, &to);
         let mut path = vec![begin];
-        let done: Result<(), ()> = following.to(&begin, &to, |corner| {
+        let done: Result<(), ()> = following.corners_to(&begin, &to, |corner| {
             path.push(corner);
             Ok(())
         });
@@ -108,11 +108,11 @@ fn over_level_ground_and_along_a_slope_a_path_is_straight() {
     let ridge = field(&shape, &ridge);
     for (bytes, most) in [(&level, 1), (&rising, 1), (&ridge, 2)] {
         let field = FieldView::parse(bytes).unwrap();
-        let following = Following { field, height_m: 20.0, tolerance_m: 2.0, slope: 0.2 };
+        let following = TerrainFollowing { field, height_m: 20.0, tolerance_m: 2.0, slope: 0.2 };
         let (from, to) = (Flat::new(3.0, 5.0), Flat::new(187.0, 5.0));
-        let begin = following.begin(&from, &to);
+        let begin = following.start_point(&from, &to);
         let mut corners = Vec::new();
-        let done: Result<(), ()> = following.to(&begin, &to, |corner| {
+        let done: Result<(), ()> = following.corners_to(&begin, &to, |corner| {
             corners.push(corner);
             Ok(())
         });

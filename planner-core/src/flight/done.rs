@@ -4,7 +4,7 @@ use heapless::{Vec, VecView};
 
 /// Waypoints `first` up to before `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Range {
+pub struct WaypointRange {
     /// The first number.
     pub first: u32,
     /// After the last number.
@@ -13,18 +13,18 @@ pub struct Range {
 
 /// A set of waypoints that only grows, of at most `N` ranges: in rising order, apart from each other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Done<const N: usize> {
-    ranges: Vec<Range, N>,
+pub struct WaypointSet<const N: usize> {
+    ranges: Vec<WaypointRange, N>,
 }
 
-impl<const N: usize> Done<N> {
+impl<const N: usize> WaypointSet<N> {
     /// A set without waypoints.
     pub const fn new() -> Self {
         Self { ranges: Vec::new() }
     }
 
     /// The ranges, in rising order; none is empty, and none touches the next.
-    pub fn ranges(&self) -> &[Range] {
+    pub fn ranges(&self) -> &[WaypointRange] {
         &self.ranges
     }
 
@@ -33,7 +33,7 @@ impl<const N: usize> Done<N> {
         self.ranges.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add)
     }
 
-    /// Whether there are none.
+    /// Whether it is empty.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty()
     }
@@ -47,13 +47,13 @@ impl<const N: usize> Done<N> {
     ///
     /// # Errors
     /// The range, where it touches none and there are `N` already: nothing changes.
-    pub fn insert(&mut self, range: Range) -> Result<bool, Range> {
+    pub fn insert(&mut self, range: WaypointRange) -> Result<bool, WaypointRange> {
         insert(&mut self.ranges, range)
     }
 }
 
 /// Independent of the capacity, so that the program has one copy of this function.
-fn insert(ranges: &mut VecView<Range>, range: Range) -> Result<bool, Range> {
+fn insert(ranges: &mut VecView<WaypointRange>, range: WaypointRange) -> Result<bool, WaypointRange> {
     if range.first >= range.end {
         return Ok(false);
     }
@@ -64,7 +64,7 @@ fn insert(ranges: &mut VecView<Range>, range: Range) -> Result<bool, Range> {
         if held.first <= range.first && range.end <= held.end {
             return Ok(false);
         }
-        whole = Range { first: whole.first.min(held.first), end: whole.end.max(held.end) };
+        whole = WaypointRange { first: whole.first.min(held.first), end: whole.end.max(held.end) };
     }
     // The later ranges move from there: one on, or back to behind the one that holds all touched
     // ranges.
@@ -87,7 +87,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::vec::Vec;
 
-    use super::{Done, Range};
+    use super::{WaypointRange, WaypointSet};
 
     proptest! {
         #[test]
@@ -95,8 +95,8 @@ mod tests {
             added in proptest::collection::vec((0u32..80, 0u32..9), 0..40),
             at in any::<proptest::sample::Index>(),
         ) {
-            let range = |&(first, count): &(u32, u32)| Range { first, end: first + count };
-            let (mut done, mut model) = (Done::<40>::new(), BTreeSet::new());
+            let range = |&(first, count): &(u32, u32)| WaypointRange { first, end: first + count };
+            let (mut done, mut model) = (WaypointSet::<40>::new(), BTreeSet::new());
             for range in added.iter().map(range) {
                 let grew = done.insert(range).unwrap();
                 let before = model.len();
@@ -107,7 +107,7 @@ mod tests {
             prop_assert_eq!(done.count() as usize, model.len());
             prop_assert_eq!(held, model.into_iter().collect::<Vec<_>>());
             prop_assert!(done.ranges().windows(2).all(|pair| pair[0].end < pair[1].first));
-            let mut turned = Done::<40>::new();
+            let mut turned = WaypointSet::<40>::new();
             let cut = at.index(added.len() + 1);
             for range in added[cut..].iter().chain(&added[..cut]).rev().map(range) {
                 turned.insert(range).unwrap();
@@ -117,9 +117,9 @@ mod tests {
 
         #[test]
         fn what_does_not_fit_changes_nothing(firsts in proptest::collection::vec(0u32..60, 1..30)) {
-            let mut done = Done::<4>::new();
+            let mut done = WaypointSet::<4>::new();
             for first in firsts {
-                let (range, before) = (Range { first, end: first + 1 }, done.clone());
+                let (range, before) = (WaypointRange { first, end: first + 1 }, done.clone());
                 if done.insert(range).is_err() {
                     prop_assert_eq!(&before, &done);
                     prop_assert_eq!(done.ranges().len(), 4);

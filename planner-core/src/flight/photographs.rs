@@ -1,13 +1,13 @@
 //! What a vehicle photographs along its path.
 
-use super::{Path, PathError, Range, Waypoint};
+use super::{Path, PathError, Waypoint, WaypointRange};
 
 /// Two points nearer than this along a path are the same place, metres.
 const SAME_PLACE_M: f32 = 1e-2;
 
 /// Heading of a vehicle while it photographs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Look {
+pub enum HeadingMode {
     /// One heading on the whole flight: radians from east to the left.
     Fixed(f32),
     /// The way it flies.
@@ -28,7 +28,7 @@ pub enum Trigger {
 /// A stretch of a path on which pictures are taken, metres along it: one picture at each end, others in between, as far apart
 /// over ground. Both ends are the same where one picture is enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shots<'p> {
+pub struct PictureStretch<'p> {
     /// Place of the first picture.
     pub from_m: f32,
     /// Place of the last picture.
@@ -44,33 +44,33 @@ pub struct Shots<'p> {
 
 /// A straight piece of a stretch: where it begins and how long it is, along the path and over ground, metres.
 #[derive(Clone, Copy)]
-struct Piece {
+struct StraightPiece {
     begin_m: f32,
     length_m: f32,
     ground_m: f32,
 }
 
 /// The pieces between these corners.
-fn pieces(corners: &[Waypoint]) -> impl Iterator<Item = Piece> {
+fn straight_pieces(corners: &[Waypoint]) -> impl Iterator<Item = StraightPiece> {
     corners.windows(2).map(|ends| {
         let (begin_m, length_m) = (ends[0].along_m, ends[1].along_m - ends[0].along_m);
         let step = ends[1].position - ends[0].position;
         // Level ones are as long over ground, to the bit.
         let ground_m = if step.z == 0.0 { length_m } else { step.xy().norm() };
-        Piece { begin_m, length_m, ground_m }
+        StraightPiece { begin_m, length_m, ground_m }
     })
 }
 
-impl<'p> Shots<'p> {
+impl<'p> PictureStretch<'p> {
     fn new(corners: &'p [Waypoint], count: u32) -> Option<Self> {
         let (from_m, to_m) = (corners.first()?.along_m, corners.last()?.along_m);
-        let ground_m: f32 = pieces(corners).map(|piece| piece.ground_m).sum();
+        let ground_m: f32 = straight_pieces(corners).map(|piece| piece.ground_m).sum();
         let step_m = if count > 1 { ground_m / (count - 1) as f32 } else { 0.0 };
         Some(Self { from_m, to_m, step_m, count, corners })
     }
 
     /// Pictures of it that are taken once the vehicle is `along_m` metres along the path.
-    fn taken_by(&self, along_m: f32) -> u32 {
+    fn taken_count(&self, along_m: f32) -> u32 {
         if along_m < self.from_m || along_m.is_nan() {
             0
         } else if self.step_m > 0.0 && along_m < self.to_m {
@@ -84,7 +84,7 @@ impl<'p> Shots<'p> {
     /// Distance over ground from the stretch's begin to `along_m`, metres.
     fn ground_m(&self, along_m: f32) -> f32 {
         let mut ground_m = 0.0;
-        for piece in pieces(self.corners) {
+        for piece in straight_pieces(self.corners) {
             let left_m = along_m - piece.begin_m;
             if left_m < piece.length_m {
                 return ground_m + left_m * (piece.ground_m / piece.length_m);
@@ -95,9 +95,9 @@ impl<'p> Shots<'p> {
     }
 
     /// Place of picture `k`, metres along the path; the last of all where there are fewer.
-    pub fn place_m(&self, k: u32) -> f32 {
+    pub fn picture_at_m(&self, k: u32) -> f32 {
         let mut left_m = self.step_m * k as f32;
-        for piece in pieces(self.corners) {
+        for piece in straight_pieces(self.corners) {
             if left_m < piece.ground_m {
                 return piece.begin_m + left_m * (piece.length_m / piece.ground_m);
             }
@@ -107,9 +107,9 @@ impl<'p> Shots<'p> {
     }
 }
 
-/// Which parts of a path of at most [`Photographs::MAX_PATH_WAYPOINTS`] waypoints are photographed, and how.
+/// Which parts of a path of at most [`PicturePlan::MAX_PATH_WAYPOINTS`] waypoints are photographed, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Photographs {
+pub struct PicturePlan {
     /// Bit `i`: a stretch begins at waypoint `i`.
     begins: u64,
     /// Bit `i`: it ends at waypoint `i`.
@@ -125,14 +125,14 @@ pub struct Photographs {
     /// Greatest distance from one picture to the next, metres.
     pub spacing_m: f32,
     /// Heading of the vehicle.
-    pub look: Look,
+    pub heading_mode: HeadingMode,
     /// Trigger of the pictures.
     pub trigger: Trigger,
     /// Whether the route has more lanes than the path: a stretch of it, after which all divide what is left.
     pub goes_on: bool,
 }
 
-impl Photographs {
+impl PicturePlan {
     /// Most waypoints of a path along which a vehicle photographs.
     pub const MAX_PATH_WAYPOINTS: usize = 64;
     /// Most photographed stretches of a path.
@@ -141,7 +141,7 @@ impl Photographs {
     pub const MAX_AREA_WAYPOINTS: u32 = u16::MAX as u32 + 1;
 
     /// A flight without pictures yet; they are to be `spacing_m` apart at most.
-    pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
+    pub const fn new(spacing_m: f32, look: HeadingMode, trigger: Trigger) -> Self {
         let (numbers, counts) = ([0; Self::MAX_STRETCHES], [0; Self::MAX_STRETCHES]);
         Self {
             begins: 0,
@@ -151,14 +151,14 @@ impl Photographs {
             backward: false,
             area: 0,
             spacing_m,
-            look,
+            heading_mode: look,
             trigger,
             goes_on: false,
         }
     }
 
     /// The pictures of an area with so many waypoints, along its path or back.
-    pub const fn of_area(self, area: u32, backward: bool) -> Self {
+    pub const fn with_area(self, area: u32, backward: bool) -> Self {
         Self { area, backward, ..self }
     }
 
@@ -173,7 +173,7 @@ impl Photographs {
     /// # Errors
     /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`] and [`Self::MAX_STRETCHES`], for numbers beyond [`Self::MAX_AREA_WAYPOINTS`], and for no
     /// waypoint.
-    pub fn mark(&mut self, from: usize, to: usize, waypoints: Range) -> Result<(), PathError> {
+    pub fn add_stretch(&mut self, from: usize, to: usize, waypoints: WaypointRange) -> Result<(), PathError> {
         let number = u16::try_from(waypoints.first).map_err(|_| PathError::PathFull)?;
         let count = waypoints.end.checked_sub(waypoints.first).and_then(|count| u16::try_from(count).ok());
         let count = count.filter(|count| *count > 0).ok_or(PathError::PathFull)?;
@@ -188,7 +188,10 @@ impl Photographs {
     }
 
     /// The stretches, in their order along the path they were marked on.
-    pub fn stretches<'p, const W: usize>(&self, path: &'p Path<W>) -> impl Iterator<Item = Shots<'p>> {
+    pub fn stretches<'p, const W: usize>(
+        &self,
+        path: &'p Path<W>,
+    ) -> impl Iterator<Item = PictureStretch<'p>> {
         let (mut begins, mut ends) = (self.begins, self.ends);
         let waypoints = path.waypoints();
         self.counts.into_iter().map_while(move |count| {
@@ -196,37 +199,43 @@ impl Photographs {
             let corners = waypoints.get(from..=to)?;
             begins &= begins - 1;
             ends &= ends - 1;
-            Shots::new(corners, u32::from(count))
+            PictureStretch::new(corners, u32::from(count))
         })
     }
 
     /// Pictures taken once the vehicle is `along_m` metres along the path.
-    pub fn taken_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
+    pub fn taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         let reached_m = along_m + SAME_PLACE_M;
-        self.stretches(path).map(|shots| shots.taken_by(reached_m)).fold(0, u32::saturating_add)
+        self.stretches(path).map(|shots| shots.taken_count(reached_m)).fold(0, u32::saturating_add)
     }
 
     /// The pictures passed by `along_m`, but for one that the vehicle has not come a spacing
     /// further than yet: that one may be missing.
-    pub fn passed_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
-        self.taken_by(path, along_m - self.spacing_m)
+    pub fn passed_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
+        self.taken_count(path, along_m - self.spacing_m)
     }
 
     /// Place of the last picture of all; none where there is none.
-    pub fn end_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
+    pub fn last_picture_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
         let last = Self::MAX_PATH_WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
         path.waypoints().get(last).map(|waypoint| waypoint.along_m)
     }
 
     /// Place of the last picture no further than `along_m` metres along the path; none before the
     /// first.
-    pub fn last_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
-        let last = |shots: Shots<'_>| shots.taken_by(along_m).checked_sub(1).map(|k| shots.place_m(k));
+    pub fn last_picture_before_m<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
+        let last = |shots: PictureStretch<'_>| {
+            shots.taken_count(along_m).checked_sub(1).map(|k| shots.picture_at_m(k))
+        };
         self.stretches(path).filter_map(last).last()
     }
 
     /// The waypoints of the area that these pictures show, counted along the path.
-    pub fn shown<const W: usize>(&self, path: &Path<W>, pictures: Range) -> impl Iterator<Item = Range> {
+    pub fn shown_waypoints<const W: usize>(
+        &self,
+        path: &Path<W>,
+        pictures: WaypointRange,
+    ) -> impl Iterator<Item = WaypointRange> {
         let (mut before, backward) = (0u32, self.backward);
         self.stretches(path).zip(self.numbers).filter_map(move |(shots, number)| {
             let within = |picture: u32| picture.saturating_sub(before).min(shots.count);
@@ -234,7 +243,7 @@ impl Photographs {
             before = before.saturating_add(shots.count);
             let skipped = if backward { shots.count - to } else { from };
             let first = u32::from(number).saturating_add(skipped);
-            (from < to).then(|| Range { first, end: first.saturating_add(to - from) })
+            (from < to).then(|| WaypointRange { first, end: first.saturating_add(to - from) })
         })
     }
 
@@ -259,22 +268,22 @@ mod tests {
         path
     }
 
-    fn mark_three(photographs: &mut Photographs) {
+    fn mark_three(photographs: &mut PicturePlan) {
         for (from, to, first, end) in [(0, 1, 7, 12), (2, 3, 30, 35), (4, 4, 40, 41)] {
-            photographs.mark(from, to, Range { first, end }).unwrap();
+            photographs.add_stretch(from, to, WaypointRange { first, end }).unwrap();
         }
     }
 
     #[test]
     fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
-        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
+        let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance);
         mark_three(&mut photographs);
         let path = path();
         let mut stretches = photographs.stretches(&path);
         let first = stretches.next().unwrap();
         assert_eq!((first.from_m, first.to_m, first.step_m, first.count), (0.0, 30.0, 7.5, 5));
         let second = stretches.next().unwrap();
-        assert_eq!((second.from_m, second.to_m, second.place_m(4)), (40.0, 70.0, 70.0));
+        assert_eq!((second.from_m, second.to_m, second.picture_at_m(4)), (40.0, 70.0, 70.0));
         let third = stretches.next().unwrap();
         assert_eq!((third.from_m, third.to_m, third.step_m, third.count), (80.0, 80.0, 0.0, 1));
         assert_eq!(stretches.next(), None);
@@ -286,11 +295,11 @@ mod tests {
             (39.0, 5, Some(30.0)),
             (99.0, 11, Some(80.0)),
         ] {
-            assert_eq!(photographs.taken_by(&path, along_m), taken, "{along_m}");
-            assert_eq!(photographs.last_by(&path, along_m), last_m, "{along_m}");
+            assert_eq!(photographs.taken_count(&path, along_m), taken, "{along_m}");
+            assert_eq!(photographs.last_picture_before_m(&path, along_m), last_m, "{along_m}");
         }
-        assert_eq!(photographs.end_m(&path), Some(80.0));
-        assert_eq!(Photographs::new(9.0, Look::Ahead, Trigger::Distance).end_m(&path), None);
+        assert_eq!(photographs.last_picture_m(&path), Some(80.0));
+        assert_eq!(PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).last_picture_m(&path), None);
     }
 
     #[test]
@@ -300,28 +309,29 @@ mod tests {
         for (x, z) in [(0.0, 30.0), (20.0, 30.0), (60.0, 60.0), (80.0, 45.0), (80.0, 90.0)] {
             path.push(Point::new(x, 0.0, z), 1.0).unwrap();
         }
-        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Waypoint);
-        photographs.mark(0, 3, Range { first: 0, end: 9 }).unwrap();
+        let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Waypoint);
+        photographs.add_stretch(0, 3, WaypointRange { first: 0, end: 9 }).unwrap();
         let shots = photographs.stretches(&path).next().unwrap();
         assert_eq!((shots.step_m, shots.count), (10.0, 9));
         for k in 0..9 {
-            let place = path.point_at(shots.place_m(k)).unwrap();
+            let place = path.point_at(shots.picture_at_m(k)).unwrap();
             assert!((place.x - 10.0 * k as f32).abs() < 1e-3, "{place}");
-            let by = |beside_m: f32| photographs.taken_by(&path, shots.place_m(k) + beside_m);
+            let by = |beside_m: f32| photographs.taken_count(&path, shots.picture_at_m(k) + beside_m);
             assert_eq!((by(-0.05), by(0.0), by(0.05)), (k, k + 1, k + 1), "{k}");
         }
-        assert_eq!(photographs.taken_by(&path, 1e9), 9);
+        assert_eq!(photographs.taken_count(&path, 1e9), 9);
     }
 
     #[test]
     fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
         for (backward, [part, whole]) in [(false, [(30, 33), (30, 35)]), (true, [(32, 35), (30, 35)])] {
-            let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance).of_area(50, backward);
+            let mut photographs =
+                PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).with_area(50, backward);
             mark_three(&mut photographs);
             let path = path();
             let shown = |first, end| -> std::vec::Vec<_> {
-                let pictures = Range { first, end };
-                photographs.shown(&path, pictures).map(|range| (range.first, range.end)).collect()
+                let pictures = WaypointRange { first, end };
+                photographs.shown_waypoints(&path, pictures).map(|range| (range.first, range.end)).collect()
             };
             let numbers = |count| shown(0, count);
             assert_eq!(numbers(0), []);
@@ -342,18 +352,21 @@ mod tests {
 
     #[test]
     fn waypoints_beyond_the_bits_are_refused() {
-        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        let two = Range { first: 0, end: 2 };
-        assert_eq!(photographs.mark(63, 64, two), Err(PathError::PathFull));
-        assert_eq!(photographs.mark(3, 2, two), Err(PathError::PathFull));
-        assert_eq!(photographs.mark(2, 3, Range { first: 2, end: 2 }), Err(PathError::PathFull));
+        let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance);
+        let two = WaypointRange { first: 0, end: 2 };
+        assert_eq!(photographs.add_stretch(63, 64, two), Err(PathError::PathFull));
+        assert_eq!(photographs.add_stretch(3, 2, two), Err(PathError::PathFull));
+        assert_eq!(
+            photographs.add_stretch(2, 3, WaypointRange { first: 2, end: 2 }),
+            Err(PathError::PathFull)
+        );
         // On a path that is shorter than what was marked there is nothing to photograph.
-        photographs.mark(62, 63, two).unwrap();
+        photographs.add_stretch(62, 63, two).unwrap();
         assert_eq!(photographs.stretches(&path()).next(), None);
-        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        for at in 0..Photographs::MAX_STRETCHES {
-            photographs.mark(at, at, Range { first: 0, end: 1 }).unwrap();
+        let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance);
+        for at in 0..PicturePlan::MAX_STRETCHES {
+            photographs.add_stretch(at, at, WaypointRange { first: 0, end: 1 }).unwrap();
         }
-        assert_eq!(photographs.mark(40, 41, two), Err(PathError::PathFull));
+        assert_eq!(photographs.add_stretch(40, 41, two), Err(PathError::PathFull));
     }
 }

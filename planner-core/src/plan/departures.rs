@@ -28,21 +28,21 @@ const COMPARISONS_PER_PAIR: u32 = 200;
 const MEAN_LANDING_WEIGHT: f32 = 0.02;
 
 /// The differences of take-off times, of flight `i` after flight `j`, that are forbidden.
-struct Differences<'a> {
+struct ForbiddenDifferences<'a> {
     /// For each pair the lower end at `[i][j]` with i < j, the upper one at `[j][i]`.
     ends: &'a [f32],
     count: usize,
 }
 
-impl Differences<'_> {
-    fn between(&self, i: usize, j: usize) -> (f32, f32) {
+impl ForbiddenDifferences<'_> {
+    fn forbidden_interval(&self, i: usize, j: usize) -> (f32, f32) {
         let (low, high) = (i.min(j), i.max(j));
         let (from, to) = (self.ends[low * self.count + high], self.ends[high * self.count + low]);
         if i < j { (from, to) } else { (-to, -from) }
     }
 
     /// Take-off times of vehicles taken in this `order`, and how good they are: smaller is better, infinite is no schedule.
-    fn depart(&self, order: &[u16], lasts_s: &[f32], departs_s: &mut [f32], looks: &mut u32) -> f32 {
+    fn departure_times(&self, order: &[u16], lasts_s: &[f32], departs_s: &mut [f32], looks: &mut u32) -> f32 {
         let (mut makespan_s, mut sum_s) = (0.0, 0.0);
         for (place, &i) in order.iter().enumerate() {
             let i = usize::from(i);
@@ -51,7 +51,7 @@ impl Differences<'_> {
             for _ in 0..=place {
                 let before_s = depart_s;
                 for &j in &order[..place] {
-                    let (from, to) = self.between(i, usize::from(j));
+                    let (from, to) = self.forbidden_interval(i, usize::from(j));
                     let after_s = depart_s - departs_s[usize::from(j)];
                     if from < after_s && after_s < to {
                         depart_s = departs_s[usize::from(j)] + to;
@@ -72,7 +72,7 @@ impl Differences<'_> {
 
 /// Takes the vehicles in the order that ends the mission earliest, of those that are tried. A place is free `handover_s` after
 /// its vehicle has left it.
-pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: usize>(
+pub(super) fn improve_departure_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     request: &PlanRequest<'_>,
     handover_s: f32,
     ws: &mut PlanWorkspace<N, V, P>,
@@ -84,11 +84,11 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
     let mut lasts_s: Vec<f32, V> = Vec::new();
     let mut found_s: Vec<f32, V> = Vec::new();
     for (i, flight) in out.flights.iter().enumerate() {
-        if flight.task.flies() {
+        if flight.task.leaves_pad() {
             // Cannot overflow: one entry a flight, as below.
             let _ = order.push(i as u16);
         }
-        let _ = (lasts_s.push(flight.lasts_s(cfg)), found_s.push(flight.depart_s));
+        let _ = (lasts_s.push(flight.duration_s(cfg)), found_s.push(flight.depart_s));
     }
     if order.len() < 2 {
         return Ok(());
@@ -101,10 +101,10 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
             (ends[i * count + j], ends[j * count + i]) = (from, to);
         }
     }
-    let differences = Differences { ends: &ws.costs.as_flattened()[..count * count], count };
+    let differences = ForbiddenDifferences { ends: &ws.costs.as_flattened()[..count * count], count };
     let by_departure =
         |a: &u16, b: &u16| found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b));
-    sort::by(&mut order, by_departure);
+    sort::sort_by(&mut order, by_departure);
     let pairs = (order.len() * order.len()) as u32;
     let mut looks = if count <= BOARD_VEHICLES {
         MAX_COMPARISONS
@@ -112,17 +112,17 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
         MAX_COMPARISONS.max(COMPARISONS_PER_PAIR * pairs)
     };
     let mut departs_s = lasts_s.clone();
-    let mut best = differences.depart(&order, &lasts_s, &mut departs_s, &mut looks);
+    let mut best = differences.departure_times(&order, &lasts_s, &mut departs_s, &mut looks);
     let mut rng = Pcg32::seed_from_u64(order.len() as u64);
     let mut below = |bound: usize| ((u64::from(rng.next_u32()) * bound as u64) >> 32) as usize;
     while looks > 0 {
         let (from, to) = (below(order.len()), below(order.len()));
-        move_to(&mut order, from, to);
-        let cost = differences.depart(&order, &lasts_s, &mut departs_s, &mut looks);
+        move_element(&mut order, from, to);
+        let cost = differences.departure_times(&order, &lasts_s, &mut departs_s, &mut looks);
         if cost <= best {
             best = cost;
         } else {
-            move_to(&mut order, to, from);
+            move_element(&mut order, to, from);
         }
         // Even a move to the same place ends the search some time.
         looks = looks.saturating_sub(1);
@@ -131,7 +131,9 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
         flights.iter().zip(&lasts_s).map(|(f, lasts_s)| f.depart_s + lasts_s).fold(0.0, fmaxf)
     };
     let before_s = makespan_s(&out.flights);
-    if depart_in(&order, request, handover_s, ws, out).is_err() || makespan_s(&out.flights) >= before_s {
+    if schedule_departures(&order, request, handover_s, ws, out).is_err()
+        || makespan_s(&out.flights) >= before_s
+    {
         out.flights.iter_mut().zip(&found_s).for_each(|(flight, &depart_s)| flight.depart_s = depart_s);
     }
     Ok(())
@@ -141,7 +143,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
 const BOARD_VEHICLES: usize = 32;
 
 /// Each vehicle in turn takes off as early as those before it allow; one that stays on its pad comes before all.
-fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: usize>(
     order: &[u16],
     request: &PlanRequest<'_>,
     handover_s: f32,
@@ -153,7 +155,7 @@ fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
             .flights
             .iter()
             .enumerate()
-            .filter(|&(j, flight)| !flight.task.flies() || order[..place].contains(&(j as u16)));
+            .filter(|&(j, flight)| !flight.task.leaves_pad() || order[..place].contains(&(j as u16)));
         let (flight, scheduled) = (&out.flights[usize::from(i)], scheduled.map(|(_, flight)| flight));
         let cfg = &request.schedule;
         let departure =
@@ -163,8 +165,8 @@ fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
     Ok(())
 }
 
-/// Takes one element out and puts it in again.
-fn move_to(order: &mut [u16], from: usize, to: usize) {
+/// Moves one element to another index.
+fn move_element(order: &mut [u16], from: usize, to: usize) {
     if from < to {
         order[from..=to].rotate_left(1);
     } else {

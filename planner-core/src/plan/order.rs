@@ -12,7 +12,7 @@ use super::workspace::{PlanWorkspace, SwarmPlan};
 use crate::Point;
 use crate::flight::{Flight, Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::schedule::sipp::{self, Route};
+use crate::schedule::sipp::{self, RouteQuery};
 use crate::schedule::{self, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::sort;
@@ -32,8 +32,8 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         let mut nodes: Vec<u16, W> = Vec::new();
         let length = match flight.task.goal() {
             Some(goal) => {
-                let parked = Parked::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
-                let ends = Ends::new(request, i, goal);
+                let parked = ParkedVehicles::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
+                let ends = PathEnds::new(request, i, goal);
                 find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?
             }
             None => f32::INFINITY,
@@ -42,18 +42,18 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         let _ = (order.push(i as u16), straight.push(length));
     }
     let mut failed = Ok(());
-    for first in [First::Longest, First::Shortest] {
+    for first in [InitialOrder::Longest, InitialOrder::Shortest] {
         // A vehicle that stays on its pad comes first: it blocks all others. Ties go to the higher id (P3D §3.4).
-        sort::by(&mut order, |&a, &b| {
+        sort::sort_by(&mut order, |&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) =
-                ([a, b].map(|i| out.flights[i].task.flies()), (out.flights[b].id, out.flights[a].id));
+                ([a, b].map(|i| out.flights[i].task.leaves_pad()), (out.flights[b].id, out.flights[a].id));
             let longer = straight[b].total_cmp(&straight[a]);
-            let longer = if first == First::Longest { longer } else { longer.reverse() };
+            let longer = if first == InitialOrder::Longest { longer } else { longer.reverse() };
             goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
         });
-        let rush = Rush { count: 0, head_start_s: 0.0, handover_s };
-        failed = schedule_from(view, request, (&mut order, rush), ws, out);
+        let rush = HeadStart { count: 0, head_start_s: 0.0, handover_s };
+        failed = schedule_with_reordering(view, request, (&mut order, rush), ws, out);
         if failed.is_ok() {
             break;
         }
@@ -61,18 +61,18 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     failed
 }
 
-/// Which vehicle is scheduled first before any reordering.
+/// Order in which vehicles are scheduled before any reordering.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum First {
+enum InitialOrder {
     Longest,
     Shortest,
 }
 
 /// Schedules in this order; a vehicle that cannot be fitted in goes first in the next round, or later gets a head start.
-fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    (order, mut rush): (&mut Vec<u16, V>, Rush),
+    (order, mut rush): (&mut Vec<u16, V>, HeadStart),
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
@@ -86,7 +86,7 @@ fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>
         let blocked = order.remove(place);
         // Cannot overflow: one was just removed.
         if round < reorderings {
-            let front = order.iter().take_while(|&&i| !out.flights[usize::from(i)].task.flies()).count();
+            let front = order.iter().take_while(|&&i| !out.flights[usize::from(i)].task.leaves_pad()).count();
             let _ = order.insert(front, blocked);
         } else {
             rush.count = rush.count.max(order.len() + 1 - place);
@@ -106,16 +106,16 @@ const MAX_HEAD_STARTS: usize = 8;
 /// Time that two vehicles head-on need to clear a side room, seconds.
 const HEAD_START_S: f32 = 3.0;
 
-/// The last `count` in the order may leave at once, all others only after a head start.
-struct Rush {
+/// Head start: the last `count` vehicles in the order may leave at once, all others later.
+struct HeadStart {
     count: usize,
     head_start_s: f32,
     /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
 }
 
-/// One vehicle's turn among the others.
-struct Turn<'a> {
+/// State of one vehicle's turn to be scheduled.
+struct SchedulingTurn<'a> {
     /// Index of the vehicle in the request.
     index: usize,
     /// Vehicles scheduled already.
@@ -132,22 +132,22 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     order: &[u16],
-    rush: &Rush,
+    rush: &HeadStart,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), (usize, PlanError)> {
     for (place, &index) in order.iter().enumerate() {
         let index = usize::from(index);
-        if !out.flights[index].task.flies() {
+        if !out.flights[index].task.leaves_pad() {
             continue;
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
         let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
-        let turn = Turn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
+        let turn = SchedulingTurn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
         let waits = wait_on_pad(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,
-            None => step_aside(view, request, &turn, ws, out)
+            None => wait_on_path(view, request, &turn, ws, out)
                 .map_err(|error| (place, PlanError::Schedule(out.flights[index].id, error)))?,
         };
         out.flights[index] = flight;
@@ -159,24 +159,24 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
 fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    turn: &Turn<'_>,
+    turn: &SchedulingTurn<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Option<Flight<W>>, PlanError> {
-    let &Turn { index, before, waiting, not_before_s, handover_s } = turn;
+    let &SchedulingTurn { index, before, waiting, not_before_s, handover_s } = turn;
     let flight = &out.flights[index];
     let Some(goal) = flight.task.goal() else { return Ok(None) };
-    let ends = Ends::new(request, index, goal);
+    let ends = PathEnds::new(request, index, goal);
     for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
-        let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
+        let parked = ParkedVehicles::<V>::new(view, avoid, &out.flights, waiting, index);
         let mut nodes: Vec<u16, W> = Vec::new();
         if find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
             continue;
         }
-        let mut path = path_of(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
-        path.label(flight.climb_m / request.schedule.vertical_mps, request.schedule.cruise_mps);
+        let mut path = path_from_nodes(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
+        path.label_times(flight.climb_m / request.schedule.vertical_mps, request.schedule.cruise_mps);
         let mut flight = Flight { path, depart_s: 0.0, ..flight.clone() };
-        flight.fit_pieces();
+        flight.fit_segment_length();
         let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
         let cfg = &request.schedule;
         let from_s = (not_before_s, handover_s);
@@ -191,38 +191,38 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
 
 /// The flight that waits and steps aside on its way. The earliest to arrive may leave its pad only to wait for long among the
 /// others; then a later departure is tried, as often as that helps.
-fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    turn: &Turn<'_>,
+    turn: &SchedulingTurn<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Flight<W>, ScheduleError> {
-    let &Turn { index, before, waiting, not_before_s, handover_s } = turn;
+    let &SchedulingTurn { index, before, waiting, not_before_s, handover_s } = turn;
     let mut flight = out.flights[index].clone();
     let Some(goal) = flight.task.goal() else { return Ok(flight) };
-    let Ends { from, to, vehicle } = Ends::new(request, index, goal);
-    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
+    let PathEnds { from, to, vehicle } = PathEnds::new(request, index, goal);
+    let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, vehicle.required_clearance_m);
     for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
-        let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
+        let parked = ParkedVehicles::<V>::new(view, avoid, &out.flights, waiting, index);
         let cfg = &request.schedule;
-        let mut route = Route { cfg, from, to, not_before_s, parked: &parked.pads, handover_s };
+        let mut route = RouteQuery { cfg, from, to, not_before_s, parked: &parked.before_flight, handover_s };
         let mut best: Option<Flight<W>> = None;
-        flight.piece_m = MAX_TIMED_SEGMENT_M;
+        flight.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_DEPARTURES {
             let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
-            match sipp::route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
+            match sipp::find_route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
                 // Looked for again with the longer segments that it is cut into.
-                Ok(()) if flight.pieces() > MAX_TIMED_SEGMENTS => {
-                    flight.fit_pieces();
+                Ok(()) if flight.segment_count() > MAX_TIMED_SEGMENTS => {
+                    flight.fit_segment_length();
                     continue;
                 }
                 Ok(()) => {}
                 Err(ScheduleError::Blocked) => break,
                 Err(error) => return Err(error),
             }
-            let (longest_s, all_s) = waits_s(&flight);
-            if best.as_ref().is_none_or(|best| longest_s < waits_s(best).0) {
+            let (longest_s, all_s) = wait_durations_s(&flight);
+            if best.as_ref().is_none_or(|best| longest_s < wait_durations_s(best).0) {
                 best = Some(flight.clone());
             }
             if longest_s <= LONG_WAIT_S {
@@ -244,8 +244,8 @@ const MAX_DEPARTURES: usize = 6;
 const LONG_WAIT_S: f32 = 10.0;
 
 /// The longest wait on the way, and all of them together, seconds.
-fn waits_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
-    let waits = flight.path.waypoints().iter().map(|w| w.leave_s - w.at_s);
+fn wait_durations_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
+    let waits = flight.path.waypoints().iter().map(|w| w.leave_s - w.arrive_s);
     waits.fold((0.0, 0.0), |(longest, all), wait| (fmaxf(longest, wait), all + wait))
 }
 
@@ -261,12 +261,12 @@ enum Avoid {
 }
 
 /// Points on the ground where other vehicles stand, before and after their flights.
-struct Parked<const V: usize> {
-    pads: Vec<Point, V>,
-    landed: Vec<Point, V>,
+struct ParkedVehicles<const V: usize> {
+    before_flight: Vec<Point, V>,
+    after_flight: Vec<Point, V>,
 }
 
-impl<const V: usize> Parked<V> {
+impl<const V: usize> ParkedVehicles<V> {
     fn new<const W: usize>(
         view: &RoadmapView<'_>,
         avoid: Avoid,
@@ -274,39 +274,39 @@ impl<const V: usize> Parked<V> {
         waiting: &[u16],
         index: usize,
     ) -> Self {
-        let mut parked = Self { pads: Vec::new(), landed: Vec::new() };
+        let mut parked = Self { before_flight: Vec::new(), after_flight: Vec::new() };
         let below = |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
         for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
         {
             // Cannot overflow: at most one entry of each kind per flight.
-            if avoid == Avoid::AllPlaces || !flight.task.flies() || waiting.contains(&(j as u16)) {
-                let _ = parked.pads.push(below(j, flight.climb_m));
+            if avoid == Avoid::AllPlaces || !flight.task.leaves_pad() || waiting.contains(&(j as u16)) {
+                let _ = parked.before_flight.push(below(j, flight.climb_m));
             }
             if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.task.goal()) {
-                let _ = parked.landed.push(below(flights.len() + usize::from(goal), flight.descent_m));
+                let _ = parked.after_flight.push(below(flights.len() + usize::from(goal), flight.descent_m));
             }
         }
         parked
     }
 
-    fn clears(&self, a: &Point, b: &Point, distance_m: f32) -> bool {
+    fn is_segment_clear(&self, a: &Point, b: &Point, distance_m: f32) -> bool {
         let along = b - a;
         let near = |p: &Point| {
             let share = ((p - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
             (a + along * share - p).norm_squared() < distance_m * distance_m
         };
-        !self.pads.iter().chain(&self.landed).any(near)
+        !self.before_flight.iter().chain(&self.after_flight).any(near)
     }
 }
 
 /// The vehicle that a path is for, and the nodes of its start and of its goal.
-struct Ends<'a> {
+struct PathEnds<'a> {
     vehicle: &'a VehicleTask,
     from: u16,
     to: u16,
 }
 
-impl<'a> Ends<'a> {
+impl<'a> PathEnds<'a> {
     fn new(request: &PlanRequest<'a>, index: usize, goal: u16) -> Self {
         let vehicles = request.vehicles;
         Self { vehicle: &vehicles[index], from: index as u16, to: vehicles.len() as u16 + goal }
@@ -317,14 +317,18 @@ impl<'a> Ends<'a> {
 fn find_path<const N: usize, const V: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    ends: &Ends<'_>,
-    parked: &Parked<V>,
+    ends: &PathEnds<'_>,
+    parked: &ParkedVehicles<V>,
     search: &mut SearchWorkspace<N>,
     nodes: &mut Vec<u16, W>,
 ) -> Result<f32, PlanError> {
     let passable = |from: u16, edge: &HalfEdge| {
-        view.clears(edge, ends.vehicle.required_clearance_m)
-            && parked.clears(&view.node(from), &view.node(edge.target), request.schedule.parked_separation_m)
+        view.has_clearance(edge, ends.vehicle.required_clearance_m)
+            && parked.is_segment_clear(
+                &view.node(from),
+                &view.node(edge.target),
+                request.schedule.parked_separation_m,
+            )
     };
     match search::astar(view, ends.from, ends.to, passable, search, nodes) {
         Ok(length_m) => Ok(length_m),
@@ -333,7 +337,7 @@ fn find_path<const N: usize, const V: usize, const W: usize>(
     }
 }
 
-fn path_of<const W: usize>(view: &RoadmapView<'_>, nodes: &[u16]) -> Result<Path<W>, PathError> {
+fn path_from_nodes<const W: usize>(view: &RoadmapView<'_>, nodes: &[u16]) -> Result<Path<W>, PathError> {
     let mut path = Path::new();
     for (i, &node) in nodes.iter().enumerate() {
         let edge = i.checked_sub(1).and_then(|before| view.edge_between(nodes[before], node));

@@ -15,7 +15,7 @@ pub enum Objective {
     Makespan,
 }
 
-/// How goals are given out.
+/// Rule by which goals are assigned to vehicles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Every vehicle has its goal.
@@ -44,12 +44,12 @@ pub struct PlanRequest<'a> {
     pub vehicles: &'a [VehicleTask],
     /// Height of each goal above the ground below it, metres; as many as the roadmap has goals.
     pub descents_m: &'a [f32],
-    /// How goals are given out.
+    /// Rule by which goals are assigned to vehicles.
     pub mode: Mode,
     /// Separation and nominal speeds.
     pub schedule: ScheduleConfig,
     /// Most gates of one vehicle: the least `G` that [`super::vehicle_plan`] is to be called with.
-    pub gates_most: usize,
+    pub max_gates: usize,
 }
 
 impl PlanRequest<'_> {
@@ -77,7 +77,7 @@ impl PlanRequest<'_> {
     }
 }
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanError {
     /// The roadmap has other numbers of starts or goals than the request.

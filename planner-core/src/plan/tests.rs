@@ -70,7 +70,7 @@ fn plan(
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 2048>::new());
     let mut out = SwarmPlan::new();
     let descents = std::vec![HEIGHT_M; goals];
-    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, gates_most: 1024 };
+    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: 1024 };
     plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
 }
 
@@ -114,7 +114,7 @@ proptest! {
         prop_assume!((0..20).all(|terminal| connected.contains(&terminal)));
         let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
         let plan = plan(&bytes, &tasks(10, labelled), 10, mode).unwrap();
-        prop_assert!(plan.flights.iter().all(|f| f.task.flies()));
+        prop_assert!(plan.flights.iter().all(|f| f.task.leaves_pad()));
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
         prop_assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{apart:?}");
     }
@@ -164,7 +164,7 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
         let plan = plan(&bytes, &tasks(2, true), 2, Mode::Labelled).unwrap();
         let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
         assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
-        let waits = plan.flights.iter().flat_map(|f| f.path.waypoints()).map(|w| w.leave_s - w.at_s);
+        let waits = plan.flights.iter().flat_map(|f| f.path.waypoints()).map(|w| w.leave_s - w.arrive_s);
         // It waits on its pad, and in the side room only while the other passes.
         assert!(waits.fold(0.0, f32::max) < 2.1, "side room at {side_at_m}, {depth_m} deep");
         for speeds in [[1.0, 1.0], [0.3, 2.0], [2.0, 0.3]] {
@@ -284,7 +284,7 @@ fn fits<const G: usize>(bytes: &[u8], vehicles: &[VehicleTask]) -> (bool, Result
     let mut out = SwarmPlan::<16, 64>::new();
     let descents = std::vec![HEIGHT_M; vehicles.len()];
     let mode = Mode::Labelled;
-    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, gates_most: G };
+    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: G };
     let planned = plan_swarm(&view, &request, &mut ws, &mut out);
     let mut own = VehiclePlan::<64, G>::default();
     let all =
@@ -311,7 +311,7 @@ fn flights_of_four_kilometres_are_scheduled_and_flown() {
     let (bytes, vehicles) = queue(4000.0, 3, 99.0, 1);
     let plan = plan(&bytes, &vehicles, 3, Mode::Labelled).unwrap();
     for flight in &plan.flights {
-        assert!(flight.path.length_m() > 4000.0 && flight.piece_m > schedule::MAX_TIMED_SEGMENT_M);
+        assert!(flight.path.length_m() > 4000.0 && flight.segment_m > schedule::MAX_TIMED_SEGMENT_M);
     }
     for speeds in [[10.0, 10.0, 10.0], [4.0, 10.0, 7.0]] {
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 100_000);

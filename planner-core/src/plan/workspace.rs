@@ -45,7 +45,7 @@ pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
 }
 
 impl<const N: usize, const V: usize, const P: usize> PlanWorkspace<N, V, P> {
-    /// All zeros.
+    /// Creates it empty: all zeros.
     pub const fn new() -> Self {
         Self {
             search: SearchWorkspace::new(),

@@ -8,7 +8,7 @@ pub const TRIES_PER_NODE: usize = 10_000;
 /// passages has none.
 pub const TRIES_PER_BRIDGE: usize = 1_000;
 
-/// How nodes are spread.
+/// Distribution of the random nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampling {
     /// Independent and uniform, as in the paper.
@@ -33,11 +33,11 @@ pub struct Config {
     pub clearance_m: f32,
     /// Seed of the nodes.
     pub seed: u64,
-    /// How nodes are spread.
+    /// Distribution of the random nodes.
     pub sampling: Sampling,
 }
 
-/// Why a roadmap could not be built.
+/// Reason why a roadmap could not be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PrmError {
     /// The named field is NaN, infinite, negative, or makes an empty range.
@@ -108,7 +108,7 @@ impl LengthRange {
     }
 
     #[inline(always)]
-    pub(super) fn holds(self, square: f32) -> bool {
+    pub(super) fn contains(self, square: f32) -> bool {
         square >= self.min && square <= self.max
     }
 }

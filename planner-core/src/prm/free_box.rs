@@ -30,8 +30,8 @@ struct FreeBox {
     high: [i32; 3],
 }
 
-/// The view from one node.
-pub(super) struct Sight<'g, 'a> {
+/// Line-of-sight checks from one node.
+pub(super) struct NodeVisibility<'g, 'a> {
     grid: &'g VoxelGrid<'a>,
     clearance_m: f32,
     clearance_cells: f32,
@@ -46,11 +46,11 @@ pub(super) struct Sight<'g, 'a> {
     /// `here` as the exact check takes it.
     snapped: Option<Snapped>,
     /// The box around `here` relative to it, cells; `None` where it cannot be used.
-    view: Option<View>,
+    view: Option<BoxView>,
 }
 
 #[derive(Clone, Copy)]
-struct View {
+struct BoxView {
     /// A ray that ends between these is clear. Empty if `here` itself is nearer to a face than the clearance.
     clear_low: [f32; 3],
     clear_high: [f32; 3],
@@ -61,7 +61,7 @@ struct View {
     inset: f32,
 }
 
-impl<'g, 'a> Sight<'g, 'a> {
+impl<'g, 'a> NodeVisibility<'g, 'a> {
     pub(super) fn new(grid: &'g VoxelGrid<'a>, config: &Config) -> Self {
         let resolution = grid.shape().resolution_m;
         Self {
@@ -93,7 +93,7 @@ impl<'g, 'a> Sight<'g, 'a> {
             return;
         };
         let cell = cell.map(|c| c as i32);
-        let around = match self.boxes.iter().find(|b| b.holds(cell)) {
+        let around = match self.boxes.iter().find(|b| b.contains(cell)) {
             Some(around) => *around,
             None => {
                 let Some(around) = FreeBox::grow(self.grid, cell, self.reach) else {
@@ -110,7 +110,7 @@ impl<'g, 'a> Sight<'g, 'a> {
             return;
         }
         let inset = self.clearance_cells + self.clearance_cells * 1e-6 + ROUNDING_CELLS;
-        let mut view = View {
+        let mut view = BoxView {
             clear_low: low.map(|x| x + inset),
             clear_high: high.map(|x| x - inset),
             face_low: low.map(|x| x - PROBE_DEPTH_CELLS),
@@ -126,7 +126,7 @@ impl<'g, 'a> Sight<'g, 'a> {
     /// Calls `found` with those of `places` to which the segment from here is clear, and with what it keeps from the faces
     /// of the box, metres: 0 where it leaves the box.
     #[inline(always)]
-    pub(super) fn each_clear<E, const NODES: usize, const CUBES: usize>(
+    pub(super) fn for_each_visible<E, const NODES: usize, const CUBES: usize>(
         &self,
         workspace: &Workspace<NODES, CUBES>,
         places: &[u16],
@@ -137,11 +137,12 @@ impl<'g, 'a> Sight<'g, 'a> {
             let place = usize::from(place);
             let there = workspace.point(place);
             let (clear, room) =
-                match self.view.as_ref().map_or(Judgement::Leaves(0.0), |view| self.judge(view, there)) {
-                    Judgement::Clear(room) => (true, room),
-                    Judgement::Blocked => (false, 0.0),
-                    Judgement::Leaves(known) => {
-                        (hint(place).unwrap_or_else(|| self.check(there, known)), 0.0)
+                match self.view.as_ref().map_or(RayClass::Leaves(0.0), |view| self.classify_ray(view, there))
+                {
+                    RayClass::Clear(room) => (true, room),
+                    RayClass::Blocked => (false, 0.0),
+                    RayClass::Leaves(known) => {
+                        (hint(place).unwrap_or_else(|| self.check_exactly(there, known)), 0.0)
                     }
                 };
             if clear {
@@ -153,7 +154,7 @@ impl<'g, 'a> Sight<'g, 'a> {
 
     /// The exact check of the segment from here; the share `known` of it lies in the box.
     #[inline]
-    fn check(&self, there: [f32; 3], known: f32) -> bool {
+    fn check_exactly(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
         let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else { return false };
         if self.clearance_cells >= MIN_MISSED_CELLS {
@@ -167,7 +168,7 @@ impl<'g, 'a> Sight<'g, 'a> {
 
     /// Whether the segment from here is clear, where that is certain.
     #[inline(always)]
-    fn judge(&self, view: &View, there: [f32; 3]) -> Judgement {
+    fn classify_ray(&self, view: &BoxView, there: [f32; 3]) -> RayClass {
         let d = [0, 1, 2].map(|axis| (there[axis] - self.here[axis]) * self.cells_per_m);
         let inside = (d[0] > view.clear_low[0])
             & (d[0] < view.clear_high[0])
@@ -180,7 +181,7 @@ impl<'g, 'a> Sight<'g, 'a> {
                 let (low, high) = (view.clear_low[axis], view.clear_high[axis]);
                 (d[axis].min(0.0) - low).min(high - d[axis].max(0.0))
             });
-            return Judgement::Clear(room[0].min(room[1]).min(room[2]) + view.inset);
+            return RayClass::Clear(room[0].min(room[1]).min(room[2]) + view.inset);
         }
         // A component of zero never leaves: the quotient is infinite.
         let leave = [0, 1, 2].map(|axis| {
@@ -190,13 +191,13 @@ impl<'g, 'a> Sight<'g, 'a> {
         let t = leave[0].min(leave[1]).min(leave[2]);
         let at = |t: f32| [0, 1, 2].map(|axis| self.at[axis] + d[axis] * t);
         if t < 0.999 && self.is_obstacle(at(t)) {
-            return Judgement::Blocked;
+            return RayClass::Blocked;
         }
         // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead, and as far
         // away as the clearance.
         let near = [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
-        Judgement::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
+        RayClass::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
     }
 
     /// Whether a place, in cells, is certain to lie inside an obstacle.
@@ -215,8 +216,8 @@ impl<'g, 'a> Sight<'g, 'a> {
     }
 }
 
-/// Judgement of a ray by the box alone.
-enum Judgement {
+/// Classification of a ray by the free box alone.
+enum RayClass {
     /// The ray ends inside, so many cells from the nearest face, but for rounding.
     Clear(f32),
     /// The ray meets an obstacle behind a face.
@@ -226,7 +227,7 @@ enum Judgement {
 }
 
 impl FreeBox {
-    fn holds(&self, cell: [i32; 3]) -> bool {
+    fn contains(&self, cell: [i32; 3]) -> bool {
         (0..3).all(|axis| cell[axis] >= self.low[axis] && cell[axis] < self.high[axis])
     }
 
@@ -249,7 +250,7 @@ impl FreeBox {
         let start = self.high[axis];
         let mut brick = start >> 2;
         while brick * 4 < limit {
-            let mut layers = self.layers(grid, axis, brick);
+            let mut layers = self.occupied_layers(grid, axis, brick);
             if brick == start >> 2 {
                 layers &= 0b1111 << (start & 3);
             }
@@ -266,7 +267,7 @@ impl FreeBox {
         let start = self.low[axis];
         let mut brick = (start - 1) >> 2;
         while brick >= 0 && brick * 4 + 3 >= limit {
-            let mut layers = self.layers(grid, axis, brick);
+            let mut layers = self.occupied_layers(grid, axis, brick);
             if brick == (start - 1) >> 2 {
                 layers &= 0b1111 >> (3 - ((start - 1) & 3));
             }
@@ -280,7 +281,7 @@ impl FreeBox {
 
     /// Which of the four layers of cells of brick layer `brick` along `axis` hold an obstacle within the box's extent on the
     /// other two axes.
-    fn layers(&self, grid: &VoxelGrid<'_>, axis: usize, brick: i32) -> u32 {
+    fn occupied_layers(&self, grid: &VoxelGrid<'_>, axis: usize, brick: i32) -> u32 {
         let [v, w] = [[1, 2], [0, 2], [0, 1]][axis];
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
         let strides = [1, bx, bx * by];

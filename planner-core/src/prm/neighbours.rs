@@ -59,7 +59,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
     }
 
     /// Sorts the nodes. O(nodes + cubes).
-    pub fn index(&mut self, nodes: &[Point], config: &Config) -> Result<(), PrmError> {
+    pub fn build_index(&mut self, nodes: &[Point], config: &Config) -> Result<(), PrmError> {
         config.check()?;
         self.len = 0;
         if nodes.len() > NODES {
@@ -140,7 +140,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
     /// Calls `visit` with the places after `place` whose nodes are in the range of lengths from it, up to [`CANDIDATE_LANES`] at a
     /// time.
     #[inline(always)]
-    pub(super) fn each_near<E>(
+    pub(super) fn for_each_in_range<E>(
         &self,
         place: usize,
         config: &Config,
@@ -198,13 +198,13 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         ) {
             (Some(x), Some(y), Some(z)) => {
                 for i in 0..CANDIDATE_LANES {
-                    hits |= u32::from(lengths.holds(squared_length(here, [x[i], y[i], z[i]]))) << i;
+                    hits |= u32::from(lengths.contains(squared_length(here, [x[i], y[i], z[i]]))) << i;
                 }
                 hits & ((1 << lanes) - 1)
             }
             _ => {
                 for i in 0..lanes {
-                    hits |= u32::from(lengths.holds(squared_length(here, self.point(from + i)))) << i;
+                    hits |= u32::from(lengths.contains(squared_length(here, self.point(from + i)))) << i;
                 }
                 hits
             }

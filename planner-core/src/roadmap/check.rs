@@ -45,7 +45,7 @@ impl RoadmapView<'_> {
                 if (there - here).norm_squared() == 0.0 {
                     return Err(RoadmapError::ZeroLength(node));
                 }
-                if !self.header.holds_length(&here, &there) {
+                if !self.header.is_edge_length_valid(&here, &there) {
                     return Err(RoadmapError::EdgeLength(node));
                 }
             }
@@ -64,18 +64,18 @@ impl RoadmapView<'_> {
         let nodes = 0..self.nodes.len() as u16;
         let (mut farthest, mut farthest_m) = (0, 0.0);
         for node in nodes.clone() {
-            let [way_m, _] = self.ways_to_landmarks_m(node);
+            let [way_m, _] = self.landmark_distances_m(node);
             if way_m > farthest_m {
                 (farthest, farthest_m) = (node, way_m);
             }
         }
         let landmarks = [0, farthest];
         for node in nodes {
-            let here = self.ways_to_landmarks_m(node);
+            let here = self.landmark_distances_m(node);
             let (mut sound, mut explained) = (true, [false; LANDMARKS]);
             for edge in self.half_edges(node) {
                 let length = self.distance_m(node, edge.target);
-                let there = self.ways_to_landmarks_m(edge.target);
+                let there = self.landmark_distances_m(edge.target);
                 for i in 0..LANDMARKS {
                     let reached = there[i] > 0.0 || edge.target == landmarks[i];
                     let way = there[i] + length;

@@ -25,7 +25,7 @@ impl RoadmapView<'_> {
 
     /// The lowest and the highest ground that the nodes around a place have on its storey, metres; `None` where none has any.
     /// O(nodes).
-    pub fn ground_around(&self, place: &Point) -> Option<(f32, f32)> {
+    pub fn ground_range_near(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;
         let mut nearest = [(GROUND_REACH_M * GROUND_REACH_M, None); MAX_GROUND_NODES];
         for node in 0..self.heights.len() as u16 {

@@ -148,9 +148,13 @@ fn a_vehicle_passes_where_it_fits() {
     let bytes = encode(&header(1, 1), &nodes, &edges);
     let view = RoadmapView::parse(&bytes).unwrap();
     let (wide, narrow) = (view.edge_between(0, 1).unwrap(), view.edge_between(0, 2).unwrap());
-    assert!(view.clears(&wide, 0.698) && !view.clears(&wide, 0.699) && !view.clears(&wide, f32::NAN));
+    assert!(
+        view.has_clearance(&wide, 0.698)
+            && !view.has_clearance(&wide, 0.699)
+            && !view.has_clearance(&wide, f32::NAN)
+    );
     // Tested at 0.25 m, so clear at 0.25 m whatever the stored figure.
-    assert!(view.clears(&narrow, 0.25) && !view.clears(&narrow, 0.251));
+    assert!(view.has_clearance(&narrow, 0.25) && !view.has_clearance(&narrow, 0.251));
     assert_eq!(view.edge_between(1, 2), None);
     assert_eq!(view.edge_between(7, 0), None);
     assert_eq!(view.half_edges(7).len(), 0);
@@ -219,7 +223,7 @@ fn ways_to_landmarks_are_written_and_checked() {
     // Node 0, and node 1, five metres away; from there node 2 is reached through node 0.
     let aside = 2.0f32.sqrt();
     for (node, ways) in [(0, [0.0, 5.0]), (1, [5.0, 0.0]), (2, [aside, 5.0 + aside])] {
-        assert_eq!(view.ways_to_landmarks_m(node), ways, "node {node}");
+        assert_eq!(view.landmark_distances_m(node), ways, "node {node}");
     }
     for few in 0..2 {
         let bytes = encode_with_landmarks(&header(0, 0), &nodes[..few], &[]);
@@ -266,7 +270,7 @@ fn heights_over_ground_are_written_and_checked() {
     // A file of version 1 says nothing of the ground.
     let old = with_heights(&[]).unwrap();
     let view = RoadmapView::parse(&old).unwrap();
-    assert_eq!((old[8], view.ground_m(0), view.ground_around(&Point::zeros())), (1, None, None));
+    assert_eq!((old[8], view.ground_m(0), view.ground_range_near(&Point::zeros())), (1, None, None));
 }
 
 #[test]
@@ -279,12 +283,12 @@ fn the_ground_of_a_place_is_that_of_nodes_on_its_storey() {
     let mut ws = SearchWorkspace::<4>::new();
     write_with_landmarks(&header(0, 0), &nodes, &[], &heights, &mut ws, &mut out).unwrap();
     let view = RoadmapView::parse(&out).unwrap();
-    let around = |x: f32, z: f32| view.ground_around(&Point::new(x, 0.0, z));
+    let around = |x: f32, z: f32| view.ground_range_near(&Point::new(x, 0.0, z));
     assert_eq!(around(1.0, 5.2), Some((4.0, 4.5)), "0.25 m of clearance: node 0 may be lower by 0.5 m");
     assert_eq!(around(1.0, 5.6), Some((4.5, 4.5)));
     assert_eq!(around(1.0, 2.0), Some((0.0, 0.0)));
     assert_eq!(around(1.0, 3.6), None, "between the storeys");
     assert_eq!(around(9.0, 5.0), Some((2.0, 2.0)));
     assert_eq!(around(20.0, 5.0), None);
-    assert_eq!(view.ground_around(&Point::new(f32::NAN, 0.0, 1.0)), None);
+    assert_eq!(view.ground_range_near(&Point::new(f32::NAN, 0.0, 1.0)), None);
 }

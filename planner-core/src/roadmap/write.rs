@@ -41,7 +41,7 @@ pub fn write(
     out: &mut [u8],
 ) -> Result<usize, RoadmapError> {
     let out = write_graph(header, nodes, edges, 0, out)?;
-    Ok(seal(out))
+    Ok(append_crc(out))
 }
 
 /// As [`write()`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in a building: node 0, a start
@@ -62,7 +62,7 @@ pub fn write_with_landmarks<const N: usize>(
     let columns = LANDMARKS + usize::from(!heights_m.is_empty());
     let out = write_graph(header, nodes, edges, columns, out)?;
     if nodes.is_empty() {
-        return Ok(seal(out));
+        return Ok(append_crc(out));
     }
     let body = &mut out[HEADER_LEN..];
     let heights_len = heights_m.len() * HEIGHT_LEN;
@@ -72,7 +72,7 @@ pub fn write_with_landmarks<const N: usize>(
     for (bytes, height_m) in heights.as_chunks_mut::<HEIGHT_LEN>().0.iter_mut().zip(heights_m) {
         *bytes = height_m.to_le_bytes();
     }
-    let view = RoadmapView::over(*header, 0, graph, [nodes.len(), 2 * edges.len(), 0]);
+    let view = RoadmapView::from_body(*header, 0, graph, [nodes.len(), 2 * edges.len(), 0]);
     let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
     let mut landmark = 0;
     for column in 0..LANDMARKS {
@@ -92,10 +92,10 @@ pub fn write_with_landmarks<const N: usize>(
     }
     // An edge too short to lengthen a way leaves what no reader can check.
     let body = &out[HEADER_LEN..out.len() - WORD_LEN];
-    let view = RoadmapView::over(*header, 0, body, [nodes.len(), 2 * edges.len(), LANDMARKS]);
+    let view = RoadmapView::from_body(*header, 0, body, [nodes.len(), 2 * edges.len(), LANDMARKS]);
     view.check_landmarks()?;
     view.check_heights()?;
-    Ok(seal(out))
+    Ok(append_crc(out))
 }
 
 /// Everything but the `columns` of numbers and the CRC; the bytes of the whole roadmap are returned.
@@ -128,7 +128,7 @@ fn write_graph<'a>(
 }
 
 /// Closes the roadmap with its CRC; its length.
-fn seal(out: &mut [u8]) -> usize {
+fn append_crc(out: &mut [u8]) -> usize {
     let (body, crc) = out.split_at_mut(out.len() - WORD_LEN);
     crc.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
     out.len()
@@ -157,7 +157,7 @@ fn check_edges(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Resul
         if (b - a).norm_squared() == 0.0 {
             return Err(RoadmapError::ZeroLength(edge.a));
         }
-        if !header.holds_length(a, b) {
+        if !header.is_edge_length_valid(a, b) {
             return Err(RoadmapError::EdgeLength(edge.a));
         }
     }

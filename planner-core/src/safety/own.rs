@@ -8,7 +8,7 @@
 use heapless::Vec;
 use libm::sqrtf;
 
-use super::{MAX_SET_POINTS, Set};
+use super::{MAX_SET_POINTS, ReachableSet};
 use crate::Point;
 use crate::geometry::{point_distance_sq, segments_distance_sq};
 
@@ -24,7 +24,7 @@ const MAX_LEGS_WITHOUT_BOUND: usize = 2;
 
 /// No less than the square root, and at most 7 % more: half the exponent, and the line between two powers of four.
 #[inline]
-fn root_above(square: f32) -> f32 {
+fn sqrt_upper_bound(square: f32) -> f32 {
     f32::from_bits((square.to_bits() >> 1) + (127 << 22))
 }
 
@@ -41,7 +41,7 @@ impl Leg {
     #[inline]
     fn new(from: &Point, to: &Point) -> Self {
         let half = (to - from) * 0.5;
-        Self { from: *from, to: *to, middle: from + half, half_m: root_above(half.norm_squared()) }
+        Self { from: *from, to: *to, middle: from + half, half_m: sqrt_upper_bound(half.norm_squared()) }
     }
 
     /// Whether two cannot come nearer than `apart_m`.
@@ -55,12 +55,12 @@ impl Leg {
 /// The own set.
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
-    set: &'a Set,
+    set: &'a ReachableSet,
     legs: Vec<Leg, MAX_SET_POINTS>,
     /// Reach of the set from its first point, metres.
     reach_m: f32,
     /// Greatest distance of the set from the line between its first point and its last, metres.
-    beside_m: f32,
+    lateral_extent_m: f32,
     /// Middle and size of the box around it.
     middle: Point,
     size: Point,
@@ -68,14 +68,14 @@ pub struct OwnSet<'a> {
 
 impl<'a> OwnSet<'a> {
     /// The set that a vehicle can no longer avoid.
-    pub fn new(set: &'a Set) -> Self {
+    pub fn new(set: &'a ReachableSet) -> Self {
         let (first, _) = set.ends();
         // Filled in place: a board takes long to copy it.
         let mut own = Self {
             set,
             legs: Vec::new(),
             reach_m: set.reach_m(),
-            beside_m: 0.0,
+            lateral_extent_m: 0.0,
             middle: *first,
             size: *first,
         };
@@ -86,7 +86,7 @@ impl<'a> OwnSet<'a> {
             .skip(usize::from(double))
             .for_each(|(from, to)| own.add(from, to, &mut low, &mut high));
         if own.legs.len() > MAX_LEGS_WITHOUT_BOUND {
-            own.beside_m = own.lies_beside_m();
+            own.lateral_extent_m = own.lateral_extent_m();
         }
         (own.middle, own.size) = ((low + high) * 0.5, high - low);
         own
@@ -96,14 +96,16 @@ impl<'a> OwnSet<'a> {
     fn add(&mut self, from: &Point, to: &Point, low: &mut Point, high: &mut Point) {
         // Cannot overflow: as many legs as points at most.
         let _ = self.legs.push(Leg::new(from, to));
-        (*low, *high) = (each(low, to, |a, b| a < b), each(high, to, |a, b| a > b));
+        (*low, *high) = (merge_coordinates(low, to, |a, b| a < b), merge_coordinates(high, to, |a, b| a > b));
     }
 
     /// No less than what its points lie beside the line between its ends, metres.
     #[inline(never)]
-    fn lies_beside_m(&self) -> f32 {
+    fn lateral_extent_m(&self) -> f32 {
         let beside_sq = |leg: &Leg| point_distance_sq(self.set.ends(), &leg.to);
-        root_above(self.legs.iter().map(beside_sq).fold(0.0, |most, sq| if sq > most { sq } else { most }))
+        sqrt_upper_bound(
+            self.legs.iter().map(beside_sq).fold(0.0, |most, sq| if sq > most { sq } else { most }),
+        )
     }
 
     /// Greatest distance of the set from its first point, metres.
@@ -124,7 +126,7 @@ impl<'a> OwnSet<'a> {
     }
 
     /// Square of the least distance to another set's line, or `most_m` squared if it is not less.
-    fn least_sq(&self, other: &Set, most_m: f32) -> f32 {
+    fn min_distance_sq(&self, other: &ReachableSet, most_m: f32) -> f32 {
         let wide_m = most_m + BOUNDS_ROUNDING_M;
         let mut least_sq = most_m * most_m;
         for (from, to) in other.segments() {
@@ -132,7 +134,7 @@ impl<'a> OwnSet<'a> {
                 continue;
             }
             if self.legs.len() > MAX_LEGS_WITHOUT_BOUND {
-                let line_m = wide_m + self.beside_m;
+                let line_m = wide_m + self.lateral_extent_m;
                 if segments_distance_sq((from, to), self.set.ends()) >= line_m * line_m {
                     continue;
                 }
@@ -150,17 +152,17 @@ impl<'a> OwnSet<'a> {
 
     /// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place` now, and nearer than the
     /// vehicle is already.
-    pub fn conflicts(&self, other: &Set, place: &Point, apart_m: f32) -> bool {
-        let most_m = apart_m + other.grow_m + self.set.grow_m;
+    pub fn conflicts(&self, other: &ReachableSet, place: &Point, apart_m: f32) -> bool {
+        let most_m = apart_m + other.widened_by_m + self.set.widened_by_m;
         let most_sq = most_m * most_m;
-        let motion_sq = self.least_sq(other, most_m);
+        let motion_sq = self.min_distance_sq(other, most_m);
         motion_sq < most_sq && self.comes_nearer(motion_sq, other, place, most_m)
     }
 
     /// Whether a motion that comes too near comes nearer than the vehicle is.
     #[inline(never)]
-    fn comes_nearer(&self, motion_sq: f32, other: &Set, place: &Point, most_m: f32) -> bool {
-        if self.set.grow_m > 0.0 {
+    fn comes_nearer(&self, motion_sq: f32, other: &ReachableSet, place: &Point, most_m: f32) -> bool {
+        if self.set.widened_by_m > 0.0 {
             return true;
         }
         let here = &self.set.points[0];
@@ -176,7 +178,7 @@ impl<'a> OwnSet<'a> {
 
 /// Square of the least distance from a set's line to a place, or `most_sq` if it is not less.
 #[inline(never)]
-fn distance_sq(set: &Set, place: &Point, most_sq: f32) -> f32 {
+fn distance_sq(set: &ReachableSet, place: &Point, most_sq: f32) -> f32 {
     let nearer = |least: f32, leg| {
         let apart_sq = point_distance_sq(leg, place);
         if apart_sq < least { apart_sq } else { least }
@@ -194,7 +196,7 @@ fn is_nearer(least_sq: f32, than_sq: f32) -> bool {
 /// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about numbers that are none takes a
 /// board three times as long.
 #[inline]
-fn each(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
+fn merge_coordinates(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
     let of = |a: f32, b: f32| if more(b, a) { b } else { a };
     Point::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
 }

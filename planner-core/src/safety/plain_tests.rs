@@ -26,25 +26,25 @@ fn one_of<T: Copy>(rng: &mut Pcg32, of: &[T]) -> T {
 }
 
 /// Square of the least distance between two sets' lines, at most `most_sq`.
-fn least_sq(a: &Set, b: &Set, most_sq: f32) -> f32 {
+fn least_sq(a: &ReachableSet, b: &ReachableSet, most_sq: f32) -> f32 {
     let pairs = a.segments().flat_map(|p| b.segments().map(move |q| segments_distance_sq(q, p)));
     pairs.fold(most_sq, f32::min)
 }
 
 /// Whether two sets conflict, by the definition.
-fn conflict(own: &Set, other: &Set, place: &Point, apart_m: f32) -> bool {
-    let here = Set::at(own.points[0]);
-    let most_m = apart_m + other.grow_m + own.grow_m;
+fn conflict(own: &ReachableSet, other: &ReachableSet, place: &Point, apart_m: f32) -> bool {
+    let here = ReachableSet::at(own.points[0]);
+    let most_m = apart_m + other.widened_by_m + own.widened_by_m;
     let most_sq = most_m * most_m;
     let motion_sq = least_sq(own, other, most_sq);
     if motion_sq >= most_sq {
         return false;
     }
     let now_m = least_sq(&here, other, most_sq).sqrt();
-    if own.grow_m > 0.0 || motion_sq.sqrt() < now_m - NEARER_M {
+    if own.widened_by_m > 0.0 || motion_sq.sqrt() < now_m - NEARER_M {
         return true;
     }
-    let least_m = least_sq(&Set::at(*place), own, f32::INFINITY).sqrt();
+    let least_m = least_sq(&ReachableSet::at(*place), own, f32::INFINITY).sqrt();
     least_m < (own.points[0] - place).norm_squared().sqrt().min(2.0 * most_m) - NEARER_M
 }
 
@@ -69,16 +69,16 @@ fn way(rng: &mut Pcg32, from: Point, most: u32) -> StdVec<Point> {
     points
 }
 
-fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Heard<'a> {
+fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> NeighbourMotion<'a> {
     let velocity = near(rng, 2.0);
-    Heard {
+    NeighbourMotion {
         position,
         velocity,
         speed_mps: velocity.norm(),
         age_s: uniform(rng, 0.0, 1.2),
         delay_s: uniform(rng, 0.0, 0.5),
         points,
-        joint: Joint::Unknown,
+        place_on_points: PlaceOnPoints::Unknown,
         extent_m: points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max),
         rests_within_m: one_of(rng, &[0.0, 0.0, 6.0]),
         grounded: rng.next_u32().is_multiple_of(16),
@@ -88,7 +88,7 @@ fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Heard<'a>
 
 #[test]
 fn a_prepared_set_conflicts_where_the_definition_says() {
-    let bounds = Bounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
+    let bounds = MotionBounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
     let (mut meets, mut passes, mut far) = (0, 0, 0);
     for seed in 0..if cfg!(debug_assertions) { 20_000 } else { 400_000 } {
         let rng = &mut Pcg32::seed_from_u64(seed);
@@ -96,9 +96,9 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
         let here = near(rng, around_m);
         let ahead = way(rng, here, 12);
         let set = match rng.next_u32() % 8 {
-            0 => Set::vertical(here, here.z + uniform(rng, -30.0, 30.0)),
-            1 => Set::at(here),
-            _ => Set::along(here, ahead.iter().copied(), uniform(rng, 0.0, 15.0)),
+            0 => ReachableSet::vertical(here, here.z + uniform(rng, -30.0, 30.0)),
+            1 => ReachableSet::at(here),
+            _ => ReachableSet::along(here, ahead.iter().copied(), uniform(rng, 0.0, 15.0)),
         };
         let own = OwnSet::new(&set);
         let away_m = one_of(rng, &[2.0, 8.0, 20.0]);
@@ -108,10 +108,10 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
         let points = way(rng, from, 8);
         let heard = heard(rng, position, &points);
         let ahead_s = one_of(rng, &[0.0, 3.0]);
-        let other = heard.set(&bounds, ahead_s);
-        let joint = Joint::find(&position, &points);
+        let other = heard.reachable_set(&bounds, ahead_s);
+        let joint = PlaceOnPoints::find(&position, &points);
         assert_eq!(
-            Heard { joint, ..heard }.set(&bounds, ahead_s),
+            NeighbourMotion { place_on_points: joint, ..heard }.reachable_set(&bounds, ahead_s),
             other,
             "{seed}: what is remembered is the same"
         );
@@ -123,7 +123,7 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
             conflict(&set, &other, &position, apart_m),
             "{seed}: {set:?}, {other:?}, {apart_m} m"
         );
-        let most_m = apart_m + other.grow_m + set.grow_m;
+        let most_m = apart_m + other.widened_by_m + set.widened_by_m;
         let most_sq = most_m * most_m;
         match (conflicts, least_sq(&set, &other, most_sq) < most_sq) {
             (true, _) => meets += 1,
@@ -156,7 +156,7 @@ fn the_nearest_place_is_among_the_remembered_ones() {
         let position = near(rng, 100.0);
         let from = position + near(rng, 1.0);
         let points = way(rng, from, 8);
-        let joint = Joint::find(&position, &points);
+        let joint = PlaceOnPoints::find(&position, &points);
         let places = places(&points);
         let away_m = |p: &Point| (position - p).norm();
         let least_m = places.iter().map(|(_, p)| away_m(p)).fold(f32::INFINITY, f32::min);
@@ -168,11 +168,11 @@ fn the_nearest_place_is_among_the_remembered_ones() {
         let on_m = |p: &Point| (first - p).norm();
         let at_m = places.iter().filter(|(_, p)| on_m(p) < 0.02).map(|(at_m, _)| *at_m);
         let at_m = at_m.fold(f32::INFINITY, f32::min);
-        let remembered = at_m - 0.05..at_m + joint.more_m() + 0.05;
+        let remembered = at_m - 0.05..at_m + joint.flown_beyond_m() + 0.05;
         let within = places.iter().filter(|(at_m, _)| remembered.contains(at_m));
         let within_m = within.map(|(_, p)| away_m(p)).fold(f32::INFINITY, f32::min);
         assert!(within_m < least_m + 0.06, "{seed}: {within_m} instead of {least_m}, {joint:?}");
-        (on, back) = (on + 1, back + u32::from(joint.more_m() > 0.0));
+        (on, back) = (on + 1, back + u32::from(joint.flown_beyond_m() > 0.0));
     }
     std::println!("{on} on their points, {back} on some that come back");
     assert!(on > 2000 && back > 200, "{on} {back}");
@@ -181,7 +181,7 @@ fn the_nearest_place_is_among_the_remembered_ones() {
 /// Points may lead past a vehicle again, or straight back: wherever on them it truly is, it stays in its set.
 #[test]
 fn a_vehicle_stays_in_its_set_where_points_lead_back() {
-    let bounds = Bounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
+    let bounds = MotionBounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
     let mut back = 0;
     for seed in 0..if cfg!(debug_assertions) { 500 } else { 20_000 } {
         let rng = &mut Pcg32::seed_from_u64(seed);
@@ -203,7 +203,7 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
         let (truly_m, truly) = places[rng.next_u32() as usize % places.len()];
         let position = truly + near(rng, stray_m / 2.0);
         let speed_mps = uniform(rng, 0.0, 2.0);
-        let heard = Heard {
+        let heard = NeighbourMotion {
             velocity: Point::new(speed_mps, 0.0, 0.0),
             speed_mps,
             age_s: uniform(rng, 0.0, 0.9),
@@ -212,14 +212,14 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
             column_to_m: None,
             ..heard(rng, position, &points)
         };
-        let set = heard.set(&bounds, 0.0);
+        let set = heard.reachable_set(&bounds, 0.0);
         let flown_m = speed_mps * heard.age_s + BRAKING.stop_m(speed_mps);
         let may_be = |at_m: f32| at_m >= truly_m && at_m <= truly_m + flown_m;
         for (_, place) in places.iter().filter(|(at_m, _)| may_be(*at_m)).step_by(7) {
-            let away_m = least_sq(&Set::at(*place), &set, f32::INFINITY).sqrt();
+            let away_m = least_sq(&ReachableSet::at(*place), &set, f32::INFINITY).sqrt();
             assert!(away_m < 2.0 * stray_m + 0.1, "{seed}: {away_m} m from its set, {stray_m}");
         }
-        back += u32::from(Joint::find(&position, &points).more_m() > 0.0);
+        back += u32::from(PlaceOnPoints::find(&position, &points).flown_beyond_m() > 0.0);
     }
     std::println!("{back} of points that come back");
     assert!(back > 100, "{back}");

@@ -7,7 +7,7 @@ use std::vec::Vec as StdVec;
 use super::*;
 
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-const BOUNDS: Bounds = Bounds { braking: BRAKING, speed_max_mps: 2.0, silent_s: 3.0 };
+const BOUNDS: MotionBounds = MotionBounds { braking: BRAKING, speed_max_mps: 2.0, silent_s: 3.0 };
 const APART_M: f32 = 1.5;
 
 fn point() -> impl Strategy<Value = Point> {
@@ -19,7 +19,7 @@ fn points(most: usize) -> impl Strategy<Value = StdVec<Point>> {
 }
 
 /// Places of a set, 2 cm apart.
-fn places(set: &Set) -> StdVec<Point> {
+fn places(set: &ReachableSet) -> StdVec<Point> {
     let mut places = StdVec::new();
     for (a, b) in set.segments() {
         let steps = ((b - a).norm() / 0.02) as usize + 1;
@@ -39,8 +39,8 @@ proptest! {
     fn sets_conflict_where_their_places_do(
         own in points(5), other in points(5), length_m in 0.0_f32..6.0, grow_m in 0.0_f32..2.0, floor in -3.0_f32..6.0,
     ) {
-        let own = Set::along(own[0], own[1..].iter().copied(), length_m);
-        let mut other = Set { grow_m, ..Set::along(other[0], other[1..].iter().copied(), length_m) };
+        let own = ReachableSet::along(own[0], own[1..].iter().copied(), length_m);
+        let mut other = ReachableSet { widened_by_m: grow_m, ..ReachableSet::along(other[0], other[1..].iter().copied(), length_m) };
         other.add_column((floor > 0.0).then_some(floor));
         let (here, there) = (places(&own), places(&other));
         let motion_m = least(&here, &there) - grow_m;
@@ -64,23 +64,23 @@ proptest! {
         path in points(8), speed_mps in 0.0_f32..2.0, age_s in 0.0_f32..0.99, goes_on_s in 0.0_f32..0.1,
     ) {
         prop_assume!(path.len() > 1);
-        let heard = Heard {
+        let heard = NeighbourMotion {
             position: path[0],
             velocity: (path[1] - path[0]).normalize() * speed_mps,
             speed_mps,
             age_s,
             delay_s: 0.0,
             points: &path,
-            joint: Joint::Unknown,
+            place_on_points: PlaceOnPoints::Unknown,
             extent_m: extent_m(&path),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
         };
-        let there = places(&heard.set(&BOUNDS, 0.0));
+        let there = places(&heard.reachable_set(&BOUNDS, 0.0));
         // It flew on, and stops after the reaction.
         let flown_m = speed_mps * (age_s + goes_on_s) + BRAKING.stop_m(speed_mps);
-        let set = Set::along(path[0], path.iter().copied(), flown_m);
+        let set = ReachableSet::along(path[0], path.iter().copied(), flown_m);
         for place in places(&set) {
             prop_assert!(least(&[place], &there) < 0.03);
             let reach_m = heard.reach_m(&BOUNDS, 0.0);
@@ -95,20 +95,20 @@ proptest! {
     ) {
         let way = Point::new(east, north, 0.2).normalize();
         let position = path[0] + way * by_m;
-        let heard = Heard {
+        let heard = NeighbourMotion {
             position,
             velocity: way * speed_mps,
             speed_mps,
             age_s,
             delay_s: 0.2,
             points: &path,
-            joint: Joint::Unknown,
+            place_on_points: PlaceOnPoints::Unknown,
             extent_m: extent_m(&path),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
         };
-        let set = heard.set(&BOUNDS, ahead_s);
+        let set = heard.reachable_set(&BOUNDS, ahead_s);
         prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
     }
 }
@@ -146,11 +146,11 @@ impl Flier {
         (*self.path.last().unwrap(), self.path.len(), Point::zeros())
     }
 
-    fn set(&self) -> Set {
+    fn set(&self) -> ReachableSet {
         let (place, next, _) = self.at(self.along_m);
         let length_m = self.speed_mps * REACTION_S + BRAKING.stop_m(self.speed_mps) + 0.1;
         let ahead = core::iter::once(place).chain(self.path[next.min(self.path.len())..].iter().copied());
-        Set::along(place, ahead, length_m)
+        ReachableSet::along(place, ahead, length_m)
     }
 
     fn step(&mut self, stop: bool, dt_s: f32) {
@@ -198,20 +198,24 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
             let stop = [0, 1].map(|i| {
                 let other = &fliers[1 - i];
                 let (position, velocity, at_s, from) = other.reported;
-                let heard = Heard {
+                let heard = NeighbourMotion {
                     position,
                     velocity,
                     speed_mps: velocity.norm(),
                     age_s: now_s - at_s,
                     delay_s: 0.0,
                     points: &other.path[from..],
-                    joint: Joint::Unknown,
+                    place_on_points: PlaceOnPoints::Unknown,
                     extent_m: extent_m(&other.path[from..]),
                     rests_within_m: 0.0,
                     grounded: false,
                     column_to_m: None,
                 };
-                OwnSet::new(&fliers[i].set()).conflicts(&heard.set(&BOUNDS, 0.0), &position, APART_M)
+                OwnSet::new(&fliers[i].set()).conflicts(
+                    &heard.reachable_set(&BOUNDS, 0.0),
+                    &position,
+                    APART_M,
+                )
             });
             for (flier, stop) in fliers.iter_mut().zip(stop) {
                 flier.step(stop, 0.05);

@@ -8,7 +8,7 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use super::config::ScheduleConfig;
-use super::pieces::{MAX_TIMED_SEGMENTS, Piece};
+use super::pieces::{MAX_TIMED_SEGMENTS, TimedSegment};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
@@ -32,37 +32,38 @@ const _: () = assert!(
     "a bit for each block"
 );
 
-/// Some timed segments in a row.
+/// A block of consecutive timed segments, with its bounding volumes.
 #[derive(Clone, Copy, Debug)]
 struct Block {
-    around: Extent,
+    bounding_box: BoundingBox,
     /// Line from the beginning of the first segment to the end of the last.
     line: (Point, Point),
     /// Greatest distance of the other segments beside that line, metres.
-    beside_m: f32,
+    lateral_extent_m: f32,
 }
 
 impl Block {
-    fn of(pieces: &[Piece]) -> Self {
+    fn around_segments(pieces: &[TimedSegment]) -> Self {
         let from = pieces[0].from;
-        let mut block = Self { around: Extent(from, from), line: (from, from), beside_m: 0.0 };
+        let mut block =
+            Self { bounding_box: BoundingBox(from, from), line: (from, from), lateral_extent_m: 0.0 };
         for piece in pieces {
-            block.around.with(&piece.to, &piece.to);
+            block.bounding_box.include(&piece.to, &piece.to);
             block.line.1 = piece.to;
         }
         block
     }
 
     /// The block with the greatest distance of its segments from its line.
-    fn with_line(mut self, pieces: &[Piece]) -> Self {
+    fn with_line(mut self, pieces: &[TimedSegment]) -> Self {
         let beside =
-            |piece: &Piece| segments_distance_sq((&self.line.0, &self.line.1), (&piece.to, &piece.to));
-        self.beside_m = libm::sqrtf(pieces.iter().map(beside).fold(0.0, fmaxf));
+            |piece: &TimedSegment| segments_distance_sq((&self.line.0, &self.line.1), (&piece.to, &piece.to));
+        self.lateral_extent_m = libm::sqrtf(pieces.iter().map(beside).fold(0.0, fmaxf));
         self
     }
 
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
-        let apart_m = reach_m + self.beside_m + other.beside_m;
+        let apart_m = reach_m + self.lateral_extent_m + other.lateral_extent_m;
         let (own, theirs) = (&self.line, &other.line);
         segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
     }
@@ -70,17 +71,17 @@ impl Block {
 
 /// A box: its lowest and its highest corner.
 #[derive(Clone, Copy, Debug)]
-struct Extent(Point, Point);
+struct BoundingBox(Point, Point);
 
-impl Extent {
-    fn with(&mut self, low: &Point, high: &Point) {
+impl BoundingBox {
+    fn include(&mut self, low: &Point, high: &Point) {
         for axis in 0..3 {
             self.0[axis] = fminf(self.0[axis], low[axis]);
             self.1[axis] = fmaxf(self.1[axis], high[axis]);
         }
     }
 
-    fn meets(&self, other: &Self, reach_m: f32) -> bool {
+    fn is_within(&self, other: &Self, reach_m: f32) -> bool {
         (0..3).all(|axis| self.0[axis] - other.1[axis] <= reach_m && other.0[axis] - self.1[axis] <= reach_m)
     }
 }
@@ -89,7 +90,7 @@ impl Extent {
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<Block, MAX_BLOCKS>,
-    groups: Vec<Extent, MAX_GROUPS>,
+    groups: Vec<BoundingBox, MAX_GROUPS>,
 }
 
 impl Blocks {
@@ -97,17 +98,17 @@ impl Blocks {
         Self { blocks: Vec::new(), groups: Vec::new() }
     }
 
-    /// Makes those of a flight.
-    pub(super) fn of(&mut self, pieces: &[Piece]) {
+    /// Rebuilds the blocks from the timed segments of a flight.
+    pub(super) fn rebuild(&mut self, pieces: &[TimedSegment]) {
         self.blocks.clear();
         // Cannot overflow: there are no more pieces than blocks have room for.
         pieces
             .chunks(SEGMENTS_PER_BLOCK)
-            .for_each(|some| _ = self.blocks.push(Block::of(some).with_line(some)));
+            .for_each(|some| _ = self.blocks.push(Block::around_segments(some).with_line(some)));
         self.groups.clear();
         for blocks in self.blocks.chunks(BLOCKS_PER_GROUP) {
-            let mut around = blocks[0].around;
-            blocks[1..].iter().for_each(|block| around.with(&block.around.0, &block.around.1));
+            let mut around = blocks[0].bounding_box;
+            blocks[1..].iter().for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
             // Cannot overflow either.
             let _ = self.groups.push(around);
         }
@@ -124,34 +125,34 @@ impl Blocks {
             waypoints.last().map(|last| down(last, flight.descent_m)),
         ];
         let legs = waypoints.windows(2).map(|leg| (leg[0].position, leg[1].position));
-        !ends.into_iter().flatten().chain(legs).any(|(from, to)| self.meet(cfg, &from, &to))
+        !ends.into_iter().flatten().chain(legs).any(|(from, to)| self.is_near_leg(cfg, &from, &to))
     }
 
     /// Whether a leg meets the box of any group.
     #[inline(never)]
-    fn meet(&self, cfg: &ScheduleConfig, from: &Point, to: &Point) -> bool {
-        let mut leg = Extent(*from, *from);
-        leg.with(to, to);
-        self.groups.iter().any(|group| group.meets(&leg, reach_m(cfg)))
+    fn is_near_leg(&self, cfg: &ScheduleConfig, from: &Point, to: &Point) -> bool {
+        let mut leg = BoundingBox(*from, *from);
+        leg.include(to, to);
+        self.groups.iter().any(|group| group.is_within(&leg, conflict_distance_m(cfg)))
     }
 
     /// The blocks that may come too near to these segments of another flight, which are at most [`SEGMENTS_PER_BLOCK`] in a row.
     #[inline(never)]
-    pub(super) fn near(&self, cfg: &ScheduleConfig, pieces: &[Piece]) -> Bits {
+    pub(super) fn blocks_near(&self, cfg: &ScheduleConfig, pieces: &[TimedSegment]) -> Bits {
         if pieces.is_empty() {
             return 0;
         }
-        let reach_m = reach_m(cfg);
-        let mut other = Block::of(pieces);
+        let reach_m = conflict_distance_m(cfg);
+        let mut other = Block::around_segments(pieces);
         let (mut near, mut has_line) = (0, false);
         for (group, (around, blocks)) in
             self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
         {
-            if !around.meets(&other.around, reach_m) {
+            if !around.is_within(&other.bounding_box, reach_m) {
                 continue;
             }
             for (bit, own) in blocks.iter().enumerate() {
-                if !own.around.meets(&other.around, reach_m) {
+                if !own.bounding_box.is_within(&other.bounding_box, reach_m) {
                     continue;
                 }
                 if !has_line {
@@ -167,12 +168,12 @@ impl Blocks {
 }
 
 /// Distance from which on two segments are in no conflict, metres.
-fn reach_m(cfg: &ScheduleConfig) -> f32 {
+fn conflict_distance_m(cfg: &ScheduleConfig) -> f32 {
     fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M
 }
 
-/// Which bits are set, in order.
-pub(super) fn ones(mut bits: Bits) -> impl Iterator<Item = usize> {
+/// Indices of the set bits, in rising order.
+pub(super) fn set_bit_indices(mut bits: Bits) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
@@ -181,8 +182,8 @@ pub(super) fn ones(mut bits: Bits) -> impl Iterator<Item = usize> {
 }
 
 /// The segments of these blocks, in order.
-pub(super) fn pieces_of(near: Bits, pieces: &[Piece]) -> impl Iterator<Item = &Piece> {
-    ones(near).flat_map(|block| pieces.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
+pub(super) fn segments_in_blocks(near: Bits, pieces: &[TimedSegment]) -> impl Iterator<Item = &TimedSegment> {
+    set_bit_indices(near).flat_map(|block| pieces.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -193,7 +194,7 @@ mod tests {
 
     use super::*;
     use crate::flight::{Path, Task};
-    use crate::schedule::pieces::{conflict, cut};
+    use crate::schedule::pieces::{cut_into_segments, is_conflict};
     use proptest::prelude::*;
 
     const CFG: ScheduleConfig =
@@ -203,7 +204,7 @@ mod tests {
     type Steps = ((f32, f32), List<(f32, f32, f32, bool)>);
 
     /// A flight of steps from a place, some of which are holds and some go straight on.
-    fn flight((from, steps): &Steps) -> List<Piece> {
+    fn flight((from, steps): &Steps) -> List<TimedSegment> {
         let mut at = Point::new(from.0, from.1, 1.0);
         let mut way = Point::zeros();
         let mut along_m = 0.0;
@@ -212,7 +213,7 @@ mod tests {
             let (from, from_m) = (at, along_m);
             at += way;
             along_m += way.norm();
-            Piece { from, to: at, from_m, to_m: along_m, from_s: 0.0, to_s: 1.0, parked: false }
+            TimedSegment { from, to: at, from_m, to_m: along_m, from_s: 0.0, to_s: 1.0, parked: false }
         };
         steps.iter().map(piece).collect()
     }
@@ -230,15 +231,15 @@ mod tests {
             other.0 = (own.0.0 + apart.0, own.0.1 + apart.1);
             let (own, other) = (flight(&own), flight(&other));
             let mut blocks = Blocks::new();
-            blocks.of(&own);
-            let all = |own: &mut dyn Iterator<Item = &Piece>, q: &Piece| -> List<f32> {
-                own.filter(|p| conflict(&CFG, p, q)).map(|p| p.from_m).collect()
+            blocks.rebuild(&own);
+            let all = |own: &mut dyn Iterator<Item = &TimedSegment>, q: &TimedSegment| -> List<f32> {
+                own.filter(|p| is_conflict(&CFG, p, q)).map(|p| p.from_m).collect()
             };
             for some in other.chunks(SEGMENTS_PER_BLOCK) {
-                let near = blocks.near(&CFG, some);
+                let near = blocks.blocks_near(&CFG, some);
                 for q in some {
                     let expected = all(&mut own.iter(), q);
-                    prop_assert_eq!(all(&mut pieces_of(near, &own), q), expected);
+                    prop_assert_eq!(all(&mut segments_in_blocks(near, &own), q), expected);
                 }
             }
         }
@@ -247,7 +248,7 @@ mod tests {
     fn whole(points: &[(f32, f32, f32)], descent_m: f32) -> Flight<8> {
         let mut path = Path::new();
         points.iter().for_each(|(x, y, z)| path.push(Point::new(*x, *y, *z), 1.0).unwrap());
-        path.label(1.5, CFG.cruise_mps);
+        path.label_times(1.5, CFG.cruise_mps);
         let mut flight = Flight {
             id: 1,
             task: Task::Goto(0),
@@ -255,9 +256,9 @@ mod tests {
             climb_m: 1.5,
             descent_m,
             depart_s: 0.0,
-            piece_m: crate::schedule::MAX_TIMED_SEGMENT_M,
+            segment_m: crate::schedule::MAX_TIMED_SEGMENT_M,
         };
-        flight.fit_pieces();
+        flight.fit_segment_length();
         flight
     }
 
@@ -278,12 +279,12 @@ mod tests {
             other.iter_mut().for_each(|point| (point.0, point.1) = (point.0 + apart.0, point.1 + apart.1));
             let (own, other) = (whole(&own, 1.5), whole(&other, descent_m));
             let (mut own_pieces, mut other_pieces) = (Vec::new(), Vec::new());
-            cut(&CFG, &own, &mut own_pieces).unwrap();
-            cut(&CFG, &other, &mut other_pieces).unwrap();
+            cut_into_segments(&CFG, &own, &mut own_pieces).unwrap();
+            cut_into_segments(&CFG, &other, &mut other_pieces).unwrap();
             let mut blocks = Blocks::new();
-            blocks.of(&own_pieces);
+            blocks.rebuild(&own_pieces);
             let far = blocks.are_far_from(&CFG, &other);
-            let meet = other_pieces.iter().any(|q| own_pieces.iter().any(|p| conflict(&CFG, p, q)));
+            let meet = other_pieces.iter().any(|q| own_pieces.iter().any(|p| is_conflict(&CFG, p, q)));
             prop_assert!(!(far && meet));
         }
     }

@@ -5,7 +5,7 @@ use crate::{ConfigError, all_positive};
 /// Tunables of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduleConfig {
-    /// Distance kept between the paths of two vehicles that move: the safety distance and what both stray from their
+    /// Distance kept between the paths of two vehicles that move: the safety distance and what both deviate from their
     /// paths, metres.
     pub separation_m: f32,
     /// Distance kept from a vehicle that stands on the ground, metres.
@@ -28,7 +28,7 @@ impl ScheduleConfig {
     }
 }
 
-/// Why a schedule could not be made.
+/// Reason why a schedule could not be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
     /// A flight has more than [`PIECES`](super::MAX_TIMED_SEGMENTS) timed segments.

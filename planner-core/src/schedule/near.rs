@@ -5,7 +5,7 @@
 
 use libm::{fmaxf, fminf};
 
-use super::pieces::Piece;
+use super::pieces::TimedSegment;
 use crate::sort;
 
 /// Cells along one side of the grid.
@@ -15,7 +15,7 @@ const MIN_CELL_M: f32 = 0.5;
 
 /// Pieces by the cell of their middle, seen from above.
 #[derive(Clone, Debug)]
-pub(super) struct Cells {
+pub(super) struct SegmentGrid {
     min: [f32; 2],
     cell_m: f32,
     /// Half of the longest piece, metres.
@@ -24,14 +24,14 @@ pub(super) struct Cells {
     starts: [u16; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
 }
 
-impl Cells {
+impl SegmentGrid {
     pub(super) const fn new() -> Self {
-        // All zero; `sort` sets the size before a piece is looked for.
+        // All zero; `sort_into_cells` sets the size before a piece is looked for.
         Self { min: [0.0; 2], cell_m: 0.0, half_m: 0.0, starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1] }
     }
 
     /// Sorts `pieces`, at most `u16::MAX` of them, into cells.
-    pub(super) fn sort(&mut self, pieces: &mut [Piece]) {
+    pub(super) fn sort_into_cells(&mut self, pieces: &mut [TimedSegment]) {
         let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         self.half_m = 0.0;
         for piece in &*pieces {
@@ -43,16 +43,16 @@ impl Cells {
         }
         let extent_m = fmaxf(max[0] - min[0], max[1] - min[1]);
         (self.min, self.cell_m) = (min, fmaxf(extent_m / CELLS_PER_SIDE as f32, MIN_CELL_M));
-        let cell = |piece: &Piece| {
+        let cell = |piece: &TimedSegment| {
             let [x, y] = middle(piece);
-            self.at(1, y) * CELLS_PER_SIDE + self.at(0, x)
+            self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x)
         };
         // Any order within a cell will do, if it is the same on all boards.
-        sort::by(pieces, |a, b| cell(a).cmp(&cell(b)));
+        sort::sort_by(pieces, |a, b| cell(a).cmp(&cell(b)));
         self.starts.fill(0);
         for piece in &*pieces {
             let [x, y] = middle(piece);
-            self.starts[self.at(1, y) * CELLS_PER_SIDE + self.at(0, x) + 1] += 1;
+            self.starts[self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x) + 1] += 1;
         }
         for cell in 0..CELLS_PER_SIDE * CELLS_PER_SIDE {
             self.starts[cell + 1] += self.starts[cell];
@@ -60,21 +60,22 @@ impl Cells {
     }
 
     /// The cell of a coordinate, the nearest if it lies outside.
-    fn at(&self, axis: usize, value: f32) -> usize {
+    fn cell_index(&self, axis: usize, value: f32) -> usize {
         (((value - self.min[axis]) / self.cell_m) as usize).min(CELLS_PER_SIDE - 1)
     }
 
     /// The pieces whose middle is so near that they may come within `apart_m` of `own`, and some more.
-    pub(super) fn around<'a>(
+    pub(super) fn candidates_near<'a>(
         &'a self,
-        pieces: &'a [Piece],
-        own: &Piece,
+        pieces: &'a [TimedSegment],
+        own: &TimedSegment,
         apart_m: f32,
-    ) -> impl Iterator<Item = &'a Piece> {
+    ) -> impl Iterator<Item = &'a TimedSegment> {
         let reach_m = apart_m + half_length(own) + self.half_m;
         let middle = middle(own);
-        let [columns, rows] =
-            [0, 1].map(|axis| (self.at(axis, middle[axis] - reach_m), self.at(axis, middle[axis] + reach_m)));
+        let [columns, rows] = [0, 1].map(|axis| {
+            (self.cell_index(axis, middle[axis] - reach_m), self.cell_index(axis, middle[axis] + reach_m))
+        });
         (rows.0..=rows.1).flat_map(move |row| {
             let from = self.starts[row * CELLS_PER_SIDE + columns.0];
             let to = self.starts[row * CELLS_PER_SIDE + columns.1 + 1];
@@ -83,11 +84,11 @@ impl Cells {
     }
 }
 
-fn middle(piece: &Piece) -> [f32; 2] {
+fn middle(piece: &TimedSegment) -> [f32; 2] {
     [(piece.from.x + piece.to.x) * 0.5, (piece.from.y + piece.to.y) * 0.5]
 }
 
-fn half_length(piece: &Piece) -> f32 {
+fn half_length(piece: &TimedSegment) -> f32 {
     (piece.to - piece.from).norm() * 0.5
 }
 
@@ -96,14 +97,14 @@ mod tests {
     use super::*;
     use crate::Point;
     use crate::schedule::ScheduleConfig;
-    use crate::schedule::pieces::conflict;
+    use crate::schedule::pieces::is_conflict;
     use heapless::Vec;
     use proptest::prelude::*;
 
-    fn piece((x, y, dx, dy): (f32, f32, f32, f32)) -> Piece {
+    fn piece((x, y, dx, dy): (f32, f32, f32, f32)) -> TimedSegment {
         let (from, to) = (Point::new(x, y, 1.0), Point::new(x + dx, y + dy, 1.0));
         let to_m = (to - from).norm();
-        Piece { from, to, from_m: 0.0, to_m, from_s: 0.0, to_s: 1.0, parked: false }
+        TimedSegment { from, to, from_m: 0.0, to_m, from_s: 0.0, to_s: 1.0, parked: false }
     }
 
     fn place() -> impl Strategy<Value = (f32, f32, f32, f32)> {
@@ -118,12 +119,12 @@ mod tests {
             own in (-60.0f32..60.0, -20.0f32..20.0, -8.0f32..8.0, -8.0f32..8.0),
         ) {
             let cfg = ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
-            let mut pieces: Vec<Piece, 200> = others.into_iter().map(piece).collect();
-            let mut cells = Cells::new();
-            cells.sort(&mut pieces);
+            let mut pieces: Vec<TimedSegment, 200> = others.into_iter().map(piece).collect();
+            let mut cells = SegmentGrid::new();
+            cells.sort_into_cells(&mut pieces);
             let own = piece(own);
-            let all = pieces.iter().filter(|q| conflict(&cfg, &own, q)).count();
-            let found = cells.around(&pieces, &own, 2.0).filter(|q| conflict(&cfg, &own, q)).count();
+            let all = pieces.iter().filter(|q| is_conflict(&cfg, &own, q)).count();
+            let found = cells.candidates_near(&pieces, &own, 2.0).filter(|q| is_conflict(&cfg, &own, q)).count();
             prop_assert_eq!(found, all);
         }
     }

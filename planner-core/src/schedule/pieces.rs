@@ -22,7 +22,7 @@ pub(super) const OFF_PAD_S: f32 = 0.05;
 /// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
 /// landing place to +∞.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+pub(super) struct TimedSegment {
     pub(super) from: Point,
     pub(super) to: Point,
     /// Place where the vehicle waits before this segment, metres along its path: no vehicle waits
@@ -39,24 +39,24 @@ pub(super) struct Piece {
 
 impl<const W: usize> Flight<W> {
     /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`MAX_TIMED_SEGMENTS`].
-    pub(crate) fn fit_pieces(&mut self) {
-        self.piece_m = MAX_TIMED_SEGMENT_M;
+    pub(crate) fn fit_segment_length(&mut self) {
+        self.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_SEGMENT_DOUBLINGS {
-            if self.pieces() <= MAX_TIMED_SEGMENTS {
+            if self.segment_count() <= MAX_TIMED_SEGMENTS {
                 break;
             }
-            self.piece_m *= 2.0;
+            self.segment_m *= 2.0;
         }
     }
 
     /// Time from take-off to landing, seconds; zero for a vehicle that stays on its pad.
-    pub(crate) fn lasts_s(&self, cfg: &ScheduleConfig) -> f32 {
+    pub(crate) fn duration_s(&self, cfg: &ScheduleConfig) -> f32 {
         let landed_s = |w: &Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
-        self.path.waypoints().last().filter(|_| self.task.flies()).map_or(0.0, landed_s)
+        self.path.waypoints().last().filter(|_| self.task.leaves_pad()).map_or(0.0, landed_s)
     }
 
-    /// Timed segments that [`cut`] makes of it, by the same lengths: as those are rounded.
-    pub(crate) fn pieces(&self) -> usize {
+    /// Timed segments that [`cut_into_segments`] makes of it, by the same lengths: as those are rounded.
+    pub(crate) fn segment_count(&self) -> usize {
         let waypoints = self.path.waypoints();
         let legs = waypoints.windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
         let down_m = |waypoint: Option<&Waypoint>, m: f32| {
@@ -64,8 +64,9 @@ impl<const W: usize> Flight<W> {
         };
         let ends = [down_m(waypoints.first(), self.climb_m), down_m(waypoints.last(), self.descent_m)];
         let lengths = ends.into_iter().chain(legs);
-        let moving = lengths.map(|length_m| parts(length_m, self.piece_m)).fold(0, u32::saturating_add);
-        let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.at_s).count();
+        let moving =
+            lengths.map(|length_m| segment_count(length_m, self.segment_m)).fold(0, u32::saturating_add);
+        let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.arrive_s).count();
         (moving as usize).saturating_add(2 + holds)
     }
 }
@@ -74,10 +75,10 @@ impl<const W: usize> Flight<W> {
 ///
 /// A climb is flown in one go, and so are a descent and what follows it, the landing place. All segments of such a group are
 /// held from its beginning; each is free again when the vehicle has left it.
-pub(super) fn cut<const W: usize>(
+pub(super) fn cut_into_segments<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
-    out: &mut Vec<Piece, MAX_TIMED_SEGMENTS>,
+    out: &mut Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
 ) -> Result<(), ScheduleError> {
     out.clear();
     let waypoints = flight.path.waypoints();
@@ -85,7 +86,7 @@ pub(super) fn cut<const W: usize>(
         return Ok(());
     };
     let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
-    let stay = |at: Point, m: f32, from_s: f32, to_s: f32| Piece {
+    let stay = |at: Point, m: f32, from_s: f32, to_s: f32| TimedSegment {
         from: at,
         to: at,
         from_m: m,
@@ -95,20 +96,20 @@ pub(super) fn cut<const W: usize>(
         parked: true,
     };
     let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
-    if !flight.task.flies() {
+    if !flight.task.leaves_pad() {
         return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
     }
-    let climb = Leg::climb(pad, first.position, first.at_s);
-    let (left_m, left_s) = climb.first_part(flight.piece_m);
+    let climb = Leg::climb(pad, first.position, first.arrive_s);
+    let (left_m, left_s) = climb.first_segment(flight.segment_m);
     let on_pad = stay(pad, -flight.climb_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
-    push(Piece { to_m: left_m - flight.climb_m, ..on_pad })?;
-    for piece in climb.pieces(-flight.climb_m, 0.0, flight.piece_m) {
+    push(TimedSegment { to_m: left_m - flight.climb_m, ..on_pad })?;
+    for piece in climb.segments(-flight.climb_m, 0.0, flight.segment_m) {
         push(piece)?;
     }
     for (i, waypoint) in waypoints.iter().enumerate() {
-        if waypoint.leave_s > waypoint.at_s {
-            let hold = stay(waypoint.position, waypoint.along_m, waypoint.at_s, waypoint.leave_s);
-            push(Piece { parked: false, ..hold })?;
+        if waypoint.leave_s > waypoint.arrive_s {
+            let hold = stay(waypoint.position, waypoint.along_m, waypoint.arrive_s, waypoint.leave_s);
+            push(TimedSegment { parked: false, ..hold })?;
         }
         let Some(next) = waypoints.get(i + 1) else { break };
         let leg = Leg {
@@ -116,10 +117,10 @@ pub(super) fn cut<const W: usize>(
             to: next.position,
             length_m: next.along_m - waypoint.along_m,
             from_s: waypoint.leave_s,
-            to_s: next.at_s,
-            stops: Stops::Anywhere,
+            to_s: next.arrive_s,
+            stops: WaitingPlaces::Anywhere,
         };
-        for piece in leg.pieces(waypoint.along_m, next.along_m, flight.piece_m) {
+        for piece in leg.segments(waypoint.along_m, next.along_m, flight.segment_m) {
             push(piece)?;
         }
     }
@@ -127,15 +128,15 @@ pub(super) fn cut<const W: usize>(
     let end_m = last.along_m + flight.descent_m;
     let landed_s = last.leave_s + flight.descent_m / cfg.vertical_mps;
     let descent = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
-    for piece in descent.pieces(last.along_m, end_m, flight.piece_m) {
+    for piece in descent.segments(last.along_m, end_m, flight.segment_m) {
         push(piece)?;
     }
-    push(Piece { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
+    push(TimedSegment { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
 }
 
-/// Places where a vehicle may wait on a leg.
+/// Part of a leg on which a vehicle may wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stops {
+pub(super) enum WaitingPlaces {
     /// Before each of its timed segments.
     Anywhere,
     /// Before the leg only.
@@ -150,24 +151,31 @@ pub(super) struct Leg {
     pub(super) length_m: f32,
     pub(super) from_s: f32,
     pub(super) to_s: f32,
-    pub(super) stops: Stops,
+    pub(super) stops: WaitingPlaces,
 }
 
 impl Leg {
-    /// A vertical one from time 0.
+    /// A vertical leg that begins at time 0.
     pub(super) fn climb(from: Point, to: Point, to_s: f32) -> Self {
-        Self { from, to, length_m: libm::fabsf(to.z - from.z), from_s: 0.0, to_s, stops: Stops::Before }
+        Self {
+            from,
+            to,
+            length_m: libm::fabsf(to.z - from.z),
+            from_s: 0.0,
+            to_s,
+            stops: WaitingPlaces::Before,
+        }
     }
 
     /// Length and duration of the first of its timed segments.
-    pub(super) fn first_part(&self, piece_m: f32) -> (f32, f32) {
-        let share = 1.0 / fmaxf(parts(self.length_m, piece_m) as f32, 1.0);
+    pub(super) fn first_segment(&self, piece_m: f32) -> (f32, f32) {
+        let share = 1.0 / fmaxf(segment_count(self.length_m, piece_m) as f32, 1.0);
         (self.length_m * share, (self.to_s - self.from_s) * share)
     }
 
     /// Timed segments of the leg; `from_m` and `to_m` are its ends along the path.
-    pub(super) fn pieces(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = Piece> {
-        let parts = parts(self.length_m, piece_m);
+    pub(super) fn segments(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = TimedSegment> {
+        let parts = segment_count(self.length_m, piece_m);
         let at = move |part: u32| {
             if part == parts {
                 // The next one begins where this ends, bit by bit.
@@ -180,19 +188,19 @@ impl Leg {
         (0..parts).map(move |part| {
             let ((from, start_m, start_s), (to, to_m, to_s)) = (at(part), at(part + 1));
             let (from_m, from_s) =
-                if self.stops == Stops::Before { (from_m, self.from_s) } else { (start_m, start_s) };
-            Piece { from, to, from_m, to_m, from_s, to_s, parked: false }
+                if self.stops == WaitingPlaces::Before { (from_m, self.from_s) } else { (start_m, start_s) };
+            TimedSegment { from, to, from_m, to_m, from_s, to_s, parked: false }
         })
     }
 }
 
-/// Timed segments of a stretch of this length; none of one without length.
-pub(super) fn parts(length_m: f32, piece_m: f32) -> u32 {
+/// Timed segments of a stretch of this length; none for zero length.
+pub(super) fn segment_count(length_m: f32, piece_m: f32) -> u32 {
     libm::ceilf(length_m / piece_m) as u32
 }
 
-/// Whether two pieces come nearer than may be at the same time.
-pub(super) fn conflict(cfg: &ScheduleConfig, p: &Piece, q: &Piece) -> bool {
+/// Whether two timed segments come nearer than the separation at the same time.
+pub(super) fn is_conflict(cfg: &ScheduleConfig, p: &TimedSegment, q: &TimedSegment) -> bool {
     if p.parked && q.parked && p.from_s.is_infinite() == q.from_s.is_infinite() {
         // Two pads, or two landing places: their distance is the mission's, not the schedule's.
         return false;

@@ -13,7 +13,7 @@ fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
     for &(x, y) in points {
         path.push(Point::new(x, y, 1.5), 1.0).unwrap();
     }
-    path.label(1.5 / CFG.vertical_mps, CFG.cruise_mps);
+    path.label_times(1.5 / CFG.vertical_mps, CFG.cruise_mps);
     Flight {
         id,
         task: Task::Goto(0),
@@ -21,7 +21,7 @@ fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
         climb_m: 1.5,
         descent_m: 1.5,
         depart_s: 0.0,
-        piece_m: MAX_TIMED_SEGMENT_M,
+        segment_m: MAX_TIMED_SEGMENT_M,
     }
 }
 

@@ -52,7 +52,7 @@ impl<const N: usize> Heap<N> {
     }
 
     #[inline]
-    pub(crate) fn place(&self, node: u16) -> u16 {
+    pub(crate) fn entry_index(&self, node: u16) -> u16 {
         self.places[usize::from(node)]
     }
 
@@ -72,10 +72,10 @@ impl<const N: usize> Heap<N> {
             if self.entries[above] <= entry {
                 break;
             }
-            self.put(at, self.entries[above]);
+            self.set_entry(at, self.entries[above]);
             at = above;
         }
-        self.put(at, entry);
+        self.set_entry(at, entry);
     }
 
     /// Takes out the node of least cost and settles it.
@@ -109,14 +109,14 @@ impl<const N: usize> Heap<N> {
             if self.entries[least] >= entry {
                 break;
             }
-            self.put(at, self.entries[least]);
+            self.set_entry(at, self.entries[least]);
             at = least;
         }
-        self.put(at, entry);
+        self.set_entry(at, entry);
     }
 
     #[inline]
-    fn put(&mut self, at: usize, entry: u64) {
+    fn set_entry(&mut self, at: usize, entry: u64) {
         self.entries[at] = entry;
         self.places[node_of(entry)] = at as u16 + 1;
     }

@@ -65,7 +65,7 @@ fn check_path(view: &RoadmapView<'_>, path: &[u16], ends: (u16, u16), length: f3
     let mut sum = 0.0f64;
     for pair in path.windows(2) {
         let edge = view.edge_between(pair[0], pair[1]).expect("consecutive nodes are joined");
-        assert!(view.clears(&edge, REQUIRED_M));
+        assert!(view.has_clearance(&edge, REQUIRED_M));
         sum += f64::from(view.distance_m(pair[0], pair[1]));
     }
     assert!(close(f64::from(length), sum), "says {length}, is {sum}");
@@ -84,13 +84,13 @@ proptest! {
     fn astar_and_dijkstra_equal_brute_force((nodes, edges) in graphs(), landmarks: bool) {
         let bytes = encode_either(&nodes, &edges, landmarks);
         let view = RoadmapView::parse(&bytes).unwrap();
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, REQUIRED_M);
+        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, REQUIRED_M);
         let expected = brute_force(&view, passable);
         let all: StdVec<u16> = (0..nodes.len() as u16).collect();
         let mut ws = Box::new(SearchWorkspace::<CAPACITY>::new());
         let mut path = Vec::<u16, CAPACITY>::new();
         let mut lengths = vec![0.0; view.half_edge_count()];
-        let with_lengths = WithLengths::new(view, &mut lengths).unwrap();
+        let with_lengths = RoadmapWithLengths::new(view, &mut lengths).unwrap();
         let mut quick = vec![f32::NAN; nodes.len()];
         for &from in &all {
             dijkstra_row(&with_lengths, from, &all, passable, &mut ws, &mut quick).unwrap();

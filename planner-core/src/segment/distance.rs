@@ -13,7 +13,7 @@ use super::lanes::lane_mask;
 use super::lattice::snap;
 use super::walk::snapped_segment_touches;
 use crate::Point;
-use crate::geometry::within;
+use crate::geometry::clamp_to;
 use crate::voxel::{Outside, VoxelGrid};
 
 /// Half the diagonal of a cell, in cells.
@@ -39,14 +39,14 @@ impl Segment {
     }
 
     /// Squared distance to a point.
-    fn square_to_point(&self, p: &Point) -> f32 {
+    fn distance_sq_to_point(&self, p: &Point) -> f32 {
         let to = p - self.a;
         let t = (to.dot(&self.d) * self.inv_square).clamp(0.0, 1.0);
         (to - self.d * t).norm_squared()
     }
 
     /// Squared distance to the closed cell whose minimum corner is `low`.
-    fn square_to_cell(&self, low: &Point) -> f32 {
+    fn distance_sq_to_cell(&self, low: &Point) -> f32 {
         // Relative to the cell's centre: |x| ≤ 0.5 is inside.
         let start = self.a - low - Point::new(0.5, 0.5, 0.5);
         let excess = |t: f32| {
@@ -83,7 +83,7 @@ impl Segment {
     }
 
     /// Distance to the nearest face of the grid, negative outside.
-    fn to_outside(&self, dims: [u32; 3]) -> f32 {
+    fn distance_to_faces(&self, dims: [u32; 3]) -> f32 {
         let end = self.a + self.d;
         (0..3)
             .map(|axis| self.a[axis].min(end[axis]).min(dims[axis] as f32 - self.a[axis].max(end[axis])))
@@ -93,7 +93,7 @@ impl Segment {
     /// Calls `visit` with each word that may hold an obstacle within `reach` cells, its other cells cleared as far as
     /// bounding boxes of the swept volume tell, and the minimum corner of its brick. `visit` may lower the reach. Of the
     /// share `known` of the segment nothing is in reach.
-    fn walk(
+    fn visit_near_words(
         &self,
         grid: &VoxelGrid<'_>,
         known: f32,
@@ -112,17 +112,17 @@ impl Segment {
         // A thousandth of a cell and the rounding of large coordinates more than the reach, so that no cell is lost.
         let largest = self.a.amax() + self.d.amax();
         let slack = 1e-3 + largest * (8.0 * f32::EPSILON);
-        let Some((first, last)) = cells(least, most, reach + slack, shape.dims[axis_u]) else {
+        let Some((first, last)) = cell_range(least, most, reach + slack, shape.dims[axis_u]) else {
             return ControlFlow::Continue(());
         };
         for brick_u in first >> 2..=last >> 2 {
             let low = (brick_u * 4) as f32;
             // The part of the segment within reach of this layer of bricks.
-            let from = within(low - reach, least, most) - self.a[axis_u];
-            let to = within(low + 4.0 + reach, least, most) - self.a[axis_u];
+            let from = clamp_to(low - reach, least, most) - self.a[axis_u];
+            let to = clamp_to(low + 4.0 + reach, least, most) - self.a[axis_u];
             let span = |axis: usize| {
                 let at = |along: f32| self.a[axis] + slope[axis] * along;
-                cells(at(from), at(to), reach + slack, shape.dims[axis])
+                cell_range(at(from), at(to), reach + slack, shape.dims[axis])
             };
             let (Some(v), Some(w)) = (span(axis_v), span(axis_w)) else {
                 continue;
@@ -145,7 +145,7 @@ impl Segment {
                     corner[axis_v] = (brick_v * 4) as f32;
                     corner[axis_w] = (brick_w * 4) as f32;
                     let bound = reach + BRICK_RADIUS;
-                    if self.square_to_point(&corner.add_scalar(2.0)) > bound * bound * (1.0 + 1e-5) {
+                    if self.distance_sq_to_point(&corner.add_scalar(2.0)) > bound * bound * (1.0 + 1e-5) {
                         continue;
                     }
                     reach = visit(word, &corner)?;
@@ -157,7 +157,7 @@ impl Segment {
 }
 
 /// First and last cell of an axis within `reach` of the stretch between two coordinates, or `None` beyond the grid.
-fn cells(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
+fn cell_range(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
     let (low, high) = if from < to { (from - reach, to + reach) } else { (to - reach, from + reach) };
     // A cast rounds towards zero: down, but for negative numbers, which are not in the grid.
     let first = (low as i32).max(0);
@@ -173,7 +173,7 @@ fn lanes(first: i32, last: i32, brick: i32) -> u32 {
 }
 
 /// The minimum corners of the occupied cells of a word.
-fn corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
+fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
     core::iter::from_fn(move || {
         if word == 0 {
             return None;
@@ -196,7 +196,7 @@ pub(crate) fn is_farther_than(
 ) -> bool {
     let segment = Segment::new(grid, a, b);
     let reach = clearance_m / grid.shape().resolution_m;
-    if grid.outside() == Outside::Blocked && segment.to_outside(grid.shape().dims) <= reach {
+    if grid.outside() == Outside::Blocked && segment.distance_to_faces(grid.shape().dims) <= reach {
         return false;
     }
     let square = reach * reach;
@@ -204,10 +204,10 @@ pub(crate) fn is_farther_than(
     let (never, always) = (reach + CELL_RADIUS, reach + 0.5);
     let (never, always) = (never * never * (1.0 + 1e-5), always * always * (1.0 - 1e-5));
     segment
-        .walk(grid, known, reach, |word, brick| {
-            for low in corners(word, brick) {
-                let to_center = segment.square_to_point(&low.add_scalar(0.5));
-                if to_center <= always || to_center <= never && segment.square_to_cell(&low) <= square {
+        .visit_near_words(grid, known, reach, |word, brick| {
+            for low in occupied_corners(word, brick) {
+                let to_center = segment.distance_sq_to_point(&low.add_scalar(0.5));
+                if to_center <= always || to_center <= never && segment.distance_sq_to_cell(&low) <= square {
                     return ControlFlow::Break(());
                 }
             }
@@ -232,7 +232,7 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     let segment = Segment::new(grid, a, b);
     let mut limit = max_m / shape.resolution_m;
     if grid.outside() == Outside::Blocked {
-        limit = limit.min(segment.to_outside(shape.dims)).max(0.0);
+        limit = limit.min(segment.distance_to_faces(shape.dims)).max(0.0);
     }
     // No obstacle is farther than the grid is long.
     let longest = (shape.dims.iter().max().copied().unwrap_or(0) * 4) as f32;
@@ -243,10 +243,10 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
         let around = |reach: f32| (reach + CELL_RADIUS) * (reach + CELL_RADIUS) * (1.0 + 1e-5);
         let (mut nearest, mut bound) = (tried * tried, around(tried));
         let mut found = false;
-        let _ = segment.walk(grid, 0.0, tried, |word, brick| {
-            for low in corners(word, brick) {
-                if segment.square_to_point(&low.add_scalar(0.5)) <= bound {
-                    let square = segment.square_to_cell(&low);
+        let _ = segment.visit_near_words(grid, 0.0, tried, |word, brick| {
+            for low in occupied_corners(word, brick) {
+                if segment.distance_sq_to_point(&low.add_scalar(0.5)) <= bound {
+                    let square = segment.distance_sq_to_cell(&low);
                     if square <= nearest {
                         (nearest, found) = (square, true);
                         bound = around(libm::sqrtf(nearest));

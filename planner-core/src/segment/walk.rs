@@ -25,11 +25,11 @@ pub(crate) fn snapped_rest_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snappe
     }
     let size = [0, 1, 2].map(|axis| (b[axis] - a[axis]).unsigned_abs());
     if size[0] >= size[1] && size[0] >= size[2] {
-        Walk::<0, 1, 2>::new(grid, a, b, known).touches()
+        Walk::<0, 1, 2>::new(grid, a, b, known).touches_obstacle()
     } else if size[1] >= size[2] {
-        Walk::<1, 0, 2>::new(grid, a, b, known).touches()
+        Walk::<1, 0, 2>::new(grid, a, b, known).touches_obstacle()
     } else {
-        Walk::<2, 0, 1>::new(grid, a, b, known).touches()
+        Walk::<2, 0, 1>::new(grid, a, b, known).touches_obstacle()
     }
 }
 
@@ -112,23 +112,23 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
 
     /// The coordinate on `axis` where the segment is at `u`, within `slack`.
     #[inline(always)]
-    fn at(&self, axis: usize, u: i32) -> i32 {
+    fn coordinate_at(&self, axis: usize, u: i32) -> i32 {
         let run = i64::from(u - self.a[U]);
         self.a[axis] + ((run * self.slopes[axis]) >> 30) as i32
     }
 
     #[inline(always)]
-    fn touches(&self) -> bool {
+    fn touches_obstacle(&self) -> bool {
         // A cell is closed: an end on its face touches the one before too.
         let whole = Span::new(self.start, self.end, 1, self.dims[U]);
         if whole.first > whole.last {
             return false;
         }
         let first = (whole.first * ONE_CELL).clamp(self.start, self.end);
-        let (mut v, mut w) = (self.at(V, first), self.at(W, first));
+        let (mut v, mut w) = (self.coordinate_at(V, first), self.coordinate_at(W, first));
         for brick in whole.first >> 2..=whole.last >> 2 {
             let u = ((brick + 1) * (4 * ONE_CELL)).clamp(self.start, self.end);
-            let (next_v, next_w) = (self.at(V, u), self.at(W, u));
+            let (next_v, next_w) = (self.coordinate_at(V, u), self.coordinate_at(W, u));
             let span_v = Span::new(v, next_v, self.slack, self.dims[V]);
             let span_w = Span::new(w, next_w, self.slack, self.dims[W]);
             (v, w) = (next_v, next_w);
@@ -156,10 +156,10 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     fn brick_touches(&self, near: u64, brick_u: i32, brick_v: i32, brick_w: i32) -> bool {
         let floor = brick_u * (4 * ONE_CELL);
         let from = floor.clamp(self.start, self.end);
-        let (mut v, mut w) = (self.at(V, from), self.at(W, from));
+        let (mut v, mut w) = (self.coordinate_at(V, from), self.coordinate_at(W, from));
         for layer in 0..4 {
             let to = (floor + (layer + 1) * ONE_CELL).clamp(self.start, self.end);
-            let (next_v, next_w) = (self.at(V, to), self.at(W, to));
+            let (next_v, next_w) = (self.coordinate_at(V, to), self.coordinate_at(W, to));
             let (last_v, last_w) = (v, w);
             (v, w) = (next_v, next_w);
             let mut cells = near & lane_mask(U, 1 << layer);

@@ -1,7 +1,7 @@
 //! ArduCopter's AUTO: an uploaded mission.
 //!
 //! It is entered only with a mission, on the ground armed only with one that begins with a take-off; it is not armed in.
-//! On the ground it waits for MISSION_START, as nobody raises a throttle; in the air it goes on at once. It looks where it
+//! On the ground it waits for MISSION_START, as nobody raises a throttle; in the air it continues at once. It looks where it
 //! flies (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. A return and a landing are flown within AUTO.
 
 use planner_core::Point;
@@ -9,7 +9,7 @@ use planner_core::Point;
 use super::auto_state::Auto;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, TakeOff};
-use crate::itinerary::{Leg, on_line};
+use crate::itinerary::{MissionLeg, interpolate_height};
 use crate::platform::{Platform, SensorReadings};
 
 /// A place to land at is reached within this distance, metres.
@@ -19,9 +19,9 @@ const TURN_BEYOND_M: f32 = 2.0;
 
 impl Copter {
     /// Whether AUTO can be entered; says why not.
-    pub(super) fn auto_runs(&self, platform: &mut Platform) -> bool {
+    pub(super) fn can_enter_auto(&self, platform: &mut Platform) -> bool {
         if platform.has_mission() && self.armed && self.landed && !platform.mission_takes_off() {
-            platform.say(2, "Auto: Missing Takeoff Cmd");
+            platform.send_text(2, "Auto: Missing Takeoff Cmd");
             return false;
         }
         platform.has_mission()
@@ -29,25 +29,25 @@ impl Copter {
 
     /// MISSION_START.
     pub(super) fn start_mission(&mut self, platform: &mut Platform) -> bool {
-        let starts = self.auto_runs(platform) && self.set_mode(Mode::Auto, &platform.sensors());
+        let starts = self.can_enter_auto(platform) && self.set_mode(Mode::Auto, &platform.sensors());
         self.auto.may_lift |= starts && self.armed;
         starts
     }
 
     /// The vehicle comes down by itself, in AUTO.
-    pub(super) fn lands_in_auto(&self) -> bool {
+    pub(super) fn is_landing_in_auto(&self) -> bool {
         self.mode == Mode::Auto
             && match self.auto.leg {
-                Some(Leg::Land { .. }) => true,
-                Some(Leg::Return) => self.leg == ReturnLeg::Land,
+                Some(MissionLeg::Land { .. }) => true,
+                Some(MissionLeg::Return) => self.leg == ReturnLeg::Land,
                 _ => false,
             }
     }
 
     /// Disarmed: what came down is done, and the mission is flown from its first item again.
     pub(super) fn end_auto(&mut self, platform: &mut Platform) {
-        if self.lands_in_auto() {
-            platform.pass_item();
+        if self.is_landing_in_auto() {
+            platform.complete_item();
         }
         if self.auto.leg.is_some() {
             platform.rewind_mission();
@@ -59,7 +59,7 @@ impl Copter {
     pub(super) fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if self.mode != Mode::Auto {
             if self.auto.leg.take().is_some() {
-                platform.missions.progress.interrupt();
+                platform.missions.progress.restart_item();
             }
             return;
         }
@@ -71,15 +71,15 @@ impl Copter {
             self.speed = (speed > 0.0).then_some(speed);
         }
         if leg != self.auto.leg {
-            self.auto.from = Leg::end(self.auto.leg, &sensors.position);
+            self.auto.from = MissionLeg::leg_end(self.auto.leg, &sensors.position);
             // At least a metre up from the ground.
             self.takeoff = match leg {
-                Some(Leg::TakeOff { up }) if self.landed => {
+                Some(MissionLeg::TakeOff { up }) if self.landed => {
                     Some(TakeOff { since_us: sensors.now_us, up: up.max(sensors.position.z + 1.0) })
                 }
                 _ => None,
             };
-            if leg == Some(Leg::Return) {
+            if leg == Some(MissionLeg::Return) {
                 self.leg = ReturnLeg::Climb { up: f32::NAN };
             }
         }
@@ -93,32 +93,33 @@ impl Copter {
         }
         let at = self.reference.position;
         match self.auto.leg {
-            Some(Leg::To { at, .. }) => {
+            Some(MissionLeg::To { at, .. }) => {
                 let off = at - sensors.position;
                 if libm::hypotf(off.x, off.y) > TURN_BEYOND_M {
                     self.auto.heading = Some(libm::atan2f(off.x, off.y));
                 }
                 self.auto.stay = Some(at);
                 let reference = &self.reference;
-                let (up, rate) = on_line(&self.auto.from, &at, &reference.position, &reference.velocity);
+                let (up, rate) =
+                    interpolate_height(&self.auto.from, &at, &reference.position, &reference.velocity);
                 let heading = self.auto.heading.unwrap_or(f32::NAN);
                 let velocity = Point::new(0.0, 0.0, rate);
                 Goal { heading, velocity, ..Goal::hold(Point::new(at.x, at.y, up)) }
             }
-            Some(Leg::TakeOff { up }) => {
+            Some(MissionLeg::TakeOff { up }) => {
                 let stay = self.auto.stay.unwrap_or(at);
                 Goal::hold(Point::new(stay.x, stay.y, up))
             }
-            Some(Leg::Land { at: Some([east, north]) })
+            Some(MissionLeg::Land { at: Some([east, north]) })
                 if libm::hypotf(east - sensors.position.x, north - sensors.position.y) > ARRIVED_M
                     && !sensors.touching =>
             {
                 let up = self.auto.stay.map_or(at.z, |stay| stay.z);
                 Goal::hold(Point::new(east, north, up))
             }
-            Some(Leg::Land { .. }) => self.landing_goal(sensors),
-            Some(Leg::Return) => self.return_goal(sensors),
-            Some(Leg::Wait(_)) | None => self.auto.stay.map_or(Goal::STOP, Goal::hold),
+            Some(MissionLeg::Land { .. }) => self.landing_goal(sensors),
+            Some(MissionLeg::Return) => self.return_goal(sensors),
+            Some(MissionLeg::Wait(_)) | None => self.auto.stay.map_or(Goal::STOP, Goal::hold),
         }
     }
 }

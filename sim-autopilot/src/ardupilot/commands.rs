@@ -8,7 +8,7 @@ use crate::command::{
 };
 use crate::platform::Platform;
 use crate::port::Sender;
-use crate::wire::Fields;
+use crate::wire::PayloadReader;
 
 const SET_MODE: u16 = 11;
 
@@ -31,29 +31,33 @@ impl Copter {
         let result = match command.id {
             176 => self.change_mode(platform, command.param[0] as u8, command.param[1] as u32),
             400 if command.param[0] == 1.0 => {
-                done(self.arm(platform, &sensors, command.param[1] == ARM_FORCE))
+                accepted_or_failed(self.arm(platform, &sensors, command.param[1] == ARM_FORCE))
             }
-            400 if command.param[0] == 0.0 => done(self.disarm(platform, command.param[1] == ARM_FORCE)),
-            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return platform.control_camera(from, command),
+            400 if command.param[0] == 0.0 => {
+                accepted_or_failed(self.disarm(platform, command.param[1] == ARM_FORCE))
+            }
+            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
+                return platform.handle_camera_command(from, command);
+            }
             // The height counts from home.
-            22 => done(self.take_off(sensors.home.z + command.z, &sensors)),
-            21 => done(self.set_mode(Mode::Land, &sensors)),
-            20 => done(self.set_mode(Mode::Rtl, &sensors)),
-            17 => done(self.set_mode(Mode::Loiter, &sensors)),
+            22 => accepted_or_failed(self.take_off(sensors.home.z + command.z, &sensors)),
+            21 => accepted_or_failed(self.set_mode(Mode::Land, &sensors)),
+            20 => accepted_or_failed(self.set_mode(Mode::Rtl, &sensors)),
+            17 => accepted_or_failed(self.set_mode(Mode::Loiter, &sensors)),
             192 => self.reposition(platform, command),
             178 => {
                 self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
                 ACCEPTED
             }
-            179 => done(platform.set_home(command)),
+            179 => accepted_or_failed(platform.handle_set_home(command)),
             193 => FAILED,
-            300 => done(self.start_mission(platform)),
+            300 => accepted_or_failed(self.start_mission(platform)),
             245 => ACCEPTED,
             241 | 246 if self.armed => FAILED,
             241 => ACCEPTED,
             246 => {
                 if command.param[0] == 1.0 {
-                    platform.reboot_soon();
+                    platform.schedule_reboot();
                 }
                 ACCEPTED
             }
@@ -61,13 +65,13 @@ impl Copter {
             511 => platform.set_interval(from, command, &STREAMS, DENIED),
             512 => match message_id(command.param[0]) {
                 Some(id) if STREAMS.iter().any(|stream| stream.0 == id) => {
-                    platform.ports[from.port].once.push(id);
+                    platform.ports[from.port].requested_once.push(id);
                     ACCEPTED
                 }
                 _ => DENIED,
             },
             520 => {
-                platform.ports[from.port].once.push(AUTOPILOT_VERSION);
+                platform.ports[from.port].requested_once.push(AUTOPILOT_VERSION);
                 ACCEPTED
             }
             _ => UNSUPPORTED,
@@ -76,7 +80,12 @@ impl Copter {
     }
 
     /// Takes the old SET_MODE, which ArduPilot acknowledges as if it were a command.
-    pub(crate) fn handle_set_mode(&mut self, platform: &mut Platform, from: Sender, fields: &Fields<'_>) {
+    pub(crate) fn handle_set_mode(
+        &mut self,
+        platform: &mut Platform,
+        from: Sender,
+        fields: &PayloadReader<'_>,
+    ) {
         let result = self.change_mode(platform, fields.u8(5), fields.u32(0));
         platform.acknowledge(from, SET_MODE, result);
     }
@@ -85,9 +94,9 @@ impl Copter {
         if base & CUSTOM_MODE == 0 {
             return DENIED;
         }
-        let runs = |mode: &Mode| *mode != Mode::Auto || self.auto_runs(platform);
+        let runs = |mode: &Mode| *mode != Mode::Auto || self.can_enter_auto(platform);
         let mode = Mode::from_number(number).filter(runs);
-        done(mode.is_some_and(|mode| self.set_mode(mode, &platform.sensors())))
+        accepted_or_failed(mode.is_some_and(|mode| self.set_mode(mode, &platform.sensors())))
     }
 
     /// DO_REPOSITION: Guided, to a place.
@@ -105,7 +114,7 @@ impl Copter {
 }
 
 /// Takes REQUEST_DATA_STREAM: the way ground stations asked before SET_MESSAGE_INTERVAL. It is not answered.
-pub(crate) fn handle_stream_request(platform: &mut Platform, from: Sender, fields: &Fields<'_>) {
+pub(crate) fn handle_stream_request(platform: &mut Platform, from: Sender, fields: &PayloadReader<'_>) {
     let (rate_hz, stream, start) = (fields.u16(0), fields.u8(4), fields.u8(5) != 0);
     let interval_us = if start && rate_hz > 0 { 1_000_000 / u32::from(rate_hz.min(50)) } else { 0 };
     let now_us = platform.time_us;
@@ -116,6 +125,6 @@ pub(crate) fn handle_stream_request(platform: &mut Platform, from: Sender, field
     }
 }
 
-fn done(done: bool) -> u8 {
+fn accepted_or_failed(done: bool) -> u8 {
     if done { ACCEPTED } else { FAILED }
 }

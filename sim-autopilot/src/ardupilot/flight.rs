@@ -4,9 +4,9 @@ use planner_core::Point;
 
 use super::reference::Reference;
 use super::setpoint::Goal;
-use super::{Copter, Mode, ReturnLeg, micros};
+use super::{Copter, Mode, ReturnLeg, micros_from_s};
 use crate::platform::SensorReadings;
-use crate::shaping::approach;
+use crate::shaping::approach_rate;
 use crate::vehicle::Demand;
 
 /// The take-off is done within this distance of its height, metres: landed_state 2 came 9.3 s after
@@ -60,13 +60,13 @@ impl Copter {
             acceleration: Point::new(a.x * d, a.y * d, a.z),
             heading: goal.heading,
             heading_rate: goal.heading_rate,
-            lift_off: self.lift_off(sensors.now_us),
-            ..tuning.nothing()
+            lift_off: self.lift_off_acceleration(sensors.now_us),
+            ..tuning.empty_demand()
         }
     }
 
     /// Acceleration up while it leaves the ground; NaN once it has.
-    fn lift_off(&self, now_us: u64) -> f32 {
+    fn lift_off_acceleration(&self, now_us: u64) -> f32 {
         let since_s = now_us.saturating_sub(self.since.lifted_us) as f32 * 1e-6;
         LIFT_OFF_PROFILE.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
     }
@@ -85,7 +85,7 @@ impl Copter {
     /// Velocities end with `GUID_TIMEOUT`; until then they carry a position with them.
     fn guided_goal(&mut self, now_us: u64, dt: f32) -> Goal {
         let age_us = now_us.saturating_sub(self.goal_us);
-        if self.goal.expires && age_us > micros(self.tuning.guided_timeout_s) {
+        if self.goal.expires && age_us > micros_from_s(self.tuning.guided_timeout_s) {
             self.goal = Goal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
             self.goal.heading_rate = f32::NAN;
         }
@@ -100,7 +100,7 @@ impl Copter {
     pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> Goal {
         let tuning = &self.tuning;
         let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);
-        let rate = approach(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
+        let rate = approach_rate(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
         let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
         Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
     }
@@ -130,7 +130,7 @@ impl Copter {
                 Goal::hold(Point::new(home.x, home.y, up))
             }
             ReturnLeg::Wait { since_us, up } => {
-                if sensors.now_us - since_us >= micros(self.tuning.return_loiter_s) {
+                if sensors.now_us - since_us >= micros_from_s(self.tuning.return_loiter_s) {
                     self.leg = ReturnLeg::Land;
                     self.reference = Reference::new(at, self.reference.velocity);
                 }

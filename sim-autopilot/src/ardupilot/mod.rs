@@ -31,11 +31,11 @@ use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
 use super::params::Params;
-use super::platform::{Integral, Order, Platform, SensorReadings};
+use super::platform::{ActuatorCommand, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
-use super::status::Status;
+use super::status::FirmwareStatus;
 use super::vehicle::VehicleLimits;
-use super::wire::Fields;
+use super::wire::PayloadReader;
 use crate::AutopilotKind;
 
 /// Time from arming to the lift-off where NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2
@@ -116,7 +116,7 @@ enum ReturnLeg {
 
 /// When each of these began last, microseconds since boot.
 #[derive(Clone, Copy, Debug, Default)]
-struct Since {
+struct PhaseStartTimes {
     armed_us: u64,
     lifted_us: u64,
     idle_us: u64,
@@ -132,10 +132,10 @@ pub struct Copter {
     /// Parameters that act.
     pub tuning: Tuning,
     ready_us: u64,
-    said: [bool; 2],
+    reported: [bool; 2],
     runtime_us: u64,
     armed: bool,
-    since: Since,
+    since: PhaseStartTimes,
     /// The position controller starts in this step.
     starts: bool,
     landed: bool,
@@ -156,15 +156,15 @@ pub struct Copter {
 impl Copter {
     /// ArduCopter as it boots: disarmed in STABILIZE, without a position until `ready_s`.
     pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
-        let params = params::defaults(system_id, limits);
+        let params = params::default_params(system_id, limits);
         Self {
             tuning: Tuning::new(&params),
             params,
-            ready_us: micros(ready_s),
-            said: [false; 2],
+            ready_us: micros_from_s(ready_s),
+            reported: [false; 2],
             runtime_us: 0,
             armed: false,
-            since: Since::default(),
+            since: PhaseStartTimes::default(),
             starts: false,
             landed: true,
             mode: Mode::Stabilize,
@@ -207,33 +207,33 @@ impl Copter {
     }
 
     /// State that telemetry reports.
-    pub fn status(&self, sensors: &SensorReadings) -> Status {
+    pub fn status(&self, sensors: &SensorReadings) -> FirmwareStatus {
         let now_us = sensors.now_us;
         let known = self.position_known(now_us);
         let sticks = matches!(self.mode, Mode::Stabilize | Mode::AltHold);
-        Status {
-            personality: AutopilotKind::Ardupilot,
+        FirmwareStatus {
+            autopilot: AutopilotKind::Ardupilot,
             custom_mode: self.mode.number(),
             intended_mode: self.mode.number(),
             // Custom, stabilised, manual input; with the guided flag in every mode that has a position.
             flags: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
             system_status: match self.failsafe {
                 Some(_) => 5,
-                None if now_us < micros(BOOT_TO_STANDBY_S) => 1,
+                None if now_us < micros_from_s(BOOT_TO_STANDBY_S) => 1,
                 None if self.landed => 3,
                 None => 4,
             },
-            armable: self.armable(sensors).is_ok(),
+            armable: self.check_arming(sensors).is_ok(),
             landed_state: match self.mode {
                 _ if self.landed => 1,
                 _ if self.takeoff.is_some() => 3,
                 Mode::Land => 4,
-                Mode::Auto if self.lands_in_auto() => 4,
+                Mode::Auto if self.is_landing_in_auto() => 4,
                 Mode::Rtl if self.leg == ReturnLeg::Land => 4,
                 _ => 2,
             },
             guided: self.mode == Mode::Guided,
-            ekf_flags: if now_us < micros(BOOT_TO_ATTITUDE_S).min(self.ready_us) {
+            ekf_flags: if now_us < micros_from_s(BOOT_TO_ATTITUDE_S).min(self.ready_us) {
                 0x400
             } else if known {
                 0x33F
@@ -250,14 +250,14 @@ impl Copter {
     }
 
     /// Takes a setpoint; outside Guided it is ignored.
-    pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &Fields<'_>) {
+    pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
         if self.mode != Mode::Guided {
             return;
         }
         let goal = if id == 84 {
-            setpoint::local_ned(fields, platform)
+            setpoint::read_local_ned(fields, platform)
         } else {
-            setpoint::global_int(fields, platform)
+            setpoint::read_global_int(fields, platform)
         };
         self.fly_to(goal, &platform.sensors());
     }
@@ -279,12 +279,12 @@ impl Copter {
         if self.failsafe == Some(Failsafe::GroundStation) {
             // The vehicle stays in the mode that the failsafe chose.
             self.failsafe = None;
-            platform.say(4, "GCS Failsafe Cleared");
+            platform.send_text(4, "GCS Failsafe Cleared");
         }
     }
 
     /// Whether the arming checks pass, or why not.
-    fn armable(&self, sensors: &SensorReadings) -> Result<(), &'static str> {
+    fn check_arming(&self, sensors: &SensorReadings) -> Result<(), &'static str> {
         if !self.mode.allows_arming() {
             Err("Arm: Mode not armable")
         } else if self.tuning.checks && !self.position_known(sensors.now_us) {
@@ -300,8 +300,8 @@ impl Copter {
         if self.armed {
             return true;
         }
-        if !force && let Err(why) = self.armable(sensors) {
-            platform.say(2, why);
+        if !force && let Err(why) = self.check_arming(sensors) {
+            platform.send_text(2, why);
             return false;
         }
         self.armed = true;
@@ -310,7 +310,7 @@ impl Copter {
         self.goal = Goal::STOP;
         platform.announce_origin();
         platform.set_home_here();
-        platform.say(6, "Arming motors");
+        platform.send_text(6, "Arming motors");
         true
     }
 
@@ -320,7 +320,7 @@ impl Copter {
             return false;
         }
         if self.armed {
-            platform.say(6, "Disarming motors");
+            platform.send_text(6, "Disarming motors");
         }
         self.end_auto(platform);
         self.armed = false;
@@ -344,7 +344,7 @@ impl Copter {
         if mode == self.mode {
             return;
         }
-        // Land goes on with the reference of a controller that was running, the others start theirs.
+        // Land continues with the reference of a controller that was running, the others start theirs.
         let runs = self.mode.needs_position() && !self.landed;
         if mode != Mode::Land || !runs {
             self.reference = Reference::new(sensors.position, sensors.velocity);
@@ -369,9 +369,14 @@ impl Copter {
     }
 
     /// One step: timers, failsafes, phases, and the demand of the mode.
-    pub fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> Order {
+    pub fn update(
+        &mut self,
+        platform: &mut Platform,
+        sensors: &SensorReadings,
+        dt_s: f32,
+    ) -> ActuatorCommand {
         let now_us = sensors.now_us;
-        self.tell_progress(platform, now_us);
+        self.send_progress_messages(platform, now_us);
         if self.armed {
             self.update_failsafe(platform, sensors);
             self.update_timers(platform, sensors);
@@ -380,13 +385,13 @@ impl Copter {
         if !self.armed {
             // A vehicle disarmed in the air falls, and has landed when it lies still.
             self.landed |= sensors.touching;
-            return self.rest();
+            return self.idle_command();
         }
         if self.landed
             && let Some(takeoff) = self.takeoff
             && now_us
-                >= (takeoff.since_us + micros(TAKEOFF_TO_LIFT_S))
-                    .max(self.since.armed_us + micros(ARM_TO_LIFT_S))
+                >= (takeoff.since_us + micros_from_s(TAKEOFF_TO_LIFT_S))
+                    .max(self.since.armed_us + micros_from_s(ARM_TO_LIFT_S))
         {
             self.landed = false;
             self.since.touching_us = None;
@@ -394,18 +399,19 @@ impl Copter {
             self.reference = Reference::new(sensors.position, Point::zeros());
         }
         if self.landed {
-            return self.rest();
+            return self.idle_command();
         }
         let demand = self.demand(sensors, dt_s);
         let climbing = demand.velocity.z > 0.05;
         self.detect_landing(sensors, climbing);
-        let integral = if core::mem::take(&mut self.starts) { Integral::Match } else { Integral::Keep };
-        Order { lift: true, integral, demand }
+        let integral =
+            if core::mem::take(&mut self.starts) { IntegralAction::Match } else { IntegralAction::Keep };
+        ActuatorCommand { lift: true, integral, demand }
     }
 
     /// Motors off or idle.
-    fn rest(&self) -> Order {
-        Order { lift: false, integral: Integral::Clear, demand: self.tuning.nothing() }
+    fn idle_command(&self) -> ActuatorCommand {
+        ActuatorCommand { lift: false, integral: IntegralAction::Clear, demand: self.tuning.empty_demand() }
     }
 
     /// Origin and position, each once.
@@ -419,23 +425,23 @@ impl Copter {
             }
         } else if self.tuning.estimator_failsafe
             && self.mode.needs_position()
-            && since(*self.lost_us.get_or_insert(now_us)) >= micros(ESTIMATOR_REACTION_S)
+            && since(*self.lost_us.get_or_insert(now_us)) >= micros_from_s(ESTIMATOR_REACTION_S)
         {
             self.failsafe = Some(Failsafe::Estimator);
-            platform.say(2, "EKF Failsafe: changed to LAND Mode");
+            platform.send_text(2, "EKF Failsafe: changed to LAND Mode");
             self.force_mode(Mode::Land, sensors);
         }
         if self.failsafe.is_some() || self.landed {
             return;
         }
-        let silent = |at: u64| since(at) >= micros(self.tuning.gcs_timeout_s + GCS_REACTION_S);
+        let silent = |at: u64| since(at) >= micros_from_s(self.tuning.gcs_timeout_s + GCS_REACTION_S);
         if self.tuning.gcs_failsafe && self.gcs_us.is_some_and(silent) {
             self.failsafe = Some(Failsafe::GroundStation);
-            platform.say(4, "GCS Failsafe");
+            platform.send_text(4, "GCS Failsafe");
             self.force_mode(Mode::Rtl, sensors);
         } else if sensors.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
             self.failsafe = Some(Failsafe::Battery);
-            platform.say(4, "Battery 1 is low");
+            platform.send_text(4, "Battery 1 is low");
             self.force_mode(if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl }, sensors);
         }
     }
@@ -446,9 +452,9 @@ impl Copter {
             self.since.idle_us = sensors.now_us;
         } else {
             let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
-            let landing = matches!(self.mode, Mode::Land | Mode::Rtl) || self.lands_in_auto();
-            if landing && since(self.since.landed_us) >= micros(LAND_DISARM_S)
-                || delay > 0.0 && since(self.since.idle_us) >= micros(delay)
+            let landing = matches!(self.mode, Mode::Land | Mode::Rtl) || self.is_landing_in_auto();
+            if landing && since(self.since.landed_us) >= micros_from_s(LAND_DISARM_S)
+                || delay > 0.0 && since(self.since.idle_us) >= micros_from_s(delay)
             {
                 self.disarm(platform, false);
             }
@@ -464,7 +470,7 @@ impl Copter {
             return;
         }
         let since = *self.since.touching_us.get_or_insert(sensors.now_us);
-        if sensors.now_us - since >= micros(LAND_DETECTOR_S) {
+        if sensors.now_us - since >= micros_from_s(LAND_DETECTOR_S) {
             self.since.touching_us = None;
             self.landed = true;
             self.since.landed_us = sensors.now_us;
@@ -475,6 +481,6 @@ impl Copter {
 }
 
 /// Microseconds of a time in seconds; what is negative or not a number is none.
-fn micros(s: f32) -> u64 {
+fn micros_from_s(s: f32) -> u64 {
     (f64::from(s) * 1e6) as u64
 }

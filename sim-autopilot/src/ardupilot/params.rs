@@ -2,12 +2,12 @@
 
 use planner_core::Point;
 
-use crate::params::Value::{self, Int, Int8, Int16, Real};
+use crate::params::ParamValue::{self, Int, Int8, Int16, Real};
 use crate::params::{Encoding, Params};
 use crate::vehicle::{Demand, Gains, VehicleLimits};
 
 /// Default parameters, sorted by name.
-const DEFAULTS: &[(&str, Value)] = &[
+const DEFAULTS: &[(&str, ParamValue)] = &[
     ("ACRO_TRAINER", Int8(2)),
     ("ANGLE_MAX", Int16(3000)),
     ("ARMING_CHECK", Int(1)),
@@ -71,7 +71,7 @@ const DEFAULTS: &[(&str, Value)] = &[
 ];
 
 /// The defaults, with the airframe's limits in the parameters that carry them.
-pub fn defaults(system_id: u8, limits: &VehicleLimits) -> Params {
+pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
     let own = [
         ("SYSID_THISMAV", Int16(i16::from(system_id))),
         ("WPNAV_SPEED", Real(100.0 * limits.speed_max_mps.min(10.0))),
@@ -113,7 +113,7 @@ pub struct Tuning {
 
 impl Tuning {
     /// A demand for nothing.
-    pub(super) fn nothing(&self) -> Demand {
+    pub(super) fn empty_demand(&self) -> Demand {
         Demand {
             position: NONE,
             velocity: NONE,
@@ -132,16 +132,16 @@ impl Tuning {
 
     /// The parameters that act, looked up once after each change.
     pub fn new(params: &Params) -> Self {
-        let cm = |name| 0.01 * params.real(name);
-        let whole_cm = |name| 0.01 * params.int(name) as f32;
-        let capacity = params.int("BATT_CAPACITY").max(1) as f32;
+        let cm = |name| 0.01 * params.f32_value(name);
+        let whole_cm = |name| 0.01 * params.i32_value(name) as f32;
+        let capacity = params.i32_value("BATT_CAPACITY").max(1) as f32;
         let or = |first: f32, second: f32| if first > 0.0 { first } else { second };
         Self {
             gains: Gains {
-                position: [params.real("PSC_POSXY_P"), params.real("PSC_POSZ_P")],
-                velocity_p: [params.real("PSC_VELXY_P"), params.real("PSC_VELZ_P")],
-                velocity_i: [params.real("PSC_VELXY_I"), params.real("PSC_VELZ_I")],
-                velocity_d: [params.real("PSC_VELXY_D"), 0.0],
+                position: [params.f32_value("PSC_POSXY_P"), params.f32_value("PSC_POSZ_P")],
+                velocity_p: [params.f32_value("PSC_VELXY_P"), params.f32_value("PSC_VELZ_P")],
+                velocity_i: [params.f32_value("PSC_VELXY_I"), params.f32_value("PSC_VELZ_I")],
+                velocity_d: [params.f32_value("PSC_VELXY_D"), 0.0],
                 tilt_tan: libm::tanf((whole_cm("ANGLE_MAX")).clamp(10.0, 80.0).to_radians()),
                 heading_rate_max: cm("ATC_SLEW_YAW").to_radians(),
             },
@@ -150,24 +150,24 @@ impl Tuning {
             speed_down: cm("WPNAV_SPEED_DN"),
             acceleration: cm("WPNAV_ACCEL").max(0.5),
             acceleration_z: cm("WPNAV_ACCEL_Z").max(0.5),
-            jerk: params.real("PSC_JERK_XY").max(1.0),
-            jerk_z: params.real("PSC_JERK_Z").max(1.0),
+            jerk: params.f32_value("PSC_JERK_XY").max(1.0),
+            jerk_z: params.f32_value("PSC_JERK_Z").max(1.0),
             land_speed: whole_cm("LAND_SPEED"),
             land_slow_below: whole_cm("LAND_ALT_LOW"),
             stick_sink: or(whole_cm("PILOT_SPEED_DN"), whole_cm("PILOT_SPEED_UP")),
-            guided_timeout_s: params.real("GUID_TIMEOUT").max(0.1),
-            disarm_delay_s: params.int("DISARM_DELAY") as f32,
+            guided_timeout_s: params.f32_value("GUID_TIMEOUT").max(0.1),
+            disarm_delay_s: params.i32_value("DISARM_DELAY") as f32,
             return_height: whole_cm("RTL_ALT"),
-            return_cone: params.real("RTL_CONE_SLOPE"),
-            return_loiter_s: 0.001 * params.int("RTL_LOIT_TIME") as f32,
-            gcs_failsafe: params.int("FS_GCS_ENABLE") != 0,
-            gcs_timeout_s: params.real("FS_GCS_TIMEOUT"),
-            gcs_system: params.int("SYSID_MYGCS") as u8,
-            estimator_failsafe: params.int("FS_EKF_ACTION") != 0,
-            battery_action: params.int("BATT_FS_LOW_ACT"),
-            battery_low: params.real("BATT_LOW_MAH") / capacity,
-            battery_to_arm: params.int("BATT_ARM_MAH") as f32 / capacity,
-            checks: params.int("ARMING_CHECK") != 0,
+            return_cone: params.f32_value("RTL_CONE_SLOPE"),
+            return_loiter_s: 0.001 * params.i32_value("RTL_LOIT_TIME") as f32,
+            gcs_failsafe: params.i32_value("FS_GCS_ENABLE") != 0,
+            gcs_timeout_s: params.f32_value("FS_GCS_TIMEOUT"),
+            gcs_system: params.i32_value("SYSID_MYGCS") as u8,
+            estimator_failsafe: params.i32_value("FS_EKF_ACTION") != 0,
+            battery_action: params.i32_value("BATT_FS_LOW_ACT"),
+            battery_low: params.f32_value("BATT_LOW_MAH") / capacity,
+            battery_to_arm: params.i32_value("BATT_ARM_MAH") as f32 / capacity,
+            checks: params.i32_value("ARMING_CHECK") != 0,
         }
     }
 }
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; of these only the battery's and the GCS failsafe are 0 by default.
-        let t = Tuning::new(&defaults(3, &VehicleLimits::default()));
+        let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
         let positive = [t.speed, t.speed_up, t.speed_down, t.land_speed, t.land_slow_below, t.stick_sink];
         assert!(positive.iter().all(|v| *v > 0.1));
         let positive = [t.disarm_delay_s, t.return_height, t.return_cone, t.return_loiter_s, t.gcs_timeout_s];

@@ -8,7 +8,7 @@ use planner_core::Point;
 
 use super::params::Tuning;
 use super::setpoint::Goal;
-use crate::shaping::approach;
+use crate::shaping::approach_rate;
 
 /// Share of the acceleration that corrections of position may use.
 const CORRECTION_ACCEL_SHARE: f32 = 0.5;
@@ -35,24 +35,25 @@ impl Reference {
         let error = goal.position.map_or(Point::zeros(), |position| position - self.position);
         // Across: a vector.
         let (limit, jerk) = (tuning.acceleration, tuning.jerk);
-        let mut wanted =
-            scaled(error.x, error.y, |e| approach(e, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit));
-        wanted = scaled(wanted.0, wanted.1, |speed| speed.min(tuning.speed));
+        let mut wanted = with_length(error.x, error.y, |e| {
+            approach_rate(e, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit)
+        });
+        wanted = with_length(wanted.0, wanted.1, |speed| speed.min(tuning.speed));
         wanted = (wanted.0 + goal.velocity.x, wanted.1 + goal.velocity.y);
         let lack = (wanted.0 - self.velocity.x, wanted.1 - self.velocity.y);
-        let push = scaled(lack.0, lack.1, |e| approach(e, jerk / limit, jerk).min(limit));
+        let push = with_length(lack.0, lack.1, |e| approach_rate(e, jerk / limit, jerk).min(limit));
         let step = (
             push.0 + goal.acceleration.x - self.acceleration.x,
             push.1 + goal.acceleration.y - self.acceleration.y,
         );
-        let step = scaled(step.0, step.1, |change| change.min(jerk * dt));
+        let step = with_length(step.0, step.1, |change| change.min(jerk * dt));
         self.acceleration.x += step.0;
         self.acceleration.y += step.1;
         // Up.
         let (limit, jerk) = (tuning.acceleration_z, tuning.jerk_z);
-        let rate = approach(error.z, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit);
+        let rate = approach_rate(error.z, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit);
         let rate = rate.max(-tuning.speed_down).min(tuning.speed_up) + goal.velocity.z;
-        let push = approach(rate - self.velocity.z, jerk / limit, jerk).max(-limit).min(limit);
+        let push = approach_rate(rate - self.velocity.z, jerk / limit, jerk).max(-limit).min(limit);
         let step = push + goal.acceleration.z - self.acceleration.z;
         self.acceleration.z += step.max(-jerk * dt).min(jerk * dt);
         self.velocity += self.acceleration * dt;
@@ -61,7 +62,7 @@ impl Reference {
 }
 
 /// A vector of the same direction whose length is a function of its own.
-fn scaled(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
+fn with_length(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
     let norm = libm::hypotf(x, y);
     if norm < 1e-6 {
         return (0.0, 0.0);
@@ -78,7 +79,7 @@ mod tests {
 
     #[test]
     fn it_arrives_within_every_limit_and_does_not_overshoot() {
-        let tuning = Tuning::new(&params::defaults(1, &VehicleLimits::default()));
+        let tuning = Tuning::new(&params::default_params(1, &VehicleLimits::default()));
         let mut reference = Reference::new(Point::zeros(), Point::zeros());
         let goal = Goal::hold(Point::new(12.0, 16.0, 10.0));
         let dt = 0.004;

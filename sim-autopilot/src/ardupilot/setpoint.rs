@@ -9,7 +9,7 @@ use planner_core::Point;
 use planner_core::frames::Geodetic;
 
 use crate::platform::Platform;
-use crate::wire::Fields;
+use crate::wire::PayloadReader;
 
 const FRAME_LOCAL_NED: u8 = 1;
 const FRAME_LOCAL_OFFSET_NED: u8 = 7;
@@ -57,7 +57,7 @@ impl Goal {
 }
 
 /// Reads message 84.
-pub fn local_ned(fields: &Fields<'_>, platform: &Platform) -> Goal {
+pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
     let frame = fields.u8(52);
     let in_body = matches!(frame, FRAME_BODY_NED | FRAME_BODY_OFFSET_NED);
     if frame != FRAME_LOCAL_NED && frame != FRAME_LOCAL_OFFSET_NED && !in_body {
@@ -68,17 +68,17 @@ pub fn local_ned(fields: &Fields<'_>, platform: &Platform) -> Goal {
         true => Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z),
         false => v,
     };
-    let mut ned = turned(vector(fields, 4));
+    let mut ned = turned(read_vector(fields, 4));
     if frame != FRAME_LOCAL_NED {
-        ned += platform.frame.ned(&platform.sensors().position.cast::<f64>());
+        ned += platform.frame.ned_from_enu(&platform.sensors().position.cast::<f64>());
     }
-    let position = platform.frame.enu(&ned).cast::<f32>();
-    let rate = |at| platform.frame.enu_rate(&turned(vector(fields, at))).cast::<f32>();
-    finish(fields, position, rate(16), rate(28))
+    let position = platform.frame.enu_from_ned(&ned).cast::<f32>();
+    let rate = |at| platform.frame.enu_velocity_from_ned(&turned(read_vector(fields, at))).cast::<f32>();
+    goal_from_fields(fields, position, rate(16), rate(28))
 }
 
 /// Reads message 86.
-pub fn global_int(fields: &Fields<'_>, platform: &Platform) -> Goal {
+pub fn read_global_int(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
     let base = match fields.u8(52) {
         0 | 5 => 0.0,
         3 | 6 => platform.home.alt_m,
@@ -92,15 +92,20 @@ pub fn global_int(fields: &Fields<'_>, platform: &Platform) -> Goal {
     if !asked.is_valid() {
         return Goal::STOP;
     }
-    let rate = |at| platform.frame.enu_rate(&vector(fields, at)).cast::<f32>();
-    finish(fields, platform.frame.enu_of_geodetic(&asked).cast::<f32>(), rate(16), rate(28))
+    let rate = |at| platform.frame.enu_velocity_from_ned(&read_vector(fields, at)).cast::<f32>();
+    goal_from_fields(fields, platform.frame.enu_from_geodetic(&asked).cast::<f32>(), rate(16), rate(28))
 }
 
-fn vector(fields: &Fields<'_>, at: usize) -> Vector3<f64> {
+fn read_vector(fields: &PayloadReader<'_>, at: usize) -> Vector3<f64> {
     Vector3::new(fields.f32(at), fields.f32(at + 4), fields.f32(at + 8)).cast::<f64>()
 }
 
-fn finish(fields: &Fields<'_>, position: Point, velocity: Point, acceleration: Point) -> Goal {
+fn goal_from_fields(
+    fields: &PayloadReader<'_>,
+    position: Point,
+    velocity: Point,
+    acceleration: Point,
+) -> Goal {
     let mask = fields.u16(48);
     let given = |bits: u16| mask & bits == 0;
     let has = (given(MASK_POSITION), given(MASK_VELOCITY), given(MASK_ACCELERATION));

@@ -12,31 +12,31 @@ const INT32: u8 = 6;
 
 impl Copter {
     /// Messages that the autopilot sends when it has booted.
-    pub fn boot(&mut self, platform: &mut Platform) {
-        platform.say(6, "ArduPilot Ready");
-        platform.announce(1);
+    pub fn send_boot_messages(&mut self, platform: &mut Platform) {
+        platform.send_text(6, "ArduPilot Ready");
+        platform.send_on_all_ports(1);
     }
 
-    /// Reports what has become so since the last step.
-    pub(super) fn tell_progress(&mut self, platform: &mut Platform, now_us: u64) {
-        if !self.said[0] && self.origin_known(now_us) {
-            self.said[0] = true;
+    /// Sends messages about changes since the last step.
+    pub(super) fn send_progress_messages(&mut self, platform: &mut Platform, now_us: u64) {
+        if !self.reported[0] && self.origin_known(now_us) {
+            self.reported[0] = true;
             platform.announce_origin();
-            platform.announce(HOME_POSITION);
-            platform.say(6, "EKF3 IMU0 origin set");
+            platform.send_on_all_ports(HOME_POSITION);
+            platform.send_text(6, "EKF3 IMU0 origin set");
         }
-        if !self.said[1] && self.position_known(now_us) {
-            self.said[1] = true;
-            platform.say(6, "EKF3 IMU0 is using GPS");
+        if !self.reported[1] && self.position_known(now_us) {
+            self.reported[1] = true;
+            platform.send_text(6, "EKF3 IMU0 is using GPS");
         }
         if now_us >= self.runtime_us + RUNTIME_EVERY_US {
             self.runtime_us = now_us;
-            self.tell_runtime(platform, (now_us / 1_000_000) as f32);
+            self.send_runtime_param(platform, (now_us / 1_000_000) as f32);
         }
     }
 
-    /// PARAM_VALUE that nobody asked for.
-    fn tell_runtime(&self, platform: &mut Platform, seconds: f32) {
+    /// Unrequested PARAM_VALUE.
+    fn send_runtime_param(&self, platform: &mut Platform, seconds: f32) {
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&seconds.to_le_bytes());
         payload[4..6].copy_from_slice(&(self.params.len() as u16).to_le_bytes());

@@ -5,13 +5,13 @@ use planner_core::frames::Geodetic;
 use super::{Mode, Px4};
 use crate::command::{
     ACCEPTED, ARM_FORCE, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, TEMPORARILY_REJECTED, UNSUPPORTED, accept,
-    message_id,
+    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, TEMPORARILY_REJECTED, UNSUPPORTED,
+    accepted_or_rejected, message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
 use crate::telemetry;
-use crate::wire::Fields;
+use crate::wire::PayloadReader;
 
 impl Px4 {
     /// Takes a command and acknowledges it.
@@ -21,23 +21,25 @@ impl Px4 {
             DO_SET_MODE => {
                 let mode = mode_of(command.param[0] as u8, command.param[1] as u8, command.param[2] as u8);
                 platform.acknowledge(from, DO_SET_MODE, ACCEPTED);
-                self.asked = Some((from, mode));
+                self.pending_mode = Some((from, mode));
                 return;
             }
-            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return platform.control_camera(from, command),
+            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
+                return platform.handle_camera_command(from, command);
+            }
             400 => self.arm_or_disarm(platform, command),
             22 => self.take_off(platform, command),
-            21 => accept(self.change_mode(platform, Mode::Land)),
-            20 => accept(self.change_mode(platform, Mode::Return)),
-            17 => accept(self.change_mode(platform, Mode::Hold)),
+            21 => accepted_or_rejected(self.change_mode(platform, Mode::Land)),
+            20 => accepted_or_rejected(self.change_mode(platform, Mode::Return)),
+            17 => accepted_or_rejected(self.change_mode(platform, Mode::Hold)),
             192 => self.reposition(platform, command),
             178 => {
                 self.commander.set_cruise(command.param[1]);
                 ACCEPTED
             }
-            179 if platform.set_home(command) => ACCEPTED,
+            179 if platform.handle_set_home(command) => ACCEPTED,
             179 => DENIED,
-            193 if command.param[0] == 0.0 => accept(self.change_mode(platform, Mode::Hold)),
+            193 if command.param[0] == 0.0 => accepted_or_rejected(self.change_mode(platform, Mode::Hold)),
             193 => TEMPORARILY_REJECTED,
             300 => self.start_mission(platform),
             245 => ACCEPTED,
@@ -45,7 +47,7 @@ impl Px4 {
             246 if self.commander.armed() => TEMPORARILY_REJECTED,
             246 => {
                 if command.param[0] == 1.0 {
-                    platform.reboot_soon();
+                    platform.schedule_reboot();
                 }
                 ACCEPTED
             }
@@ -53,14 +55,14 @@ impl Px4 {
             511 => platform.set_interval(from, command, &telemetry::STREAMS, FAILED),
             512 => match message_id(command.param[0]) {
                 Some(id) if self.has_message(id) => {
-                    platform.ports[from.port].once.push(id);
+                    platform.ports[from.port].requested_once.push(id);
                     ACCEPTED
                 }
                 _ => DENIED,
             },
             519 | 520 => {
                 let id = if command.id == 519 { PROTOCOL_VERSION } else { AUTOPILOT_VERSION };
-                platform.ports[from.port].once.push(id);
+                platform.ports[from.port].requested_once.push(id);
                 ACCEPTED
             }
             _ => UNSUPPORTED,
@@ -69,7 +71,7 @@ impl Px4 {
     }
 
     /// Takes the old SET_MODE, which is not acknowledged.
-    pub(crate) fn handle_set_mode(&mut self, platform: &Platform, fields: &Fields<'_>) {
+    pub(crate) fn handle_set_mode(&mut self, platform: &Platform, fields: &PayloadReader<'_>) {
         let custom = fields.u32(0);
         if let Some(mode) = mode_of(fields.u8(5), (custom >> 16) as u8, (custom >> 24) as u8) {
             self.change_mode(platform, mode);
@@ -89,9 +91,9 @@ impl Px4 {
     fn arm_or_disarm(&mut self, platform: &mut Platform, command: &Command) -> u8 {
         let force = command.param[1] == ARM_FORCE;
         if command.param[0] == 1.0 {
-            accept(self.arm(platform, force))
+            accepted_or_rejected(self.arm(platform, force))
         } else if command.param[0] == 0.0 {
-            accept(self.commander.disarm(force))
+            accepted_or_rejected(self.commander.disarm(force))
         } else {
             UNSUPPORTED
         }
@@ -120,21 +122,21 @@ impl Px4 {
         // The altitude is above the sea; how high that is in the mission frame depends on where it is asked for.
         let up = if command.z.is_finite() && command.z != 0.0 {
             let base = if command.relative { platform.home.alt_m } else { 0.0 };
-            let here = platform.frame.geodetic(platform.vehicle.position());
+            let here = platform.frame.geodetic_from_enu(platform.vehicle.position());
             let target = Geodetic { alt_m: f64::from(command.z) + base, ..here };
-            platform.frame.enu_of_geodetic(&target).z as f32
+            platform.frame.enu_from_geodetic(&target).z as f32
         } else {
             f32::NAN
         };
         let sensors = platform.sensors();
-        accept(self.commander.takeoff(up, &sensors, &self.tuning))
+        accepted_or_rejected(self.commander.takeoff(up, &sensors, &self.tuning))
     }
 
     fn reposition(&mut self, platform: &Platform, command: &Command) -> u8 {
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let sensors = platform.sensors();
         self.commander.set_cruise(command.param[0]);
-        accept(self.commander.reposition(&to, command.param[3], &sensors, &self.tuning))
+        accepted_or_rejected(self.commander.reposition(&to, command.param[3], &sensors, &self.tuning))
     }
 }
 

@@ -4,14 +4,14 @@ use super::params::{self, Tuning};
 use super::setpoint;
 use super::{Commander, Mode};
 use crate::AutopilotKind;
-use crate::command::{DO_SET_MODE, accept};
-use crate::itinerary::Leg;
+use crate::command::{DO_SET_MODE, accepted_or_rejected};
+use crate::itinerary::MissionLeg;
 use crate::params::Params;
-use crate::platform::{Order, Platform, SensorReadings};
+use crate::platform::{ActuatorCommand, Platform, SensorReadings};
 use crate::port::Sender;
-use crate::status::Status;
+use crate::status::FirmwareStatus;
 use crate::vehicle::VehicleLimits;
-use crate::wire::Fields;
+use crate::wire::PayloadReader;
 
 const COMMAND_LONG: u32 = 76;
 /// DO_GIMBAL_MANAGER_CONFIGURE and DO_GIMBAL_MANAGER_PITCHYAW as they were recorded when a failsafe began: takes control of the
@@ -32,23 +32,23 @@ pub struct Px4 {
     /// Parameters that act.
     pub tuning: Tuning,
     /// A pending DO_SET_MODE: sender, and the requested mode if it is valid.
-    pub(super) asked: Option<(Sender, Option<Mode>)>,
+    pub(super) pending_mode: Option<(Sender, Option<Mode>)>,
 }
 
 impl Px4 {
     /// PX4 as it boots, with the airframe's limits in its parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
-        let params = params::defaults(system_id, limits);
-        Self { commander: Commander::new(), tuning: Tuning::new(&params), params, asked: None }
+        let params = params::default_params(system_id, limits);
+        Self { commander: Commander::new(), tuning: Tuning::new(&params), params, pending_mode: None }
     }
 
     /// One step. A requested mode is decided now: a setpoint that came just behind the command
     /// counts.
-    pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> Order {
+    pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> ActuatorCommand {
         self.commander.set_mission_ready(platform.has_mission());
-        if let Some((from, mode)) = self.asked.take() {
+        if let Some((from, mode)) = self.pending_mode.take() {
             let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sensors, &self.tuning));
-            platform.acknowledge(from, DO_SET_MODE, accept(changed));
+            platform.acknowledge(from, DO_SET_MODE, accepted_or_rejected(changed));
         }
         self.fly_mission(platform, sensors);
         let failed = self.commander.in_failsafe();
@@ -63,8 +63,8 @@ impl Px4 {
     fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if !self.commander.armed() {
             if let Some(leg) = self.commander.mission.leg.take() {
-                if matches!(leg, Leg::Land { .. }) {
-                    platform.pass_item();
+                if matches!(leg, MissionLeg::Land { .. }) {
+                    platform.complete_item();
                 }
                 platform.rewind_mission();
             }
@@ -72,37 +72,37 @@ impl Px4 {
         }
         if self.commander.mode() != Mode::Mission {
             if self.commander.mission.leg.take().is_some() {
-                platform.missions.progress.interrupt();
+                platform.missions.progress.restart_item();
             }
             return;
         }
         let leg = platform.fly_mission(sensors, self.commander.landed());
         let mission = &mut self.commander.mission;
         if leg != mission.leg {
-            mission.from = Leg::end(mission.leg, &sensors.position);
+            mission.from = MissionLeg::leg_end(mission.leg, &sensors.position);
         }
         mission.leg = leg;
         if let Some(speed) = platform.missions.speed.take() {
             self.commander.set_cruise(speed);
         }
-        if self.commander.mission.leg == Some(Leg::Return) {
+        if self.commander.mission.leg == Some(MissionLeg::Return) {
             self.commander.mission.leg = None;
-            platform.pass_item();
+            platform.complete_item();
             platform.rewind_mission();
             self.commander.force_mode(Mode::Return, sensors);
         }
     }
 
     /// State that telemetry reports.
-    pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> Status {
+    pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> FirmwareStatus {
         let (system_status, flags) = self.commander.heartbeat(platform.time_us, &self.tuning);
-        Status {
-            personality: AutopilotKind::Px4,
+        FirmwareStatus {
+            autopilot: AutopilotKind::Px4,
             custom_mode: self.commander.mode().custom_mode(),
-            intended_mode: self.commander.intention().custom_mode(),
+            intended_mode: self.commander.intended_mode().custom_mode(),
             flags,
             system_status,
-            armable: self.commander.armable(sensors, &self.tuning),
+            armable: self.commander.is_armable(sensors, &self.tuning),
             landed_state: self.commander.landed_state(),
             guided: true,
             ekf_flags: 0,
@@ -113,16 +113,16 @@ impl Px4 {
     }
 
     /// Takes a setpoint, if it counts.
-    pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &Fields<'_>) {
-        let context = setpoint::Context {
+    pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
+        let context = setpoint::FrameContext {
             frame: &platform.frame,
             heading: platform.vehicle.state().heading_rad,
             home_alt_m: platform.home.alt_m,
         };
         let setpoint = if id == 84 {
-            setpoint::local_ned(fields, &context)
+            setpoint::read_local_ned(fields, &context)
         } else {
-            setpoint::global_int(fields, &context)
+            setpoint::read_global_int(fields, &context)
         };
         if let Some(setpoint) = setpoint {
             self.commander.handle_setpoint(setpoint, platform.time_us);

@@ -2,11 +2,11 @@
 
 use planner_core::Point;
 
-use super::glide::{self, Glide};
+use super::glide::{self, SmoothedApproach};
 use super::params::Tuning;
 use super::{CRAWL_SHARE, Commander, Mode, ReturnLeg, SensorReadings};
-use crate::itinerary::{Leg, on_line};
-use crate::shaping::Ramp;
+use crate::itinerary::{MissionLeg, interpolate_height};
+use crate::shaping::JerkLimitedRate;
 use crate::vehicle::Demand;
 
 /// Least height above the present one that a setpoint must command to count as a climb, metres; a
@@ -27,10 +27,10 @@ const MAX_LAND_MPS: f32 = 1.3;
 const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
-    /// Fixes what the mode leans on: where it stops, which leg of the return is next.
-    pub(super) fn enter(&mut self, mode: Mode, sensors: &SensorReadings) {
-        self.hold = sensors.position + glide::stop(&sensors.velocity);
-        self.glide = Glide::new(sensors.now_us, &sensors.position, &sensors.velocity);
+    /// Initialises the mode: its stopping point, and the next leg of a return.
+    pub(super) fn enter_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
+        self.hold = sensors.position + glide::stopping_point(&sensors.velocity);
+        self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
         self.hold_heading = sensors.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
         self.descent = None;
@@ -40,7 +40,7 @@ impl Commander {
     }
 
     /// Whether the demand lifts a vehicle off the ground. Hold, Return and Land never do.
-    pub(super) fn wants_up(&self, sensors: &SensorReadings, demand: &Demand) -> bool {
+    pub(super) fn demands_lift_off(&self, sensors: &SensorReadings, demand: &Demand) -> bool {
         match self.mode() {
             Mode::Takeoff => true,
             Mode::Mission => demand.position.z - sensors.position.z > MIN_CLIMB_DEMAND_M,
@@ -61,7 +61,7 @@ impl Commander {
             speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
             climb_max: tuning.auto_up.min(tuning.climb_max),
             descend_max: tuning.auto_down.min(tuning.descend_max),
-            ..tuning.nothing()
+            ..tuning.empty_demand()
         };
         match self.mode() {
             Mode::Offboard => match self.setpoint {
@@ -71,7 +71,7 @@ impl Commander {
                     acceleration: s.acceleration,
                     heading: s.heading,
                     heading_rate: s.heading_rate,
-                    ..tuning.nothing()
+                    ..tuning.empty_demand()
                 },
                 None => held,
             },
@@ -79,32 +79,32 @@ impl Commander {
                 let up = self.takeoff_up;
                 let up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
                 if !self.landed && sensors.position.z > up - ARRIVED_M {
-                    // Reached: PX4 goes on in Hold at the height asked for.
-                    self.intention = Mode::Hold;
+                    // Reached: PX4 continues in Hold at the height asked for.
+                    self.intended_mode = Mode::Hold;
                     self.after_disarm = Mode::Hold;
                     self.takeoff_up = f32::NAN;
                     self.hold.z = up;
-                    self.glide = Glide::new(sensors.now_us, &self.hold, &Point::zeros());
+                    self.glide = SmoothedApproach::new(sensors.now_us, &self.hold, &Point::zeros());
                 }
                 let position = Point::new(self.hold.x, self.hold.y, up);
                 Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
             }
             Mode::Mission => self.mission_demand(sensors, tuning, held),
             Mode::Land => {
-                let across = self.glided(sensors, tuning, &held);
-                let down = self.landing(sensors, tuning, held);
-                with_up(across, &down)
+                let across = self.approach_demand(sensors, tuning, &held);
+                let down = self.landing_demand(sensors, tuning, held);
+                with_vertical(across, &down)
             }
-            Mode::Hold => self.glided(sensors, tuning, &held),
-            Mode::Return => self.returning(sensors, tuning, held),
+            Mode::Hold => self.approach_demand(sensors, tuning, &held),
+            Mode::Return => self.return_demand(sensors, tuning, held),
             _ => held,
         }
     }
 
     /// Demand to hold a place, which is approached as the automatic modes approach it across.
-    fn glided(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: &Demand) -> Demand {
+    fn approach_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: &Demand) -> Demand {
         self.glide.advance(sensors.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
-        let Glide { position, ramps: [east, north], .. } = self.glide;
+        let SmoothedApproach { position, ramps: [east, north], .. } = self.glide;
         let up = f32::NAN;
         Demand {
             position: Point::new(position.x, position.y, held.position.z),
@@ -118,12 +118,12 @@ impl Commander {
     /// (`MPC_YAW_MODE` 0).
     fn mission_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
         match self.mission.leg {
-            Some(Leg::TakeOff { up }) => {
+            Some(MissionLeg::TakeOff { up }) => {
                 self.hold.z = up;
                 let climb_max = tuning.takeoff_speed.min(held.climb_max);
                 Demand { position: self.hold, climb_max, ..held }
             }
-            Some(Leg::To { at, heading, .. }) => {
+            Some(MissionLeg::To { at, heading, .. }) => {
                 let off = at - sensors.position;
                 if heading.is_finite() {
                     self.hold_heading = heading;
@@ -131,27 +131,28 @@ impl Commander {
                     self.hold_heading = libm::atan2f(off.x, off.y);
                 }
                 self.hold = at;
-                let (up, rate) = on_line(&self.mission.from, &at, &sensors.position, &sensors.velocity);
+                let (up, rate) =
+                    interpolate_height(&self.mission.from, &at, &sensors.position, &sensors.velocity);
                 let (position, velocity) = (Point::new(at.x, at.y, up), Point::new(0.0, 0.0, rate));
                 Demand { position, velocity, heading: self.hold_heading, ..held }
             }
-            Some(Leg::Land { at }) => {
+            Some(MissionLeg::Land { at }) => {
                 if let Some([east, north]) = at {
                     (self.hold.x, self.hold.y) = (east, north);
                     if libm::hypotf(east - sensors.position.x, north - sensors.position.y) > ARRIVED_M {
                         return Demand { position: self.hold, ..held };
                     }
                 }
-                self.landing(sensors, tuning, held)
+                self.landing_demand(sensors, tuning, held)
             }
-            Some(Leg::Wait(_) | Leg::Return) | None => held,
+            Some(MissionLeg::Wait(_) | MissionLeg::Return) | None => held,
         }
     }
 
     /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`, these heights
     /// above home; and crawls (`MPC_LAND_CRWL`) once a distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the
     /// rate is smooth (`MPC_JERK_AUTO`).
-    fn landing(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
+    fn landing_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
         let [high, low] = tuning.land_slow_below;
         let height = sensors.position.z - sensors.home.z;
         let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
@@ -167,7 +168,7 @@ impl Commander {
                 *ramp
             }
             begin => {
-                let ramp = Ramp { rate: -sensors.velocity.z, change: 0.0 };
+                let ramp = JerkLimitedRate { rate: -sensors.velocity.z, change: 0.0 };
                 *begin = Some((sensors.now_us, ramp));
                 ramp
             }
@@ -182,7 +183,7 @@ impl Commander {
         }
     }
 
-    fn returning(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
+    fn return_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
         let away = libm::hypotf(sensors.home.x - sensors.position.x, sensors.home.y - sensors.position.y);
         if let ReturnLeg::Climb { up } = &mut self.leg
             && up.is_nan()
@@ -215,13 +216,13 @@ impl Commander {
                 }
                 Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
             }
-            ReturnLeg::Land => self.landing(sensors, tuning, held),
+            ReturnLeg::Land => self.landing_demand(sensors, tuning, held),
         }
     }
 }
 
 /// A demand with the vertical part of another.
-fn with_up(across: Demand, up: &Demand) -> Demand {
+fn with_vertical(across: Demand, up: &Demand) -> Demand {
     let both = |a: Point, z: f32| Point::new(a.x, a.y, z);
     Demand {
         position: both(across.position, up.position.z),

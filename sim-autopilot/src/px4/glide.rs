@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 
-use crate::shaping::Ramp;
+use crate::shaping::JerkLimitedRate;
 
 /// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
 const AUTO_ACCEL_MPS2: f32 = 3.0;
@@ -14,29 +14,29 @@ const MAX_STEP_S: f32 = 0.1;
 
 /// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is. With 1.85 m/s recorded vehicles went 0.9 m in the first
 /// second and 1.1 to 1.7 m in all.
-pub fn stop(velocity: &Point) -> Point {
+pub fn stopping_point(velocity: &Point) -> Point {
     let speed = libm::hypotf(velocity.x, velocity.y);
     Point::new(velocity.x, velocity.y, 0.0) * (speed / (2.0 * AUTO_ACCEL_MPS2) + BRAKING_DELAY_S)
 }
 
 /// A point that is flown to a target across: it starts as the vehicle is and obeys the limits of the automatic modes.
 #[derive(Clone, Copy, Debug)]
-pub struct Glide {
+pub struct SmoothedApproach {
     at_us: u64,
     /// ENU metres; the height is nobody's.
     pub position: Point,
     /// East and north.
-    pub ramps: [Ramp; 2],
+    pub ramps: [JerkLimitedRate; 2],
 }
 
-impl Glide {
+impl SmoothedApproach {
     /// A glide that begins at this position with this velocity.
     pub fn new(now_us: u64, position: &Point, velocity: &Point) -> Self {
-        let ramp = |rate| Ramp { rate, change: 0.0 };
+        let ramp = |rate| JerkLimitedRate { rate, change: 0.0 };
         Self { at_us: now_us, position: *position, ramps: [ramp(velocity.x), ramp(velocity.y)] }
     }
 
-    /// Goes on towards `target` until `now_us`, at `speed_max` m/s and `jerk` m/s³ at most.
+    /// Continues towards `target` until `now_us`, at `speed_max` m/s and `jerk` m/s³ at most.
     pub fn advance(&mut self, now_us: u64, target: &Point, speed_max: f32, jerk: f32) {
         let since_us = now_us.saturating_sub(core::mem::replace(&mut self.at_us, now_us));
         let dt = (since_us as f32 * 1e-6).min(MAX_STEP_S);
@@ -61,8 +61,8 @@ mod tests {
     fn it_arrives_where_it_shall_from_any_speed_and_stays() {
         for (speed, cruise) in [(0.0, 5.0), (0.3, 5.0), (1.85, 5.0), (4.0, 5.0), (8.0, 5.0), (0.5, 0.3)] {
             let velocity = Point::new(0.6 * speed, -0.8 * speed, 0.0);
-            let target = stop(&velocity) + Point::new(1.0, 2.0, 0.0);
-            let mut glide = Glide::new(0, &Point::zeros(), &velocity);
+            let target = stopping_point(&velocity) + Point::new(1.0, 2.0, 0.0);
+            let mut glide = SmoothedApproach::new(0, &Point::zeros(), &velocity);
             for step in 1..=5000_u64 {
                 let before = glide.ramps.map(|ramp| ramp.change);
                 glide.advance(step * 4000, &target, cruise, 4.0);

@@ -23,13 +23,13 @@ mod firmware;
 use planner_core::Point;
 
 pub use self::firmware::Px4;
-use self::glide::Glide;
+use self::glide::SmoothedApproach;
 pub use self::modes::Mode;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
-use super::itinerary::Leg;
-use super::platform::{Integral, Order, SensorReadings};
-use super::shaping::Ramp;
+use super::itinerary::MissionLeg;
+use super::platform::{ActuatorCommand, IntegralAction, SensorReadings};
+use super::shaping::JerkLimitedRate;
 
 /// Delay of the failsafe after `COM_OF_LOSS_T`, seconds: 1.23 s seen at most, and gaps of 1.25 s
 /// trip it.
@@ -49,7 +49,7 @@ const LAND_FILTER_S: f32 = 0.5;
 const DISARM_REACTION_S: f32 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Phase {
+enum FlightPhase {
     Ground,
     Ramp { since_us: u64 },
     Flying,
@@ -69,8 +69,8 @@ struct Mission {
     /// A mission is stored.
     ready: bool,
     /// Leg that the mission commands, while it is flown.
-    leg: Option<Leg>,
-    /// Begin of that leg.
+    leg: Option<MissionLeg>,
+    /// Start of that leg.
     from: Point,
 }
 
@@ -80,10 +80,10 @@ pub struct Commander {
     armed: bool,
     landed: bool,
     flown: bool,
-    intention: Mode,
+    intended_mode: Mode,
     after_disarm: Mode,
     failsafe: Option<Mode>,
-    phase: Phase,
+    phase: FlightPhase,
     armed_us: u64,
     landed_us: u64,
     touching_us: Option<u64>,
@@ -91,13 +91,13 @@ pub struct Commander {
     setpoint_us: u64,
     hold: Point,
     /// On the way to `hold`.
-    glide: Glide,
+    glide: SmoothedApproach,
     hold_heading: f32,
     takeoff_up: f32,
     cruise: Option<f32>,
     leg: ReturnLeg,
     /// Rate of sinking in Land, as of when.
-    descent: Option<(u64, Ramp)>,
+    descent: Option<(u64, JerkLimitedRate)>,
     position_ok: bool,
     mission: Mission,
 }
@@ -115,17 +115,17 @@ impl Commander {
             armed: false,
             landed: true,
             flown: false,
-            intention: Mode::Hold,
+            intended_mode: Mode::Hold,
             after_disarm: Mode::Hold,
             failsafe: None,
-            phase: Phase::Ground,
+            phase: FlightPhase::Ground,
             armed_us: 0,
             landed_us: 0,
             touching_us: None,
             setpoint: None,
             setpoint_us: 0,
             hold: Point::zeros(),
-            glide: Glide::new(0, &Point::zeros(), &Point::zeros()),
+            glide: SmoothedApproach::new(0, &Point::zeros(), &Point::zeros()),
             hold_heading: 0.0,
             takeoff_up: f32::NAN,
             cruise: None,
@@ -148,12 +148,12 @@ impl Commander {
 
     /// The mode that flies, the failsafe's while there is one.
     pub fn mode(&self) -> Mode {
-        self.failsafe.unwrap_or(self.intention)
+        self.failsafe.unwrap_or(self.intended_mode)
     }
 
     /// The mode that was asked for, whatever a failsafe flies.
-    pub fn intention(&self) -> Mode {
-        self.intention
+    pub fn intended_mode(&self) -> Mode {
+        self.intended_mode
     }
 
     /// A failsafe flies.
@@ -166,8 +166,8 @@ impl Commander {
         match self.mode() {
             _ if self.landed => 1,
             Mode::Takeoff => 3,
-            Mode::Mission if matches!(self.mission.leg, Some(Leg::TakeOff { .. })) => 3,
-            Mode::Mission if matches!(self.mission.leg, Some(Leg::Land { .. })) => 4,
+            Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::TakeOff { .. })) => 3,
+            Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::Land { .. })) => 4,
             Mode::Land => 4,
             Mode::Return if self.leg == ReturnLeg::Land => 4,
             _ => 2,
@@ -181,7 +181,7 @@ impl Commander {
             (true, Some(_)) => 5,
             (true, None) => 4,
             // A disarmed vehicle whose mode could not run says 0, not STANDBY.
-            (false, _) if mode == Mode::Offboard && !self.stream_fresh(now_us, tuning) => 0,
+            (false, _) if mode == Mode::Offboard && !self.is_setpoint_stream_fresh(now_us, tuning) => 0,
             (false, _) => 3,
         };
         let flags = if mode.is_auto() {
@@ -213,8 +213,8 @@ impl Commander {
     }
 
     /// Whether setpoints keep coming.
-    pub fn stream_fresh(&self, now_us: u64, tuning: &Tuning) -> bool {
-        let limit = seconds(tuning.offboard_loss_s + LOSS_REACTION_S);
+    pub fn is_setpoint_stream_fresh(&self, now_us: u64, tuning: &Tuning) -> bool {
+        let limit = micros_from_s(tuning.offboard_loss_s + LOSS_REACTION_S);
         self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
     }
 
@@ -223,20 +223,20 @@ impl Commander {
         if self.armed {
             return true;
         }
-        if !force && !self.armable(sensors, tuning) {
+        if !force && !self.is_armable(sensors, tuning) {
             return false;
         }
         self.armed = true;
         self.armed_us = sensors.now_us;
         self.flown = !self.landed;
-        self.enter(self.intention, sensors);
+        self.enter_mode(self.intended_mode, sensors);
         true
     }
 
     /// Whether the arming checks pass.
-    pub fn armable(&self, sensors: &SensorReadings, tuning: &Tuning) -> bool {
-        let runs = match self.intention {
-            Mode::Offboard => self.stream_fresh(sensors.now_us, tuning),
+    pub fn is_armable(&self, sensors: &SensorReadings, tuning: &Tuning) -> bool {
+        let runs = match self.intended_mode {
+            Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
             Mode::Hold | Mode::Takeoff => true,
             Mode::Mission => self.mission.ready,
             Mode::Land | Mode::Return => false,
@@ -252,10 +252,10 @@ impl Commander {
         }
         self.armed = false;
         self.failsafe = None;
-        self.phase = Phase::Ground;
+        self.phase = FlightPhase::Ground;
         self.cruise = None;
-        if self.intention.ends_with_flight() {
-            self.intention = self.after_disarm;
+        if self.intended_mode.ends_with_flight() {
+            self.intended_mode = self.after_disarm;
         }
         true
     }
@@ -263,7 +263,7 @@ impl Commander {
     /// Changes the mode if it can run; the second ack of DO_SET_MODE says so.
     pub fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match mode {
-            Mode::Offboard => self.stream_fresh(sensors.now_us, tuning),
+            Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
             Mode::Mission => self.mission.ready,
             mode => !mode.needs_sticks(),
         };
@@ -274,9 +274,9 @@ impl Commander {
         true
     }
 
-    /// Changes the mode as a pilot's switch does, whom nobody asks whether it can run.
+    /// Changes the mode as a pilot's switch does: without a check whether the mode can run.
     pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
-        self.intention = mode;
+        self.intended_mode = mode;
         if !mode.ends_with_flight() {
             self.after_disarm = mode;
         }
@@ -284,7 +284,7 @@ impl Commander {
             self.takeoff_up = f32::NAN;
         }
         self.failsafe = None;
-        self.enter(mode, sensors);
+        self.enter_mode(mode, sensors);
     }
 
     /// Take-off to a height in the mission frame; NaN is `MIS_TAKEOFF_ALT` above home.
@@ -324,7 +324,7 @@ impl Commander {
     }
 
     /// One step: timers, failsafe, phases, and the demand of the mode.
-    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Order {
+    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> ActuatorCommand {
         let now = sensors.now_us;
         if self.armed {
             self.update_failsafe(sensors, tuning);
@@ -336,20 +336,20 @@ impl Commander {
                 self.landed = true;
                 self.landed_us = now;
             }
-            let demand = tuning.nothing();
-            return Order { lift: false, integral: Integral::Clear, demand };
+            let demand = tuning.empty_demand();
+            return ActuatorCommand { lift: false, integral: IntegralAction::Clear, demand };
         }
         let mut demand = self.demand(sensors, tuning);
-        let wants_up = self.wants_up(sensors, &demand);
-        let mut integral = Integral::Keep;
+        let wants_up = self.demands_lift_off(sensors, &demand);
+        let mut integral = IntegralAction::Keep;
         match self.phase {
-            Phase::Ground => {
-                integral = Integral::Clear;
-                if wants_up && now.saturating_sub(self.armed_us) >= seconds(tuning.spool_up_s) {
-                    self.phase = Phase::Ramp { since_us: now };
+            FlightPhase::Ground => {
+                integral = IntegralAction::Clear;
+                if wants_up && now.saturating_sub(self.armed_us) >= micros_from_s(tuning.spool_up_s) {
+                    self.phase = FlightPhase::Ramp { since_us: now };
                 }
             }
-            Phase::Ramp { since_us } => {
+            FlightPhase::Ramp { since_us } => {
                 let progress = now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
                 // The climb limit starts where it cancels hover thrust (`TakeoffHandling::updateRamp`).
                 let floor = -crate::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
@@ -359,27 +359,28 @@ impl Commander {
                     self.flown = true;
                 }
                 if progress >= 1.0 {
-                    self.phase = Phase::Flying;
+                    self.phase = FlightPhase::Flying;
                 } else {
                     demand.climb_max = limit;
                     demand.thrust_min = 0.0;
                     demand.acceleration.z = f32::NAN;
                 }
             }
-            Phase::Flying => {
+            FlightPhase::Flying => {
                 // PX4's own crawl is flown slower here than it commands (`CRAWL_SHARE`).
                 let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_SHARE };
                 self.detect_landing(sensors, -demand.velocity.z >= share * MIN_LAND_RATE_MPS, tuning);
             }
         }
-        Order { lift: self.phase != Phase::Ground, integral, demand }
+        ActuatorCommand { lift: self.phase != FlightPhase::Ground, integral, demand }
     }
 
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
-        let stream_lost = self.intention == Mode::Offboard && !self.stream_fresh(sensors.now_us, tuning);
-        let battery_out = sensors.battery < tuning.battery_critical && !self.intention.ends_with_flight();
+        let stream_lost =
+            self.intended_mode == Mode::Offboard && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
+        let battery_out = sensors.battery < tuning.battery_critical && !self.intended_mode.ends_with_flight();
         let action = if !self.position_ok {
-            (self.intention != Mode::Land).then_some(Mode::Land)
+            (self.intended_mode != Mode::Land).then_some(Mode::Land)
         } else if stream_lost {
             match tuning.offboard_loss_action {
                 4 => Some(Mode::Land),
@@ -400,21 +401,21 @@ impl Commander {
         };
         if action != self.failsafe {
             self.failsafe = action;
-            self.enter(self.mode(), sensors);
+            self.enter_mode(self.mode(), sensors);
         }
     }
 
     fn update_timers(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
         let since = |start: u64| sensors.now_us.saturating_sub(start);
-        let idle = self.landed && self.phase == Phase::Ground;
+        let idle = self.landed && self.phase == FlightPhase::Ground;
         if idle && !self.flown && tuning.disarm_preflight_s > 0.0 {
-            if since(self.armed_us) >= seconds(tuning.disarm_preflight_s) {
+            if since(self.armed_us) >= micros_from_s(tuning.disarm_preflight_s) {
                 self.disarm(false);
             }
         } else if idle
             && self.flown
             && tuning.disarm_land_s > 0.0
-            && since(self.landed_us) >= seconds(tuning.disarm_land_s + DISARM_REACTION_S)
+            && since(self.landed_us) >= micros_from_s(tuning.disarm_land_s + DISARM_REACTION_S)
         {
             self.disarm(false);
         }
@@ -429,16 +430,16 @@ impl Commander {
             return;
         }
         let since = *self.touching_us.get_or_insert(sensors.now_us);
-        if sensors.now_us - since >= seconds(tuning.land_trigger_s + LAND_FILTER_S) {
+        if sensors.now_us - since >= micros_from_s(tuning.land_trigger_s + LAND_FILTER_S) {
             self.touching_us = None;
             self.landed = true;
             self.landed_us = sensors.now_us;
-            self.phase = Phase::Ground;
+            self.phase = FlightPhase::Ground;
         }
     }
 }
 
 /// Microseconds of a time in seconds; what is negative or not a number is none.
-fn seconds(s: f32) -> u64 {
+fn micros_from_s(s: f32) -> u64 {
     (f64::from(s) * 1e6) as u64
 }

@@ -3,12 +3,12 @@
 use planner_core::Point;
 
 use crate::params::Encoding;
+use crate::params::ParamValue::{self, Int, Real};
 use crate::params::Params;
-use crate::params::Value::{self, Int, Real};
 use crate::vehicle::{Demand, Gains, VehicleLimits};
 
 /// Default parameters, sorted by name, as PX4 lists them.
-const DEFAULTS: &[(&str, Value)] = &[
+const DEFAULTS: &[(&str, ParamValue)] = &[
     ("BAT1_CAPACITY", Real(-1.0)),
     ("BAT1_N_CELLS", Int(4)),
     ("BAT1_V_CHARGED", Real(4.05)),
@@ -106,7 +106,7 @@ const DEFAULTS: &[(&str, Value)] = &[
 ];
 
 /// The defaults, with the airframe's limits in the parameters that carry them.
-pub fn defaults(system_id: u8, limits: &VehicleLimits) -> Params {
+pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
     let own = [
         ("MAV_SYS_ID", Int(i32::from(system_id))),
         ("MPC_XY_VEL_MAX", Real(limits.speed_max_mps)),
@@ -156,7 +156,7 @@ pub struct Tuning {
 
 impl Tuning {
     /// A demand for nothing, within the bounds of manual and Offboard flight.
-    pub(super) fn nothing(&self) -> Demand {
+    pub(super) fn empty_demand(&self) -> Demand {
         Demand {
             position: NONE,
             velocity: NONE,
@@ -177,41 +177,41 @@ impl Tuning {
     pub fn new(params: &Params) -> Self {
         Self {
             gains: Gains {
-                position: [params.real("MPC_XY_P"), params.real("MPC_Z_P")],
-                velocity_p: [params.real("MPC_XY_VEL_P_ACC"), params.real("MPC_Z_VEL_P_ACC")],
-                velocity_i: [params.real("MPC_XY_VEL_I_ACC"), params.real("MPC_Z_VEL_I_ACC")],
-                velocity_d: [params.real("MPC_XY_VEL_D_ACC"), params.real("MPC_Z_VEL_D_ACC")],
-                tilt_tan: libm::tanf(params.real("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians()),
-                heading_rate_max: params.real("MPC_YAWRAUTO_MAX").to_radians(),
+                position: [params.f32_value("MPC_XY_P"), params.f32_value("MPC_Z_P")],
+                velocity_p: [params.f32_value("MPC_XY_VEL_P_ACC"), params.f32_value("MPC_Z_VEL_P_ACC")],
+                velocity_i: [params.f32_value("MPC_XY_VEL_I_ACC"), params.f32_value("MPC_Z_VEL_I_ACC")],
+                velocity_d: [params.f32_value("MPC_XY_VEL_D_ACC"), params.f32_value("MPC_Z_VEL_D_ACC")],
+                tilt_tan: libm::tanf(params.f32_value("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians()),
+                heading_rate_max: params.f32_value("MPC_YAWRAUTO_MAX").to_radians(),
             },
-            speed_max: params.real("MPC_XY_VEL_MAX"),
-            climb_max: params.real("MPC_Z_VEL_MAX_UP"),
-            descend_max: params.real("MPC_Z_VEL_MAX_DN"),
-            cruise: params.real("MPC_XY_CRUISE"),
-            auto_up: params.real("MPC_Z_V_AUTO_UP"),
-            auto_down: params.real("MPC_Z_V_AUTO_DN"),
-            land_speed: params.real("MPC_LAND_SPEED"),
-            land_slow_below: [params.real("MPC_LAND_ALT1"), params.real("MPC_LAND_ALT2")],
-            land_crawl_speed: params.real("MPC_LAND_CRWL"),
-            land_crawl_below: params.real("MPC_LAND_ALT3"),
-            auto_jerk: params.real("MPC_JERK_AUTO").max(0.5),
-            auto_acceleration_down: params.real("MPC_ACC_DOWN_MAX").max(0.5),
-            takeoff_speed: params.real("MPC_TKO_SPEED"),
-            takeoff_ramp_s: params.real("MPC_TKO_RAMP_T"),
-            takeoff_height: params.real("MIS_TAKEOFF_ALT"),
-            spool_up_s: params.real("COM_SPOOLUP_TIME"),
-            land_trigger_s: params.real("LNDMC_TRIG_TIME"),
-            offboard_loss_s: params.real("COM_OF_LOSS_T"),
-            offboard_loss_action: params.int("COM_OBL_RC_ACT"),
-            disarm_land_s: params.real("COM_DISARM_LAND"),
-            disarm_preflight_s: params.real("COM_DISARM_PRFLT"),
-            return_height: params.real("RTL_RETURN_ALT"),
-            return_descend_height: params.real("RTL_DESCEND_ALT"),
-            return_min_distance: params.real("RTL_MIN_DIST"),
-            return_cone_tan: libm::tanf((params.int("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians()),
-            low_battery_action: params.int("COM_LOW_BAT_ACT"),
-            battery_critical: params.real("BAT_CRIT_THR"),
-            battery_low: params.real("BAT_LOW_THR"),
+            speed_max: params.f32_value("MPC_XY_VEL_MAX"),
+            climb_max: params.f32_value("MPC_Z_VEL_MAX_UP"),
+            descend_max: params.f32_value("MPC_Z_VEL_MAX_DN"),
+            cruise: params.f32_value("MPC_XY_CRUISE"),
+            auto_up: params.f32_value("MPC_Z_V_AUTO_UP"),
+            auto_down: params.f32_value("MPC_Z_V_AUTO_DN"),
+            land_speed: params.f32_value("MPC_LAND_SPEED"),
+            land_slow_below: [params.f32_value("MPC_LAND_ALT1"), params.f32_value("MPC_LAND_ALT2")],
+            land_crawl_speed: params.f32_value("MPC_LAND_CRWL"),
+            land_crawl_below: params.f32_value("MPC_LAND_ALT3"),
+            auto_jerk: params.f32_value("MPC_JERK_AUTO").max(0.5),
+            auto_acceleration_down: params.f32_value("MPC_ACC_DOWN_MAX").max(0.5),
+            takeoff_speed: params.f32_value("MPC_TKO_SPEED"),
+            takeoff_ramp_s: params.f32_value("MPC_TKO_RAMP_T"),
+            takeoff_height: params.f32_value("MIS_TAKEOFF_ALT"),
+            spool_up_s: params.f32_value("COM_SPOOLUP_TIME"),
+            land_trigger_s: params.f32_value("LNDMC_TRIG_TIME"),
+            offboard_loss_s: params.f32_value("COM_OF_LOSS_T"),
+            offboard_loss_action: params.i32_value("COM_OBL_RC_ACT"),
+            disarm_land_s: params.f32_value("COM_DISARM_LAND"),
+            disarm_preflight_s: params.f32_value("COM_DISARM_PRFLT"),
+            return_height: params.f32_value("RTL_RETURN_ALT"),
+            return_descend_height: params.f32_value("RTL_DESCEND_ALT"),
+            return_min_distance: params.f32_value("RTL_MIN_DIST"),
+            return_cone_tan: libm::tanf((params.i32_value("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians()),
+            low_battery_action: params.i32_value("COM_LOW_BAT_ACT"),
+            battery_critical: params.f32_value("BAT_CRIT_THR"),
+            battery_low: params.f32_value("BAT_LOW_THR"),
         }
     }
 }
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
-        let t = Tuning::new(&defaults(3, &VehicleLimits::default()));
+        let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
         for value in [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height] {
             assert!(value > 0.0);
         }

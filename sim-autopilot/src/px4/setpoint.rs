@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
 use crate::geodesy::LocalFrame;
-use crate::wire::Fields;
+use crate::wire::PayloadReader;
 use planner_core::Point;
 
 const FRAME_LOCAL_NED: u8 = 1;
@@ -38,7 +38,7 @@ pub struct Setpoint {
 }
 
 /// State that the frame of a setpoint refers to.
-pub struct Context<'a> {
+pub struct FrameContext<'a> {
     /// The autopilot's local frame.
     pub frame: &'a LocalFrame,
     /// Heading of the vehicle, radians.
@@ -48,27 +48,27 @@ pub struct Context<'a> {
 }
 
 /// Reads message 84; `None` where it does not count.
-pub fn local_ned(fields: &Fields<'_>, context: &Context<'_>) -> Option<Setpoint> {
+pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) -> Option<Setpoint> {
     let frame = fields.u8(52);
     if frame != FRAME_LOCAL_NED && frame != FRAME_BODY_NED {
         return None;
     }
     let mask = fields.u16(48);
-    let mut position = masked(fields, 4, mask);
-    let mut velocity = masked(fields, 16, mask >> 3);
-    let mut acceleration = masked(fields, 28, mask >> 6);
+    let mut position = read_masked_vector(fields, 4, mask);
+    let mut velocity = read_masked_vector(fields, 16, mask >> 3);
+    let mut acceleration = read_masked_vector(fields, 28, mask >> 6);
     if frame == FRAME_BODY_NED {
         // PX4 turns velocity and acceleration by the heading and takes no position in the body's frame.
         position = Vector3::repeat(f64::NAN);
-        velocity = turned(velocity, context.heading);
-        acceleration = turned(acceleration, context.heading);
+        velocity = rotated_by_heading(velocity, context.heading);
+        acceleration = rotated_by_heading(acceleration, context.heading);
     }
-    let position = keep_nan(position, |ned| context.frame.enu(ned));
-    finish(fields, mask, position, velocity, acceleration, context)
+    let position = map_keeping_nan(position, |ned| context.frame.enu_from_ned(ned));
+    setpoint_from_fields(fields, mask, position, velocity, acceleration, context)
 }
 
 /// Reads message 86; `None` where it does not count.
-pub fn global_int(fields: &Fields<'_>, context: &Context<'_>) -> Option<Setpoint> {
+pub fn read_global_int(fields: &PayloadReader<'_>, context: &FrameContext<'_>) -> Option<Setpoint> {
     let base = match fields.u8(52) {
         FRAME_GLOBAL | FRAME_GLOBAL_INT => 0.0,
         FRAME_GLOBAL_RELATIVE_ALT | FRAME_GLOBAL_RELATIVE_ALT_INT => context.home_alt_m,
@@ -91,32 +91,32 @@ pub fn global_int(fields: &Fields<'_>, context: &Context<'_>) -> Option<Setpoint
     if !whole.is_valid() {
         return None;
     }
-    let enu = context.frame.enu_of_geodetic(&whole);
+    let enu = context.frame.enu_from_geodetic(&whole);
     if given(1) && given(2) {
         (position.x, position.y) = (enu.x, enu.y);
     }
     if given(4) {
         position.z = enu.z;
     }
-    let velocity = masked(fields, 16, mask >> 3);
-    let acceleration = masked(fields, 28, mask >> 6);
-    finish(fields, mask, position, velocity, acceleration, context)
+    let velocity = read_masked_vector(fields, 16, mask >> 3);
+    let acceleration = read_masked_vector(fields, 28, mask >> 6);
+    setpoint_from_fields(fields, mask, position, velocity, acceleration, context)
 }
 
-fn masked(fields: &Fields<'_>, at: usize, mask: u16) -> Vector3<f64> {
+fn read_masked_vector(fields: &PayloadReader<'_>, at: usize, mask: u16) -> Vector3<f64> {
     let axis = |k: usize| {
         if mask >> k & 1 == 0 { f64::from(fields.f32(at + 4 * k)) } else { f64::NAN }
     };
     Vector3::new(axis(0), axis(1), axis(2))
 }
 
-fn turned(v: Vector3<f64>, heading: f32) -> Vector3<f64> {
+fn rotated_by_heading(v: Vector3<f64>, heading: f32) -> Vector3<f64> {
     let (sin, cos) = libm::sincos(f64::from(heading));
     Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 }
 
 /// Maps a NED vector to ENU by `map`, axis by axis as far as it is given: north and east only together, down alone.
-fn keep_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
+fn map_keeping_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
     let across = ned.x.is_finite() && ned.y.is_finite();
     let mapped = map(&ned.map(|x| if x.is_finite() { x } else { 0.0 }));
     let nan = f64::NAN;
@@ -127,19 +127,19 @@ fn keep_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> V
     )
 }
 
-fn finish(
-    fields: &Fields<'_>,
+fn setpoint_from_fields(
+    fields: &PayloadReader<'_>,
     mask: u16,
     position: Vector3<f64>,
     velocity: Vector3<f64>,
     acceleration: Vector3<f64>,
-    context: &Context<'_>,
+    context: &FrameContext<'_>,
 ) -> Option<Setpoint> {
     if mask & MASK_NOTHING == MASK_NOTHING || mask & MASK_FORCE != 0 {
         return None;
     }
-    let velocity = keep_nan(velocity, |ned| context.frame.enu_rate(ned));
-    let acceleration = keep_nan(acceleration, |ned| context.frame.enu_rate(ned));
+    let velocity = map_keeping_nan(velocity, |ned| context.frame.enu_velocity_from_ned(ned));
+    let acceleration = map_keeping_nan(acceleration, |ned| context.frame.enu_velocity_from_ned(ned));
     let any = |v: &Vector3<f64>| v.iter().any(|x| x.is_finite());
     if !any(&position) && !any(&velocity) && !any(&acceleration) {
         return None;
@@ -152,12 +152,12 @@ fn finish(
         position: position.cast::<f32>(),
         velocity: velocity.cast::<f32>(),
         acceleration: acceleration.cast::<f32>(),
-        heading: wrap(optional(MASK_YAW, 40)),
+        heading: wrap_angle(optional(MASK_YAW, 40)),
         heading_rate: optional(MASK_YAW_RATE, 44),
     })
 }
 
 /// Any finite angle into ±π; NaN stays.
-fn wrap(angle: f32) -> f32 {
+fn wrap_angle(angle: f32) -> f32 {
     angle - core::f32::consts::TAU * libm::roundf(angle / core::f32::consts::TAU)
 }

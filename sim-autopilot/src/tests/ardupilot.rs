@@ -13,7 +13,7 @@ const BRAKE: f32 = 17.0;
 const READY_S: f32 = 8.0;
 
 fn config() -> Config {
-    Config { personality: AutopilotKind::Ardupilot, estimator_ready_s: READY_S, ..Config::default() }
+    Config { autopilot: AutopilotKind::Ardupilot, estimator_ready_s: READY_S, ..Config::default() }
 }
 
 impl Bench {
@@ -56,13 +56,13 @@ impl Bench {
     pub(super) fn in_guided(up: f32) -> Self {
         let mut bench = Self::armed();
         assert_eq!(bench.take_off(up), [0]);
-        bench.until(20.0, |a| a.truth().position.z > up);
+        bench.until(20.0, |a| a.true_state().position.z > up);
         bench.run(3.0);
         bench
     }
 
     fn at(&self) -> Point {
-        self.autopilot.truth().position
+        self.autopilot.true_state().position
     }
 }
 
@@ -73,12 +73,12 @@ fn it_flies_the_sequence_that_was_seen_to_fly() {
     assert_eq!(bench.heartbeat(), (4, 0xD9, 3), "armed on the ground is STANDBY");
     assert_eq!(bench.take_off(10.0), [0]);
     let start = bench.now();
-    bench.until(5.0, |a| !a.truth().landed);
+    bench.until(5.0, |a| !a.true_state().landed);
     let lifted = bench.now() - start;
     assert!((2.0..2.5).contains(&lifted), "in the air after {lifted} s");
     bench.run(0.2);
     assert_eq!(bench.landed_state(), 3);
-    bench.until(15.0, |a| a.truth().position.z - 0.3 > 9.5);
+    bench.until(15.0, |a| a.true_state().position.z - 0.3 > 9.5);
     let there = bench.now() - start;
     assert!((8.0..8.8).contains(&there), "9.5 m after {there} s");
     assert_eq!(bench.landed_state(), 3);
@@ -134,7 +134,7 @@ fn guided_is_accepted_before_the_estimator_is_ready_and_arming_refused() {
 fn setpoints_before_take_off_do_not_lift_and_it_disarms_itself() {
     let mut bench = Bench::armed();
     bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
-    let took = bench.until(12.0, |a| !a.truth().armed);
+    let took = bench.until(12.0, |a| !a.true_state().armed);
     assert!((9.8..=10.0).contains(&took), "disarmed after {took} s");
     assert!(bench.at().z < 0.31);
 }
@@ -150,7 +150,7 @@ fn a_setpoint_before_the_lift_off_ends_the_take_off() {
     // Once in the air setpoints take over.
     let mut bench = Bench::armed();
     bench.take_off(5.0);
-    bench.until(5.0, |a| !a.truth().landed);
+    bench.until(5.0, |a| !a.true_state().landed);
     bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -3.0], [0.0; 3], 0.0));
     bench.run(8.0);
     assert!((bench.at().z - 3.0).abs() < 0.15, "at {}", bench.at());
@@ -165,19 +165,19 @@ fn the_masks_that_work_move_it() {
     assert!((bench.at() - Point::new(4.0, 10.0, 5.0)).norm() < 0.2, "0xDF8 at {}", bench.at());
     bench.stream(20.0, setpoint(0xDC7, 1, [0.0; 3], [0.0, 2.0, 0.0], 0.0));
     bench.run(4.0);
-    let v = bench.autopilot.truth().velocity;
+    let v = bench.autopilot.true_state().velocity;
     assert!((1.85..2.15).contains(&v.x) && v.y.abs() < 0.1, "0xDC7 flies {v}");
     bench.stream(20.0, setpoint(0xDC0, 1, [3.0, 1.0, -6.0], [0.0; 3], 0.0));
     bench.run(14.0);
     assert!((bench.at() - Point::new(1.0, 3.0, 6.0)).norm() < 0.2, "0xDC0 at {}", bench.at());
     bench.stream(20.0, setpoint(0x9F8, 1, [3.0, 1.0, -6.0], [0.0; 3], 1.57));
     bench.run(5.0);
-    assert!((bench.autopilot.truth().heading_rad - 1.57).abs() < 0.02, "0x9F8 turns");
+    assert!((bench.autopilot.true_state().heading_rad - 1.57).abs() < 0.02, "0x9F8 turns");
     let mut turning = setpoint(0x5C7, 1, [0.0; 3], [1.0, 0.0, 0.0], 0.0);
     turning[44..48].copy_from_slice(&0.5_f32.to_le_bytes());
     bench.stream(20.0, turning);
     bench.run(3.0);
-    let truth = bench.autopilot.truth();
+    let truth = bench.autopilot.true_state();
     assert!(truth.velocity.y > 0.8 && (truth.heading_rate - 0.5).abs() < 0.05, "0x5C7 {truth:?}");
 }
 
@@ -188,7 +188,7 @@ fn frames_1_8_and_9_move_it_and_12_stops_it() {
         let texts = bench.texts().len();
         bench.stream(20.0, setpoint(VELOCITY, frame, [0.0; 3], [2.0, 0.0, 0.0], 0.0));
         bench.run(3.0);
-        let speed = bench.autopilot.truth().velocity.y;
+        let speed = bench.autopilot.true_state().velocity.y;
         assert_eq!(speed > 1.8, moves, "frame {frame}: {speed} m/s");
         assert_eq!(bench.texts().len(), texts, "without a word");
     }
@@ -211,9 +211,9 @@ fn a_velocity_is_held_three_seconds_then_it_brakes() {
     bench.run(4.0);
     let texts = bench.texts().len();
     bench.stream = None;
-    let slower = bench.until(5.0, |a| a.truth().velocity.norm() < 1.8);
+    let slower = bench.until(5.0, |a| a.true_state().velocity.norm() < 1.8);
     assert!((3.1..3.7).contains(&slower), "below 1.8 m/s after {slower} s");
-    let stopped = slower + bench.until(3.0, |a| a.truth().velocity.norm() < 0.2);
+    let stopped = slower + bench.until(3.0, |a| a.true_state().velocity.norm() < 0.2);
     assert!((4.0..4.8).contains(&stopped), "below 0.2 m/s after {stopped} s");
     bench.run(2.0);
     assert_eq!((bench.heartbeat().0, bench.texts().len()), (4, texts), "still Guided, without a word");
@@ -257,14 +257,14 @@ fn loiter_with_a_low_stick_sinks_and_brake_holds() {
     let mut bench = Bench::in_guided(20.0);
     assert_eq!(bench.mode(LOITER), [0]);
     bench.run(4.0);
-    let sink = bench.autopilot.truth().velocity.z;
+    let sink = bench.autopilot.true_state().velocity.z;
     assert!((-2.7..-2.2).contains(&sink), "{sink} m/s");
-    bench.autopilot.pilot_takes_over();
+    bench.autopilot.take_over_by_pilot();
     bench.run(5.0);
     let up = bench.at().z;
     bench.run(5.0);
     assert!((bench.at().z - up).abs() < 0.1);
-    bench.autopilot.pilot_returns();
+    bench.autopilot.return_from_pilot();
     bench.run(1.1);
     assert_eq!(bench.heartbeat().0, 4);
 }
@@ -313,10 +313,10 @@ fn landing_takes_as_long_as_it_took() {
     let start = bench.now();
     bench.run(1.1);
     assert_eq!((bench.heartbeat(), bench.landed_state()), ((9, 0xD9, 4), 4));
-    bench.until(40.0, |a| a.truth().landed);
+    bench.until(40.0, |a| a.true_state().landed);
     let took = bench.now() - start;
     assert!((21.0..23.2).contains(&took), "on the ground after {took} s");
-    let to_disarm = bench.until(3.0, |a| !a.truth().armed);
+    let to_disarm = bench.until(3.0, |a| !a.true_state().armed);
     assert!((0.3..=0.8).contains(&to_disarm), "disarmed after {to_disarm} s");
     bench.run(1.1);
     assert_eq!(bench.heartbeat(), (9, 0x59, 3), "it stays in LAND");
@@ -329,8 +329,8 @@ fn high_above_home_it_lands_fast_though_a_floor_is_near() {
     bench.mode(LAND);
     let mut fastest = 0.0_f32;
     bench.until(20.0, |a| {
-        fastest = fastest.min(a.truth().velocity.z);
-        a.truth().landed
+        fastest = fastest.min(a.true_state().velocity.z);
+        a.true_state().landed
     });
     assert!(fastest < -1.2, "{fastest} m/s: LAND_ALT_LOW counts from home");
 }
@@ -343,8 +343,8 @@ fn return_climbs_comes_home_and_lands() {
     assert_eq!(bench.mode(RTL), [0]);
     let mut highest = 0.0_f32;
     bench.until(120.0, |a| {
-        highest = highest.max(a.truth().position.z);
-        !a.truth().armed
+        highest = highest.max(a.true_state().position.z);
+        !a.true_state().armed
     });
     assert!(bench.at().xy().norm() < 0.7 && highest > 14.0, "landed at {}, {highest} m", bench.at());
 }
@@ -355,7 +355,7 @@ fn without_a_position_it_lands_by_failsafe() {
     bench.autopilot.set_gps_ok(false);
     bench.run(3.0);
     assert_eq!(bench.heartbeat(), (9, 0xD9, 5));
-    bench.until(30.0, |a| !a.truth().armed);
+    bench.until(30.0, |a| !a.true_state().armed);
 }
 
 #[test]

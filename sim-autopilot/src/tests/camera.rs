@@ -153,17 +153,17 @@ fn it_turns_to_a_commanded_yaw_the_short_way_at_a_bounded_rate() {
             // Position and yaw; position, velocity and yaw.
             for mask in [0x9F8, 0x9C0] {
                 bench.stream(20.0, setpoint(mask, 1, [0.0, 0.0, -10.0], [0.0; 3], yaw));
-                let from = bench.autopilot.truth().heading_rad;
+                let from = bench.autopilot.true_state().heading_rad;
                 let way = vehicle::wrap_pi(yaw - from).abs();
                 let (mut turned, mut fastest) = (0.0, 0.0_f32);
                 for _ in 0..1500 {
-                    let before = bench.autopilot.truth().heading_rad;
+                    let before = bench.autopilot.true_state().heading_rad;
                     bench.run(0.004);
-                    let truth = bench.autopilot.truth();
+                    let truth = bench.autopilot.true_state();
                     turned += vehicle::wrap_pi(truth.heading_rad - before).abs();
                     fastest = fastest.max(truth.heading_rate.abs());
                 }
-                let truth = bench.autopilot.truth();
+                let truth = bench.autopilot.true_state();
                 assert!(vehicle::wrap_pi(truth.heading_rad - yaw).abs() < 0.02, "{personality:?} {yaw}");
                 assert!(fastest <= 1.001 * most, "{personality:?}: {fastest} rad/s of {most}");
                 assert!(turned < way + 0.1, "{personality:?}: turned {turned} for {way}");

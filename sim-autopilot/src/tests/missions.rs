@@ -26,7 +26,7 @@ const SURVEY: Plan<'static> = &[
 
 impl Bench {
     fn upload(&mut self, plan: Plan<'_>) {
-        let personality = self.autopilot.platform.config.personality;
+        let personality = self.autopilot.platform.config.autopilot;
         let home = (16, 0, [0.0; 4], [0.0; 2], 488.0);
         let home: Plan<'_> = if personality == AutopilotKind::Ardupilot { &[home] } else { &[] };
         let items: Vec<_> = home.iter().chain(plan).collect();
@@ -81,9 +81,9 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         assert_eq!(bench.start(), [0], "{personality:?}");
         let mode = bench.autopilot.custom_mode();
         assert_eq!(mode, if personality == AutopilotKind::Px4 { 0x0404_0000 } else { 3 });
-        bench.until(10.0, |a| !a.truth().landed);
-        bench.until(120.0, |a| !a.truth().armed);
-        let at = bench.autopilot.truth().position;
+        bench.until(10.0, |a| !a.true_state().landed);
+        bench.until(120.0, |a| !a.true_state().armed);
+        let at = bench.autopilot.true_state().position;
         assert!(at.xy().norm() < 1.0, "{personality:?} came down at {at}");
         let photos = bench.autopilot.take_photos();
         assert_eq!(photos.len(), 6, "{personality:?}: at 0, 10, 20, 30, 40 m and one more: {photos:?}");
@@ -111,8 +111,8 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
             assert_eq!((bench.mode(4.0), bench.arm()), (vec![0], vec![0]));
         }
         assert_eq!(bench.start(), [0]);
-        bench.until(10.0, |a| !a.truth().landed);
-        bench.until(120.0, |a| !a.truth().armed);
+        bench.until(10.0, |a| !a.true_state().landed);
+        bench.until(120.0, |a| !a.true_state().armed);
         assert_eq!(bench.autopilot.take_photos().len(), 6);
     }
 }
@@ -130,14 +130,14 @@ fn speed_and_landing_at_a_place_are_flown() {
             ],
         );
         assert_eq!(bench.start(), [0]);
-        bench.until(10.0, |a| !a.truth().landed);
+        bench.until(10.0, |a| !a.true_state().landed);
         let mut fastest = 0.0_f32;
         let seconds = bench.until(90.0, |a| {
-            fastest = fastest.max(a.truth().velocity.xy().norm());
-            !a.truth().armed
+            fastest = fastest.max(a.true_state().velocity.xy().norm());
+            !a.true_state().armed
         });
         assert!((1.7..2.4).contains(&fastest), "{personality:?}: {fastest} m/s of 2");
-        let at = bench.autopilot.truth().position;
+        let at = bench.autopilot.true_state().position;
         assert!(
             (at.xy() - Point::new(30.0, 12.0, 0.0).xy()).norm() < 0.8,
             "{personality:?}: {at}, {seconds} s"
@@ -152,19 +152,19 @@ fn a_mission_that_is_left_goes_on_with_the_item_it_was_at() {
     for personality in BOTH {
         let mut bench = Bench::with_mission(personality, SURVEY);
         bench.start();
-        bench.until(90.0, |a| a.truth().position.x > 15.0);
+        bench.until(90.0, |a| a.true_state().position.x > 15.0);
         let before = bench.reached();
-        bench.autopilot.pilot_takes_over();
+        bench.autopilot.take_over_by_pilot();
         if personality == AutopilotKind::Px4 {
             bench.set_mode(4.0, 3.0);
         }
         bench.run(10.0);
-        let held = bench.autopilot.truth().position;
+        let held = bench.autopilot.true_state().position;
         bench.run(5.0);
-        assert!((bench.autopilot.truth().position - held).norm() < 0.3, "it holds");
+        assert!((bench.autopilot.true_state().position - held).norm() < 0.3, "it holds");
         assert_eq!(bench.reached(), before);
         assert_eq!(bench.start(), [0]);
-        bench.until(120.0, |a| !a.truth().armed);
+        bench.until(120.0, |a| !a.true_state().armed);
         assert_eq!(bench.reached().len(), SURVEY.len(), "{personality:?}");
     }
 }
@@ -185,7 +185,7 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
     bench.upload(SURVEY);
     assert_eq!(bench.mode(3.0), [0]);
     bench.run(5.0);
-    assert!(bench.autopilot.truth().landed);
+    assert!(bench.autopilot.true_state().landed);
     // Nonsense: passed over, or home.
     for personality in BOTH {
         let nan = f32::NAN;
@@ -203,7 +203,7 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
         assert_eq!(bench.start(), [0]);
         bench.run(60.0);
         assert_eq!(bench.reached().len(), 6, "{personality:?}");
-        let truth = *bench.autopilot.truth();
+        let truth = *bench.autopilot.true_state();
         let off = truth.position - Point::new(9.0, 0.0, 5.3);
         assert!(truth.armed && off.norm() < 0.3, "{personality:?}: after the last item it stays: {off}");
         assert_eq!(bench.autopilot.take_photos(), []);

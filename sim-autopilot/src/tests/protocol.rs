@@ -41,7 +41,7 @@ fn ned_is_about_its_own_ekf_origin() {
     bench.run(0.5);
     let b = *bench.of(32).last().unwrap().1.padded();
     let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
-    let truth = frames::enu_to_geodetic(&world, &bench.autopilot.truth().position);
+    let truth = frames::enu_to_geodetic(&world, &bench.autopilot.true_state().position);
     let expected = frames::geodetic_to_ned(AutopilotKind::Px4.projection(), &ekf, &truth);
     for (k, at) in [4, 8, 12].into_iter().enumerate() {
         assert!((said(at) - expected[k]).abs() < 0.01, "axis {k}: {} for {}", said(at), expected[k]);
@@ -125,7 +125,7 @@ fn an_empty_mission_is_answered() {
 fn ping_and_timesync_are_answered() {
     let mut bench = Bench::new();
     bench.run(0.5);
-    bench.send(4, &telemetry::ping(123, 9, 0, 0));
+    bench.send(4, &telemetry::ping_payload(123, 9, 0, 0));
     let b = bench.of(4).last().unwrap().1.padded();
     assert_eq!((b[0], b[8], b[12], b[13]), (123, 9, 1, 191));
     let mut payload = [0; 16];
@@ -177,8 +177,8 @@ fn hostile_bytes_neither_panic_nor_move_it() {
     let noise: Vec<u8> = (0..20_000).map(|_| (random.sample() * 90.0) as i32 as u8).collect();
     bench.autopilot.handle_bytes(&noise);
     bench.run(1.0);
-    assert!(!bench.autopilot.truth().armed);
-    assert_eq!(bench.autopilot.truth().position, Config::default().start);
+    assert!(!bench.autopilot.true_state().armed);
+    assert_eq!(bench.autopilot.true_state().position, Config::default().start);
 }
 
 #[test]

@@ -97,7 +97,7 @@ impl Recording {
         self.estimate.iter().filter(|s| (self.armed_s.0..=self.armed_s.1).contains(&s.t_s))
     }
 
-    /// Estimate less setpoint, at the times of the estimates in Follow counted from its begin.
+    /// Estimate less setpoint, at the times of the estimates in Follow counted from its start.
     fn tracking(&self) -> Vec<(f64, Vector3<f64>)> {
         let mut later = self.setpoints.as_slice();
         let mut errors = Vec::new();

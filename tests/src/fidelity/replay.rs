@@ -36,7 +36,7 @@ impl Recording {
     fn config(&self) -> Config {
         let ned = self.start();
         Config {
-            personality: self.autopilot,
+            autopilot: self.autopilot,
             world_origin: self.origin,
             ekf_origin: self.origin,
             start: Point::new(ned.y as f32, ned.x as f32, -ned.z as f32),

@@ -1,9 +1,9 @@
 //! Frames forged from random numbers: fields random and at their bounds, some of a message that would be believed.
 
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::MAX_POINTS;
-use companion::link::roster::{self, Entry, Roster, Standing};
+use companion::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use companion::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Link};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -75,11 +75,11 @@ impl Flight {
         intent.flags = (bits >> 8) as u8;
         intent.mission_crc = if how & 16 == 0 { 0xC0FFEE } else { bits as u32 };
         intent.plan_crc = if how & 32 == 0 { 5 } else { (bits >> 16) as u32 };
-        intent.heard = (bits >> 24) as u32;
-        intent.floor_m = number(bits >> 32, 10.0);
-        intent.column = how & 64 != 0;
+        intent.heard_bits = (bits >> 24) as u32;
+        intent.ground_m = number(bits >> 32, 10.0);
+        intent.may_come_down = how & 64 != 0;
         intent.progress_m = number(bits >> 40, 30.0);
-        intent.clear_m = number(bits >> 48, 5.0);
+        intent.gates_open_up_to_m = number(bits >> 48, 5.0);
         for _ in 0..(bits >> 56) as usize % (MAX_POINTS + 1) {
             let bits = entropy.bits();
             let here = self.autopilot.position;
@@ -99,7 +99,7 @@ impl Flight {
         match id {
             // Near enough to be no jump, now and then.
             32 if how & 3 == 0 => {
-                payload[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+                payload[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
                 let geodetic = frames::enu_to_geodetic(&ORIGIN, &self.autopilot.position);
                 let origin = self.companion.telemetry().ekf_origin.unwrap_or(ORIGIN);
                 let ned = frames::geodetic_to_ned(self.autopilot.kind.projection(), &origin, &geodetic)
@@ -113,7 +113,7 @@ impl Flight {
                 let place =
                     self.autopilot.position + Point::new(near(0, how), near(3, how), near(5, how)) * 4.0;
                 let geodetic = frames::enu_to_geodetic(&ORIGIN, &place);
-                payload[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+                payload[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
                 payload[4..8].copy_from_slice(&((geodetic.lat_deg * 1e7) as i32).to_le_bytes());
                 payload[8..12].copy_from_slice(&((geodetic.lon_deg * 1e7) as i32).to_le_bytes());
                 payload[12..16].copy_from_slice(&((geodetic.alt_m * 1e3) as i32).to_le_bytes());
@@ -128,7 +128,7 @@ impl Flight {
                 }
             }
             0 => {
-                payload[5] = if self.autopilot.kind == Kind::Px4 { 12 } else { 3 };
+                payload[5] = if self.autopilot.kind == AutopilotKind::Px4 { 12 } else { 3 };
                 if how & 1 == 0 {
                     let mode = self.autopilot.kind.setpoint_mode();
                     payload[..4].copy_from_slice(&mode.to_le_bytes());
@@ -197,28 +197,29 @@ const EDGES: [f32; 10] = [
 
 /// A roster like those of the neighbour.
 fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
-    const ALL: [Standing; 4] = [Standing::Alive, Standing::Lost, Standing::Left, Standing::Finished];
-    let entry = |bits: u64| Entry {
+    const ALL: [MemberStatus; 4] =
+        [MemberStatus::Alive, MemberStatus::Lost, MemberStatus::Left, MemberStatus::Finished];
+    let entry = |bits: u64| RosterReportEntry {
         incarnation: bits as u8 & 7,
-        standing: ALL[(bits >> 3) as usize % 4],
-        done_dm: (bits >> 8) as u16,
-        promise_dm: (bits & 32 != 0).then_some((bits >> 24) as u16),
+        status: ALL[(bits >> 3) as usize % 4],
+        progress_dm: (bits >> 8) as u16,
+        commitment_dm: (bits & 32 != 0).then_some((bits >> 24) as u16),
         holds: bits & 64 != 0,
         agrees: bits & 128 != 0,
     };
     let bits = entropy.bits();
-    // Seldom what lands the vehicle at once: the others gave it up, or are divisions ahead.
+    // Rarely what lands the vehicle at once: the others gave it up, or are divisions ahead.
     let (about_it, ahead) = (bits >> 40 & 255 == 0, bits >> 48 & 255 == 0);
     let mut entry_of = |rank| {
         let drawn = entry(entropy.bits());
-        if rank == 0 && !about_it { Entry::default() } else { drawn }
+        if rank == 0 && !about_it { RosterReportEntry::default() } else { drawn }
     };
-    let roster = Roster {
+    let roster = RosterReport {
         system_id: if how & 8 == 0 { NEIGHBOUR } else { bits as u8 },
         divisions: if ahead { (bits >> 8) as u8 } else { 0 },
         first: if how & 64 == 0 { 0 } else { 1 + (bits >> 16) as u8 % 255 },
         mission_crc: if how & 16 == 0 { 0xC0FFEE } else { bits as u32 },
-        counted: (bits >> 24) as u32 % 3,
+        committed_hash: (bits >> 24) as u32 % 3,
         hash: (bits >> 32) as u32,
         entries: (0..1 + (bits >> 56) as usize % roster::MAX_ENTRIES).map(&mut entry_of).collect(),
     };

@@ -9,7 +9,7 @@ mod reports;
 use std::collections::BTreeSet;
 
 use companion::Instant;
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use companion::autopilot::{ardupilot, px4};
 use companion::link::frame::Framer;
 use planner_core::Point;
@@ -67,7 +67,7 @@ struct Target {
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     /// Which it is.
-    pub kind: Kind,
+    pub kind: AutopilotKind,
     id: u8,
     mission_origin: Geodetic,
     ekf_origin: Geodetic,
@@ -111,7 +111,7 @@ pub struct Autopilot {
 impl Autopilot {
     /// On its pad, disarmed. `phase` shifts its streams in time.
     pub fn new(
-        kind: Kind,
+        kind: AutopilotKind,
         id: u8,
         origins: (Geodetic, Geodetic),
         pad: Point,
@@ -127,7 +127,7 @@ impl Autopilot {
             velocity: Point::zeros(),
             acceleration: Point::zeros(),
             home: pad,
-            mode: if kind == Kind::Px4 { px4::HOLD } else { 0 },
+            mode: if kind == AutopilotKind::Px4 { px4::HOLD } else { 0 },
             armed: false,
             critical: false,
             landing_commanded: false,
@@ -174,13 +174,13 @@ impl Autopilot {
 
     /// The pilot's switch.
     pub fn take_over(&mut self, velocity: Point) {
-        self.enter(if self.kind == Kind::Px4 { PX4_POSITION } else { ARDUPILOT_LOITER });
+        self.enter(if self.kind == AutopilotKind::Px4 { PX4_POSITION } else { ARDUPILOT_LOITER });
         self.pilot = velocity;
     }
 
     /// The pilot gives Offboard or Guided back; PX4 only while setpoints come.
     pub fn give_back(&mut self, now: Instant) {
-        if self.kind == Kind::ArduPilot || self.age_s(now) < 0.5 {
+        if self.kind == AutopilotKind::ArduPilot || self.age_s(now) < 0.5 {
             self.enter(self.kind.setpoint_mode());
         }
     }
@@ -194,7 +194,7 @@ impl Autopilot {
     pub fn fail(&mut self, how: Failsafe) {
         self.enter(match how {
             Failsafe::Land => self.kind.land_mode(),
-            Failsafe::Return if self.kind == Kind::Px4 => px4::RTL,
+            Failsafe::Return if self.kind == AutopilotKind::Px4 => px4::RTL,
             Failsafe::Return => ardupilot::RTL,
         });
         self.critical = true;
@@ -220,12 +220,15 @@ impl Autopilot {
     }
 
     fn age_s(&self, now: Instant) -> f32 {
-        self.target.map_or(f32::INFINITY, |target| (now - target.at).secs_f32())
+        self.target.map_or(f32::INFINITY, |target| (now - target.at).as_secs_f32())
     }
 
     /// One step of flight and telemetry; what it reports goes to `out`.
     pub fn step(&mut self, now: Instant, floor_z: f32, out: &mut Vec<u8>) {
-        if self.kind == Kind::Px4 && self.mode == px4::OFFBOARD && self.armed && self.age_s(now) > PX4_LOSS_S
+        if self.kind == AutopilotKind::Px4
+            && self.mode == px4::OFFBOARD
+            && self.armed
+            && self.age_s(now) > PX4_LOSS_S
         {
             self.fail(self.on_loss);
             self.lost = true;

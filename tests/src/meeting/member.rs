@@ -14,7 +14,7 @@ use crate::setpoints::{Limits, SetpointCheck};
 
 /// No vehicle leaves this box, metres: minimum and maximum corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
-/// A vehicle that has heard nobody for so long is deaf, seconds: it has stopped, and lands after 20 s.
+/// A vehicle that has heard no other vehicle for so long is deaf, seconds: it has stopped, and lands after 20 s.
 const DEAF_S: f32 = 20.0;
 /// A vehicle that is faster is not stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
@@ -105,14 +105,14 @@ impl Member {
 
     /// A stop by the filter lasts until nobody is waited for, or the vehicle flies.
     pub(super) fn note_stops(&mut self, now: Instant) {
-        let stops = self.companion.filter_stops();
+        let stops = self.companion.filter_stop_count();
         if core::mem::replace(&mut self.stops, stops) != stops {
             self.stopped_since.get_or_insert(now);
         } else if self.companion.waiting_for() == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
             self.stopped_since = None;
         }
         if let Some(since) = self.stopped_since {
-            self.longest_stop_s = self.longest_stop_s.max((now - since).secs_f32());
+            self.longest_stop_s = self.longest_stop_s.max((now - since).as_secs_f32());
         }
     }
 

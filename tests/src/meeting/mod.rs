@@ -15,7 +15,7 @@ pub mod scene;
 
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
-use companion::{COMPANION_COMPONENT, Event, Instant, Link, PlanFailure, State, Wanted};
+use companion::{COMPANION_COMPONENT, Event, Instant, Link, PlanFailure, PlanKind, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, MavCmd, STATUSTEXT_DATA, TUNNEL_DATA,
@@ -97,7 +97,7 @@ impl<'a> World<'a> {
     fn say(&mut self, vehicle: usize, what: &str) {
         let (now, id) = (self.now, self.scene.vehicles[vehicle].id);
         if let Some(trace) = &mut self.trace {
-            trace.push(format!("{:7.2} s  {id}: {what}", now.micros() as f64 * 1e-6));
+            trace.push(format!("{:7.2} s  {id}: {what}", now.as_micros() as f64 * 1e-6));
         }
     }
 
@@ -212,7 +212,7 @@ impl<'a> World<'a> {
             for packet in arrived.into_iter().filter(|_| member.hears) {
                 member.companion.handle_bytes(Link::Swarm, now, &packet.bytes);
                 let heard = &mut member.heard[packet.from];
-                let now_s = now.micros() as f32 * 1e-6;
+                let now_s = now.as_micros() as f32 * 1e-6;
                 match packet.said {
                     Said::Position(place, velocity, boot_ms) => {
                         if heard.position.is_none_or(|(_, _, known, _)| boot_ms > known) {
@@ -239,7 +239,7 @@ impl<'a> World<'a> {
                 break;
             }
             let (now, member) = (self.now, &mut self.members[i]);
-            member.autopilot.check.urgent = member.companion.stops_urgently();
+            member.autopilot.check.urgent = member.companion.is_in_urgent_stop();
             member.autopilot.handle_bytes(now, &buffer[..length], &mut member.bytes);
         }
         loop {
@@ -306,15 +306,15 @@ impl<'a> World<'a> {
         let own = &self.scene.vehicles[i].plan;
         let mut keep = Vec::new();
         let member = &mut self.members[i];
-        match member.companion.detour(|obstacle| keep.push(obstacle)) {
+        match member.companion.detour_request(|obstacle| keep.push(obstacle)) {
             Some(request) => {
                 let answer = around(&request, &keep, own);
                 let text = if answer.is_some() { "a way around" } else { "no way around" };
                 let answer = answer.as_ref().ok_or(PlanFailure::Unreachable);
-                member.companion.handle_plan(self.now, Wanted::Detour, answer);
+                member.companion.handle_plan(self.now, PlanKind::Detour, answer);
                 self.say(i, text);
             }
-            None => member.companion.handle_plan(self.now, Wanted::Mission, Ok(own)),
+            None => member.companion.handle_plan(self.now, PlanKind::Mission, Ok(own)),
         }
     }
 

@@ -109,7 +109,7 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
         set.segments.push((position, position + velocity * (left_m / speed)));
         set.radius_m = 0.5 * ACCEL * age_s * age_s;
     }
-    if velocity.z < -0.2 || intent.is_some_and(|i| i.column) {
+    if velocity.z < -0.2 || intent.is_some_and(|i| i.may_come_down) {
         set.segments.push((position, Point::new(position.x, position.y, floor_z.min(position.z))));
     }
     Some(set)
@@ -148,7 +148,7 @@ pub struct Seen {
     pub own: bool,
     /// It lands by its autopilot, as its companion commanded.
     pub lands: bool,
-    /// It has heard nobody for so long that it has to come down where it is.
+    /// It has heard no other vehicle for so long that it has to come down where it is.
     pub deaf: bool,
 }
 
@@ -343,7 +343,7 @@ impl Oracle {
         let Some(warned) = warned.filter(|warned| *warned < step) else { return track[step].position };
         if track[warned..=step].iter().any(|seen| !seen.own || (seen.deaf && seen.lands)) {
             // Somebody else took it: its companion could not have stopped it. Nor could a vehicle stay up for good that
-            // hears nobody any more.
+            // hears no other vehicle any more.
             return track[step].position;
         }
         let speed = track[warned].velocity.norm();

@@ -1,14 +1,14 @@
 //! The planner of detours: in the open, with nothing around but vehicles.
 
 use planner_core::Point;
-use planner_core::detour::{DetourRequest, KeepOff, Nature};
+use planner_core::detour::{DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
 
 use super::oracle;
 use super::scene::Plan;
 
 /// A way around in the open: straight, or past one or two points beside and above.
-pub(super) fn around(request: &DetourRequest, keep: &[KeepOff], own: &Plan) -> Option<Plan> {
+pub(super) fn around(request: &DetourRequest, keep: &[KeepOutZone], own: &Plan) -> Option<Plan> {
     let last = own.path.waypoints().last()?.position;
     let ground = last - Point::new(0.0, 0.0, request.descent_m);
     let here = request.here;
@@ -16,7 +16,7 @@ pub(super) fn around(request: &DetourRequest, keep: &[KeepOff], own: &Plan) -> O
         keep.iter().all(|k| {
             let now_m = oracle::distance((here, here), (k.from, k.to));
             let apart_m = k.radius_m.min((now_m - 0.002).max(0.0));
-            let solid = if k.nature == Nature::Landing { (k.from, k.from) } else { (k.from, k.to) };
+            let solid = if k.kind == ZoneKind::Descending { (k.from, k.from) } else { (k.from, k.to) };
             oracle::distance((from, to), solid) >= apart_m
         })
     };

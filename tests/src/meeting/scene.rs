@@ -5,7 +5,7 @@ mod passing;
 mod types;
 mod ways;
 
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use planner_core::Point;
 use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
@@ -146,7 +146,7 @@ fn vehicle(
     }
     Vehicle {
         id: flight.id,
-        kind: if dice.chance(0.6) { Kind::Px4 } else { Kind::ArduPilot },
+        kind: if dice.chance(0.6) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot },
         pad: pads(flight)[0],
         plan,
         phase: dice.bits() % 40,

@@ -105,7 +105,7 @@ fn planted_errors_are_found() {
     }
 }
 
-/// Of two halves the one with the lowest id goes on; else the larger one does. It photographs all, and the others land.
+/// Of two halves the one with the lowest id continues; else the larger one does. It photographs all, and the others land.
 #[test]
 fn of_parts_for_ever_one_goes_on() {
     for count in 2..=MOST {

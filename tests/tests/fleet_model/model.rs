@@ -3,8 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
-use companion::link::roster::{Roster, Standing};
-use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
+use companion::link::roster::{MemberStatus, RosterReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
 use companion::time::{Duration, Instant};
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
 use stateright::{Model, Property};
@@ -73,7 +73,7 @@ pub struct Vehicle {
     pub hears: u32,
     /// Whether its clock is a tick slow.
     pub slow: bool,
-    /// Whether it stands, and goes on only to where it has promised to hold.
+    /// Whether it stands, and continues only to where it has promised to hold.
     pub stands: bool,
     /// Waypoints that it has photographed.
     pub taken: u32,
@@ -85,7 +85,7 @@ pub struct Vehicle {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct Message {
     hears: u32,
-    roster: Roster,
+    roster: RosterReport,
 }
 
 /// What one vehicle may do in a tick.
@@ -138,7 +138,7 @@ pub struct FleetModel {
     pub planted: Planted,
     /// So many waypoints of its part are a vehicle's path: of a longer one that is the first stretch.
     pub most: usize,
-    pub limits: Limits,
+    pub limits: FleetTimeouts,
     /// What the links may change to.
     pub all_links: Vec<Links>,
     pub known: Mutex<Known>,
@@ -147,8 +147,12 @@ pub struct FleetModel {
 impl FleetModel {
     pub fn new(count: usize, radio: Radio, planted: Planted) -> Self {
         let silent = if planted == Planted::TakenOverEarly { 4 } else { SILENT };
-        let limits =
-            Limits { lease: ticks(LEASE), heard: ticks(0), silent: ticks(silent), down: ticks(silent) };
+        let limits = FleetTimeouts {
+            lease: ticks(LEASE),
+            heard: ticks(0),
+            silent: ticks(silent),
+            down: ticks(silent),
+        };
         Self {
             count,
             whole: (0..count as u32 * 2).collect(),
@@ -167,7 +171,7 @@ impl FleetModel {
         }
     }
 
-    /// The waypoints of its path, and whether its part goes on after them.
+    /// The waypoints of its path, and whether its part continues after them.
     fn path(&self, vehicle: &Vehicle) -> (Vec<u32>, bool) {
         let mut part = parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank);
         let goes_on = part.len() > self.most;
@@ -184,7 +188,7 @@ impl FleetModel {
 
     /// Up to where on its part it flies, in waypoints.
     fn end(&self, vehicle: &Vehicle) -> u16 {
-        let promise = vehicle.fleet.promise_dm().filter(|_| self.planted != Planted::PromiseBroken);
+        let promise = vehicle.fleet.commitment_dm().filter(|_| self.planted != Planted::PromiseBroken);
         promise.map_or(u16::MAX, |dm| dm / WAYPOINT_DM)
     }
 
@@ -210,53 +214,53 @@ impl FleetModel {
         vehicle.hears = 0;
         for (from, message) in heard {
             vehicle.hears |= 1 << from;
-            vehicle.fleet.handle(*from, &message.roster, false);
+            vehicle.fleet.handle_roster(*from, &message.roster, false);
         }
         if self.planted == Planted::PresentAlone {
             self.forget_silent(&mut vehicle);
         }
         let bit = |bits: u32, rank: usize| bits >> rank & 1 != 0;
-        let hearing = |rank: usize| Hearing {
-            direct_at: bit(vehicle.hears, rank).then_some(now),
+        let hearing = |rank: usize| MemberReception {
+            heard_at: bit(vehicle.hears, rank).then_some(now),
             hears_us: heard.iter().any(|(from, m)| *from == rank && bit(m.hears, vehicle.rank)),
-            by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
+            heard_by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
         };
         let (path, goes_on) = self.path(&vehicle);
         let done = usize::from(vehicle.along) >= path.len();
         let lands = choice.leaves || vehicle.flight == Flight::Down || vehicle.fleet.is_excluded();
         let standing = match (lands, done && !goes_on) {
-            (false, _) => Standing::Alive,
-            (true, false) => Standing::Left,
-            (true, true) => Standing::Finished,
+            (false, _) => MemberStatus::Alive,
+            (true, false) => MemberStatus::Left,
+            (true, true) => MemberStatus::Finished,
         };
-        let promise = vehicle.fleet.promise_dm();
-        let own = Own {
-            standing,
+        let promise = vehicle.fleet.commitment_dm();
+        let own = OwnReport {
+            status: standing,
             waits: false,
             division: vehicle.division,
-            done_dm: vehicle.along * WAYPOINT_DM,
-            promise_dm: Some((vehicle.along + 1).min(path.len() as u16) * WAYPOINT_DM),
+            progress_dm: vehicle.along * WAYPOINT_DM,
+            commitment_dm: Some((vehicle.along + 1).min(path.len() as u16) * WAYPOINT_DM),
             holds: done || promise.is_some_and(|dm| vehicle.along * WAYPOINT_DM >= dm),
-            asks: done && goes_on,
+            wants_division: done && goes_on,
         };
         vehicle.fleet.step(now, &own, hearing);
-        if vehicle.fleet.wants_hash() {
+        if vehicle.fleet.needs_division() {
             let hash = parts(&self.whole, &vehicle.fleet, self.count).1;
             vehicle.fleet.take_plan_crc(hash);
         }
-        if vehicle.fleet.division() > vehicle.division {
-            vehicle.division = vehicle.fleet.division();
+        if vehicle.fleet.division_count() > vehicle.division {
+            vehicle.division = vehicle.fleet.division_count();
             vehicle.along = 0;
         }
         let hovered = vehicle.fleet.unheard_for(now) >= ticks(2 * LEASE);
         if lands || (hovered && self.planted != Planted::LeaseIgnored) {
             vehicle.flight = Flight::Down;
         }
-        vehicle.fleet.set_clock(now, NOW);
+        vehicle.fleet.move_to_clock(now, NOW);
         let waypoint = self.path(&vehicle).0;
         let waypoint =
             waypoint.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
-        let promised = vehicle.fleet.promise_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
+        let promised = vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
         let advances = choice.advances || !vehicle.stands || promised;
         if let Some(waypoint) = waypoint.filter(|_| advances && self.flies(&vehicle)) {
             vehicle.taken |= 1 << waypoint;
@@ -267,17 +271,17 @@ impl FleetModel {
 
     /// Plants the error: a silent vehicle does not count any more, as if it had left.
     fn forget_silent(&self, vehicle: &mut Vehicle) {
-        let mut roster = vehicle.fleet.message(0);
+        let mut roster = vehicle.fleet.roster_message(0);
         roster.hash = 0;
         for rank in (0..self.count).filter(|rank| *rank != vehicle.rank) {
             let silent = &mut vehicle.silent[rank];
             *silent = if vehicle.hears >> rank & 1 != 0 { 0 } else { (*silent + 1).min(SILENT as u8) };
             if u64::from(*silent) == SILENT {
-                roster.entries[rank].standing = roster.entries[rank].standing.max(Standing::Left);
+                roster.entries[rank].status = roster.entries[rank].status.max(MemberStatus::Left);
             }
         }
         for sender in (0..self.count).filter(|rank| *rank != vehicle.rank).take(1) {
-            vehicle.fleet.handle(sender, &roster, false);
+            vehicle.fleet.handle_roster(sender, &roster, false);
         }
     }
 
@@ -290,7 +294,7 @@ impl FleetModel {
         let sends = if vehicle.flight == Flight::Dead {
             0
         } else {
-            let message = Message { hears: vehicle.hears, roster: vehicle.fleet.message(0) };
+            let message = Message { hears: vehicle.hears, roster: vehicle.fleet.roster_message(0) };
             let messages = &mut known.messages;
             *known.message_numbers.entry(message).or_insert_with_key(|message| {
                 messages.push(message.clone());
@@ -456,8 +460,8 @@ impl Model for FleetModel {
             for (rank, number) in vehicles.iter_mut().enumerate().take(self.count) {
                 let stands = stands >> rank & 1 != 0;
                 let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
-                vehicle.fleet.begin(NOW);
-                vehicle.fleet.set_clock(NOW, NOW);
+                vehicle.fleet.begin_flight(NOW);
+                vehicle.fleet.move_to_clock(NOW, NOW);
                 *number = self.number(known, vehicle);
             }
             vehicles

@@ -18,15 +18,21 @@ fn frame<M: MessageData>(message: &M, sequence: u8) -> Frame {
     Framer::new().next(Instant::ZERO, &mut input).expect("a whole frame")
 }
 
-fn heard(kind: Kind, origin: Geodetic, latitude: i32, longitude: i32, altitude: i32) -> (Telemetry, Change) {
+fn heard(
+    kind: AutopilotKind,
+    origin: Geodetic,
+    latitude: i32,
+    longitude: i32,
+    altitude: i32,
+) -> (Telemetry, TelemetryChange) {
     let mut telemetry = Telemetry { kind: Some(kind), ..Telemetry::new(false) };
     let data = GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude };
-    let change = telemetry.handle(Instant::ZERO, &origin, &frame(&data, 0));
+    let change = telemetry.handle_frame(Instant::ZERO, &origin, &frame(&data, 0));
     (telemetry, change)
 }
 
 /// Whether places about the mission's origin come back as they were sent, metres off at most.
-fn worst_m(telemetry: &Telemetry, kind: Kind, origin: &Geodetic, places: &[Point]) -> Option<f64> {
+fn worst_m(telemetry: &Telemetry, kind: AutopilotKind, origin: &Geodetic, places: &[Point]) -> Option<f64> {
     let ekf_origin = telemetry.ekf_origin?;
     let off = places.iter().map(|place| {
         let ned = telemetry.to_ned(origin, place).expect("an origin is known").cast::<f64>();
@@ -46,7 +52,7 @@ proptest! {
         places in proptest::collection::vec((-80.0f32..80.0, -80.0f32..80.0, -10.0f32..60.0), 1..8),
         px4 in any::<bool>(),
     ) {
-        let kind = if px4 { Kind::Px4 } else { Kind::ArduPilot };
+        let kind = if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
         let origin = Geodetic { lat_deg: mission.0, lon_deg: mission.1, alt_m: mission.2 };
         let degrees = range_m / 111_000.0;
         let latitude = ((mission.0 + away.0 * degrees).clamp(-90.0, 90.0) * 1e7) as i32;
@@ -58,7 +64,7 @@ proptest! {
             // As much as the geofence leaves for it.
             Some(off_m) => prop_assert!(off_m < 2e-3, "{off_m} m off"),
             None => {
-                prop_assert!(matches!(change, Change::OriginFar(_)), "{change:?}");
+                prop_assert!(matches!(change, TelemetryChange::OriginFar(_)), "{change:?}");
                 prop_assert!(range_m > 1e4, "refused although near");
             }
         }
@@ -70,14 +76,16 @@ fn a_far_origin_takes_the_place_of_none_in_flight_and_leaves_none_on_the_ground(
     let origin = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
     let near = (400_000_000, -30_000_000, 700_000);
     for armed in [false, true] {
-        let (mut telemetry, _) = heard(Kind::Px4, origin, near.0, near.1, near.2);
+        let (mut telemetry, _) = heard(AutopilotKind::Px4, origin, near.0, near.1, near.2);
         telemetry.armed = armed;
-        telemetry.watch_origin();
+        telemetry.update_origin_trust();
         let far = GPS_GLOBAL_ORIGIN_DATA { latitude: 410_000_000, longitude: near.1, altitude: near.2 };
-        let change = telemetry.handle(Instant::ZERO, &origin, &frame(&far, 1));
+        let change = telemetry.handle_frame(Instant::ZERO, &origin, &frame(&far, 1));
         match armed {
-            true => assert_eq!((change, telemetry.ekf_origin.is_some()), (Change::OriginDoubted, true)),
-            false => assert_eq!((change, telemetry.ekf_origin), (Change::OriginFar(111), None)),
+            true => {
+                assert_eq!((change, telemetry.ekf_origin.is_some()), (TelemetryChange::OriginDoubted, true))
+            }
+            false => assert_eq!((change, telemetry.ekf_origin), (TelemetryChange::OriginFar(111), None)),
         }
     }
 }

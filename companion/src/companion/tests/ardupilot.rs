@@ -119,7 +119,7 @@ fn timesync_is_answered_and_its_answers_are_not() {
     let mut bench = Bench::ardupilot(config());
     bench.run(1.0);
     bench.send(&TIMESYNC_DATA { tc1: 0, ts1: 77 });
-    assert_eq!(bench.timesyncs, [(bench.now.micros() as i64 * 1000, 77)]);
+    assert_eq!(bench.timesyncs, [(bench.now.as_micros() as i64 * 1000, 77)]);
     bench.send(&TIMESYNC_DATA { tc1: 5, ts1: 78 });
     assert_eq!(bench.timesyncs.len(), 1);
 }
@@ -128,7 +128,7 @@ fn timesync_is_answered_and_its_answers_are_not() {
 fn another_autopilots_heartbeat_changes_nothing() {
     let mut bench = Bench::ardupilot(config());
     bench.until(State::Ready, 6.0);
-    bench.kind = crate::autopilot::Kind::Px4;
+    bench.kind = crate::autopilot::AutopilotKind::Px4;
     bench.armed = true;
     bench.run(3.5);
     assert_eq!(bench.state(), State::WaitAutopilot, "its own is silent");

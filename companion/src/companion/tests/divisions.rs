@@ -14,7 +14,7 @@ use super::State::*;
 use super::*;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::ON_PLAN;
-use crate::link::roster::{self, Entry, Roster, Standing};
+use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use crate::{Link, RosterEntry};
 
 /// Three vehicles photograph an area, this one along the usual path; the first other one is heard.
@@ -30,13 +30,13 @@ pub(super) fn over_a_field(px4: bool) -> Bench {
 }
 
 /// A roster of vehicle 77, as this one would have it.
-pub(super) fn own_roster(b: &Bench) -> Roster {
+pub(super) fn own_roster(b: &Bench) -> RosterReport {
     let fleet = b.companion.neighbours.fleet().expect("an area");
-    Roster { system_id: 77, mission_crc: 0xC0FFEE, ..fleet.message(0) }
+    RosterReport { system_id: 77, mission_crc: 0xC0FFEE, ..fleet.roster_message(0) }
 }
 
 /// The bytes of a roster of vehicle 77.
-pub(super) fn bytes(roster: &Roster, sequence: u8) -> Vec<u8> {
+pub(super) fn bytes(roster: &RosterReport, sequence: u8) -> Vec<u8> {
     let (mut payload, mut out) = ([0; roster::MAX_LEN], [0; MAX_FRAME_LEN]);
     let len = roster.encode(&mut payload);
     let header = Header { system: roster.system_id, component: crate::COMPANION_COMPONENT, sequence };
@@ -47,7 +47,7 @@ pub(super) fn bytes(roster: &Roster, sequence: u8) -> Vec<u8> {
 /// Vehicle 77: what it knows follows from what this one reports while it hears it.
 #[derive(Default)]
 struct Other {
-    known: Option<Roster>,
+    known: Option<RosterReport>,
     /// It reports nothing; it hears all the same.
     mute: bool,
     sequence: u8,
@@ -56,7 +56,7 @@ struct Other {
 }
 
 impl Other {
-    /// Takes in what this one reports, agrees, lets it count once both hold, and says so.
+    /// Handles what this one reports, agrees, lets it count once both hold, and says so.
     fn tick(&mut self, b: &mut Bench) {
         self.sequence = self.sequence.wrapping_add(1);
         if !self.sequence.is_multiple_of(4) {
@@ -66,23 +66,24 @@ impl Other {
         let counted = self.known.as_ref().map_or(0, |known| known.divisions);
         let mut known = match &self.known {
             Some(known) if counted > mine.divisions => known.clone(),
-            _ => Roster { hash: mine.hash, ..mine.clone() },
+            _ => RosterReport { hash: mine.hash, ..mine.clone() },
         };
         if known.divisions == mine.divisions {
-            known.entries[1] = Entry { promise_dm: Some(50), holds: true, agrees: true, ..known.entries[1] };
-            known.entries[2].standing = Standing::Left;
+            known.entries[1] =
+                RosterReportEntry { commitment_dm: Some(50), holds: true, agrees: true, ..known.entries[1] };
+            known.entries[2].status = MemberStatus::Left;
             let own = mine.entries[0];
-            if known.divisions == 0 && mine.hash != 0 && own.holds && own.standing == Standing::Alive {
+            if known.divisions == 0 && mine.hash != 0 && own.holds && own.status == MemberStatus::Alive {
                 self.counts_after = self.counts_after.saturating_sub(1);
             }
             if known.divisions == 0 && mine.hash != 0 && own.holds && self.counts_after == 0 {
-                let entry = |e: &Entry| Entry {
+                let entry = |e: &RosterReportEntry| RosterReportEntry {
                     incarnation: e.incarnation,
-                    standing: e.standing,
-                    ..Entry::default()
+                    status: e.status,
+                    ..RosterReportEntry::default()
                 };
                 known.entries = known.entries.iter().map(entry).collect();
-                (known.divisions, known.counted, known.hash) = (1, mine.hash, 0);
+                (known.divisions, known.committed_hash, known.hash) = (1, mine.hash, 0);
             }
         }
         if !self.mute {
@@ -140,13 +141,13 @@ impl Watch {
         let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
         let homeward = guidance.returning || b.companion.detours.home.is_on();
         let flies = state == Follow && !homeward;
-        let behind = fleet.division() > b.companion.mission.division();
+        let behind = fleet.division_count() > b.companion.mission.division_count();
         let held_m = f32::from(fleet.held_at_dm()) / 10.0;
         assert!(
             !behind || !flies || guidance.along_m() <= held_m + 0.3,
             "on another's part, held {held_m} m: {said}"
         );
-        let left = fleet.message(0).entries[0].standing == Standing::Left;
+        let left = fleet.roster_message(0).entries[0].status == MemberStatus::Left;
         assert!(!left || !flies, "flies on though it left: {said}");
         // On the way back there are no gates.
         let halted = state == Follow && homeward && guidance.advice.stop_within_m <= 0.05;
@@ -157,7 +158,7 @@ impl Watch {
 
     fn happen(&mut self, b: &mut Bench, what: Happens) {
         use Happens::*;
-        self.log.push(format!("{:.2} s {:?}: {what:?}", b.now.micros() as f64 * 1e-6, b.state()));
+        self.log.push(format!("{:.2} s {:?}: {what:?}", b.now.as_micros() as f64 * 1e-6, b.state()));
         let order = |b: &mut Bench, command, param1| {
             b.acks.clear();
             b.command(command, param1, SYSTEM, crate::COMPANION_COMPONENT);
@@ -167,7 +168,7 @@ impl Watch {
             Pause => _ = order(b, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
             Resume => _ = order(b, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
             Pilot => {
-                b.mode = if b.kind == crate::autopilot::Kind::Px4 {
+                b.mode = if b.kind == crate::autopilot::AutopilotKind::Px4 {
                     px4::HOLD
                 } else {
                     crate::autopilot::ardupilot::BRAKE
@@ -310,18 +311,26 @@ fn lie() -> impl proptest::strategy::Strategy<Value = Lie> {
 }
 
 impl Lie {
-    fn told(&self, b: &Bench) -> Roster {
-        const ALL: [Standing; 4] = [Standing::Alive, Standing::Lost, Standing::Left, Standing::Finished];
+    fn told(&self, b: &Bench) -> RosterReport {
+        const ALL: [MemberStatus; 4] =
+            [MemberStatus::Alive, MemberStatus::Lost, MemberStatus::Left, MemberStatus::Finished];
         let mut roster = own_roster(b);
         roster.system_id = self.system_id;
         roster.mission_crc = if self.crc { roster.mission_crc } else { 7 };
         roster.divisions = self.divisions.unwrap_or(roster.divisions);
         roster.first = self.first.unwrap_or(roster.first);
-        roster.counted = self.counted.unwrap_or(roster.hash);
+        roster.committed_hash = self.counted.unwrap_or(roster.hash);
         roster.hash = self.hash.unwrap_or(roster.hash);
         for &(rank, incarnation, standing, done_dm, promise_dm, holds) in &self.entries {
             let standing = ALL[usize::from(standing)];
-            roster.entries[rank] = Entry { incarnation, standing, done_dm, promise_dm, holds, agrees: holds };
+            roster.entries[rank] = RosterReportEntry {
+                incarnation,
+                status: standing,
+                progress_dm: done_dm,
+                commitment_dm: promise_dm,
+                holds,
+                agrees: holds,
+            };
         }
         roster
     }

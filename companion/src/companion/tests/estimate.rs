@@ -3,7 +3,7 @@
 extern crate std;
 
 use super::super::*;
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
@@ -15,16 +15,16 @@ fn the_pace_follows_the_estimate() {
         let begun = bench.setpoints.len();
         bench.run(seconds);
         let pairs = bench.setpoints[begun..].windows(2);
-        pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).secs_f32()).fold(0.0, f32::max)
+        pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32()).fold(0.0, f32::max)
     };
     // The margin of 0.5 m leaves 0.25 m at cruise and 0.4 m at a crawl.
-    for kind in [Kind::Px4, Kind::ArduPilot] {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         let mut bench = match kind {
-            Kind::Px4 => Bench::new(config()),
-            Kind::ArduPilot => Bench::ardupilot(config()),
+            AutopilotKind::Px4 => Bench::new(config()),
+            AutopilotKind::ArduPilot => Bench::ardupilot(config()),
         };
-        bench.companion.services.set(3, 0.26).unwrap();
-        bench.companion.tune();
+        bench.companion.services.set_parameter_value(3, 0.26).unwrap();
+        bench.companion.apply_parameters();
         bench.until(State::Ready, 60.0);
         bench.start();
         bench.until(State::Aborted, 5.0);

@@ -149,8 +149,8 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
                 mission_crc: 7,
                 plan_crc: 5,
                 progress_m: 1e6,
-                clear_m: -1e6,
-                heard: u32::MAX,
+                gates_open_up_to_m: -1e6,
+                heard_bits: u32::MAX,
                 points: heapless::Vec::from_slice(&[GOAL]).unwrap(),
                 ..Intent::default()
             };
@@ -195,7 +195,7 @@ proptest::proptest! {
             bench.until(State::Ready, 6.0);
         }
         let mut flash = crate::testing::fake_flash::Flash::new(9);
-        bench.companion.mount(crate::testing::fake_flash::started(&mut flash));
+        bench.companion.attach_store(crate::testing::fake_flash::started(&mut flash));
         let (state, parameters) = (bench.state(), bench.companion.services.parameters().to_bytes());
         let config = bench.companion.config.clone();
         bench.events.clear();
@@ -211,7 +211,7 @@ proptest::proptest! {
             proptest::prop_assert!(bench.state() == state || (flies && landed), "{:?} {:?}", bench.state(), bench.texts);
         }
         proptest::prop_assert!(!bench.events.contains(&Event::RestartRequested));
-        proptest::prop_assert_eq!(bench.companion.detours.obstacles(), 0);
+        proptest::prop_assert_eq!(bench.companion.detours.obstacle_count(), 0);
         proptest::prop_assert!(bench.companion.services.parameters().to_bytes() == parameters && bench.companion.config == config);
         // The radio gives the ground station all it requests within as long as its budget needs.
         bench.swarm.clear();
@@ -282,7 +282,7 @@ proptest::proptest! {
 fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
     let at = planner_core::frames::enu_to_geodetic(&ORIGIN, &place);
     let data = GLOBAL_POSITION_INT_DATA {
-        time_boot_ms: now.boot_ms(),
+        time_boot_ms: now.as_boot_ms(),
         lat: (at.lat_deg * 1e7) as i32,
         lon: (at.lon_deg * 1e7) as i32,
         alt: (at.alt_m * 1e3) as i32,

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::super::*;
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::autopilot::{ardupilot, px4};
 use crate::link::commands::{ACCEPTED, TEMPORARILY_REJECTED};
 use crate::link::intent::{GROUNDED, ON_PLAN, OUT_OF_PLAN};
@@ -20,10 +20,10 @@ const ARM: u16 = 400;
 const SET_MODE: u16 = 176;
 const TAKE_OFF: u16 = 22;
 
-fn pilot_mode(kind: Kind) -> u32 {
+fn pilot_mode(kind: AutopilotKind) -> u32 {
     match kind {
-        Kind::Px4 => px4::HOLD,
-        Kind::ArduPilot => ardupilot::BRAKE,
+        AutopilotKind::Px4 => px4::HOLD,
+        AutopilotKind::ArduPilot => ardupilot::BRAKE,
     }
 }
 
@@ -45,10 +45,10 @@ fn land(b: &mut Bench) -> Option<u8> {
     order(b, MavCmd::MAV_CMD_NAV_LAND, 0.0)
 }
 
-fn bench(kind: Kind) -> Bench {
+fn bench(kind: AutopilotKind) -> Bench {
     let mut bench = match kind {
-        Kind::Px4 => Bench::new(config()),
-        Kind::ArduPilot => Bench::ardupilot(config()),
+        AutopilotKind::Px4 => Bench::new(config()),
+        AutopilotKind::ArduPilot => Bench::ardupilot(config()),
     };
     bench.spool = Duration::from_millis(2000);
     bench.until(State::Ready, 6.0);
@@ -57,7 +57,7 @@ fn bench(kind: Kind) -> Bench {
 
 /// A bench in a state that can be interrupted; from there the vehicle stands still, so that nothing but the interruption
 /// moves the mission on.
-fn reach(kind: Kind, state: State, paused_in: Option<State>) -> Option<Bench> {
+fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<Bench> {
     use State::*;
     let mut b = match state {
         Alone | Blocked => {
@@ -73,8 +73,8 @@ fn reach(kind: Kind, state: State, paused_in: Option<State>) -> Option<Bench> {
         }
     };
     match state {
-        TakeOff if kind == Kind::Px4 => return None,
-        Alone | Blocked if kind == Kind::ArduPilot => return None,
+        TakeOff if kind == AutopilotKind::Px4 => return None,
+        Alone | Blocked if kind == AutopilotKind::ArduPilot => return None,
         TakeOff => b.until(TakeOff, 20.0),
         Climb => {
             b.until(Climb, 20.0);
@@ -162,7 +162,7 @@ fn an_interruption_returns_to_the_state_that_it_interrupted() {
             },
         ),
     ];
-    for kind in [Kind::Px4, Kind::ArduPilot] {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         for &(state, paused_in) in CASES {
             for (name, through, there, back) in there_and_back {
                 let Some(mut b) = reach(kind, state, paused_in) else { continue };
@@ -207,7 +207,7 @@ fn an_interruption_returns_to_the_state_that_it_interrupted() {
 
 #[test]
 fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached() {
-    for kind in [Kind::Px4, Kind::ArduPilot] {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         for (paused, lost) in [(true, false), (false, true), (true, true)] {
             let mut b = bench(kind);
             b.start();
@@ -242,7 +242,7 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
 fn a_pause_holds_the_vehicle_on_its_pad_until_the_resume() {
     use State::*;
     for at in [Ready, Scheduled, Streaming, Engaging, Arming] {
-        let mut b = bench(Kind::Px4);
+        let mut b = bench(AutopilotKind::Px4);
         if at == Arming {
             b.refused.push(ARM);
         }
@@ -266,7 +266,7 @@ fn a_pause_holds_the_vehicle_on_its_pad_until_the_resume() {
 fn a_vehicle_that_is_landed_before_it_lifts_off_ends_on_the_ground() {
     for command in [MavCmd::MAV_CMD_NAV_LAND, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH] {
         for tenths in 0..40 {
-            let mut b = bench(Kind::ArduPilot);
+            let mut b = bench(AutopilotKind::ArduPilot);
             b.start();
             b.until(State::Arming, 10.0);
             b.run(tenths as f32 * 0.1);
@@ -281,19 +281,19 @@ fn a_vehicle_that_is_landed_before_it_lifts_off_ends_on_the_ground() {
 #[test]
 fn a_disarm_is_never_answered_by_arming() {
     // Undone before HEARTBEAT shows it; with the ack, and with the ack lost.
-    let mut b = bench(Kind::Px4);
+    let mut b = bench(AutopilotKind::Px4);
     b.never_arms = true;
     b.start();
     b.run(30.0);
     assert_eq!(b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count(), 1);
     assert_eq!(b.state(), State::Aborted);
-    let mut b = bench(Kind::Px4);
+    let mut b = bench(AutopilotKind::Px4);
     (b.never_arms, b.mute) = (true, true);
     b.start();
     b.run(30.0);
     assert_eq!(b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count(), 2);
     // Silent meanwhile: not even once more.
-    let mut b = bench(Kind::Px4);
+    let mut b = bench(AutopilotKind::Px4);
     b.start();
     b.until(State::Arming, 5.0);
     (b.never_arms, b.mute) = (true, true);
@@ -305,7 +305,7 @@ fn a_disarm_is_never_answered_by_arming() {
     b.run(5.0);
     assert!(b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count() <= asked + 1);
     // Seen armed, then disarmed.
-    let mut b = bench(Kind::ArduPilot);
+    let mut b = bench(AutopilotKind::ArduPilot);
     b.start();
     b.until(State::TakeOff, 10.0);
     (b.armed, b.took_off) = (false, false);
@@ -315,7 +315,7 @@ fn a_disarm_is_never_answered_by_arming() {
 
 #[test]
 fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
-    let mut b = bench(Kind::Px4);
+    let mut b = bench(AutopilotKind::Px4);
     b.refused.push(ARM);
     b.start();
     b.until(State::Arming, 5.0);
@@ -326,7 +326,7 @@ fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
     assert!((1..=4).contains(&said), "{said} on two links, arming and disarming: {:?}", b.texts);
     assert_eq!(b.state(), State::Aborted);
     // Accepted at last.
-    let mut b = bench(Kind::Px4);
+    let mut b = bench(AutopilotKind::Px4);
     b.refused.push(ARM);
     b.start();
     b.until(State::Arming, 5.0);
@@ -337,7 +337,7 @@ fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
 
 #[test]
 fn after_the_pilot_one_point_is_held_until_the_resume() {
-    for kind in [Kind::Px4, Kind::ArduPilot] {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         let mut b = bench(kind);
         b.start();
         b.until(State::Follow, 20.0);
@@ -418,7 +418,7 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     b.answer_detour = None;
     b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     b.until(State::Replanning, 10.0);
-    // Upon the way around that comes a second later.
+    // Upon the detour that comes a second later.
     let place = enu_to_geodetic(&ORIGIN, &Point::new(13.0, 16.0, 2.0));
     let data = COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
@@ -436,12 +436,12 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     let len = crate::link::frame::encode(header, &data, &mut out);
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..len]);
     b.drain();
-    let request = b.companion.detour(|_| {}).expect("planning");
+    let request = b.companion.detour_request(|_| {}).expect("planning");
     let mut path = planner_core::flight::Path::new();
     for point in [request.here, Point::new(13.0, 16.0, 2.0), GOAL] {
         path.push(point, 1.2).unwrap();
     }
-    b.companion.handle_plan(b.now, Wanted::Detour, Ok(&VehiclePlan { path, ..plan() }));
+    b.companion.handle_plan(b.now, PlanKind::Detour, Ok(&VehiclePlan { path, ..plan() }));
     b.drain();
     b.run(1.0);
     assert_eq!(b.state(), State::Blocked, "{:?}", b.texts);

@@ -1,11 +1,11 @@
-//! Fast flights that are stopped and go on at any moment, as over a field: the setpoint stays on its path, and on the curve
+//! Fast flights that are stopped and continue at any moment, as over a field: the setpoint stays on its path, and on the curve
 //! that stops with it. Descents to the ground.
 
 use planner_core::flight::Path;
 use proptest::prelude::ProptestConfig;
 
 use super::*;
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 
 /// A way back and forth over a field, lanes `apart_m` apart.
 fn lanes(long_m: f32, apart_m: f32) -> Plan {
@@ -87,11 +87,11 @@ proptest::proptest! {
         // The ground may be higher than it is said to be, and the path low.
         (higher_m, end_m) in (0f32..1.0, 1f32..6.0),
     ) {
-        for kind in [Kind::Px4, Kind::ArduPilot] {
+        for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
             let mut config = config();
             config.required_clearance_m = config.radius_m + margin_m;
             (config.descend_mps, config.cruise_mps) = (descend_mps, cruise_mps);
-            let mut bench = if kind == Kind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+            let mut bench = if kind == AutopilotKind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
             let mut path = Path::new();
             for point in [START, Point::new(GOAL.x, GOAL.y, START.z), Point::new(GOAL.x, GOAL.y, end_m)] {
                 path.push(point, 1.2).unwrap();
@@ -103,8 +103,8 @@ proptest::proptest! {
             bench.setpoints.clear();
             while bench.state() == State::Follow {
                 bench.run(0.05);
-                bench.false_ground = kind == Kind::Px4
-                    && bench.companion.guidance.descends()
+                bench.false_ground = kind == AutopilotKind::Px4
+                    && bench.companion.guidance.is_descending()
                     && bench.enu.z < higher_m;
                 proptest::prop_assert!(bench.setpoints.len() < 5000, "{kind:?}: it never lands");
             }
@@ -113,11 +113,11 @@ proptest::proptest! {
             let low_m = margin_m.min(1.2);
             let lowest = bench.setpoints.iter().map(|(_, at, _)| at.z).fold(f32::INFINITY, f32::min);
             match kind {
-                Kind::Px4 => proptest::prop_assert!(bench.enu.z < higher_m.max(0.25), "left at {} m", bench.enu.z),
-                Kind::ArduPilot => proptest::prop_assert!(lowest > end_m.min(low_m) - 0.02, "led to {lowest} m"),
+                AutopilotKind::Px4 => proptest::prop_assert!(bench.enu.z < higher_m.max(0.25), "left at {} m", bench.enu.z),
+                AutopilotKind::ArduPilot => proptest::prop_assert!(lowest > end_m.min(low_m) - 0.02, "led to {lowest} m"),
             }
             for pair in bench.setpoints.windows(2) {
-                let sinks_mps = (pair[0].1.z - pair[1].1.z) / (pair[1].0 - pair[0].0).secs_f32();
+                let sinks_mps = (pair[0].1.z - pair[1].1.z) / (pair[1].0 - pair[0].0).as_secs_f32();
                 // What is sent is smoothed, and slow a little later than the raw point: 0.61 m/s at the margin.
                 let slow = pair[0].1.z > low_m - 0.3 || sinks_mps < 0.55;
                 proptest::prop_assert!(slow, "{kind:?} sinks at {sinks_mps} m/s at {} m", pair[0].1.z);
@@ -135,10 +135,10 @@ proptest::proptest! {
         (descend_mps, margin_m) in (0.3f32..3.0, 0.1f32..3.0),
         higher_m in -1f32..1.0,
     ) {
-        for kind in [Kind::Px4, Kind::ArduPilot] {
+        for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
             let mut config = Config { descend_mps, ..two_vehicles() };
             config.required_clearance_m = config.radius_m + margin_m;
-            let mut bench = if kind == Kind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+            let mut bench = if kind == AutopilotKind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
             let mut path = Path::new();
             for at in [START, Point::new(START.x + 2.0, START.y, end_m), Point::new(GOAL.x, GOAL.y, end_m)] {
                 path.push(at, 1.2).unwrap();
@@ -157,10 +157,10 @@ proptest::proptest! {
             while bench.state() == State::Land && bench.mode == setpoint_mode {
                 bench.run(0.05);
                 bench.enu.z = bench.enu.z.max(higher_m);
-                let after_s = (bench.now - began).secs_f32();
+                let after_s = (bench.now - began).as_secs_f32();
                 proptest::prop_assert!(after_s < 12.0 + end_m / descend_mps.min(0.4), "{kind:?}: it never lands");
             }
-            let low_m = if kind == Kind::Px4 { 0.0 } else { margin_m.min(1.2) };
+            let low_m = if kind == AutopilotKind::Px4 { 0.0 } else { margin_m.min(1.2) };
             let left_m = bench.enu.z;
             proptest::prop_assert!(left_m < higher_m.max(low_m.min(from.z)) + 0.4, "{kind:?} left at {left_m} m");
             for (_, at, _) in &bench.setpoints {
@@ -190,11 +190,11 @@ proptest::proptest! {
         let mut touched = None;
         while bench.state() == State::Follow {
             bench.run(0.05);
-            if bench.companion.guidance.descends() && bench.enu.z <= higher_m {
+            if bench.companion.guidance.is_descending() && bench.enu.z <= higher_m {
                 bench.enu.z = higher_m;
                 touched = touched.or(Some(bench.now));
             }
-            let on_ground_s = touched.map_or(0.0, |at| (bench.now - at).secs_f32());
+            let on_ground_s = touched.map_or(0.0, |at| (bench.now - at).as_secs_f32());
             proptest::prop_assert!(on_ground_s < 12.0, "still in Follow {on_ground_s} s after it touched the ground");
         }
         let landing = matches!(bench.state(), State::Land | State::Disarm);

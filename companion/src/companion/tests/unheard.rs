@@ -1,4 +1,4 @@
-//! A vehicle that nobody hears any more over an area is found where it last said that it may be.
+//! A vehicle that no other vehicle hears any more over an area is found where it last said that it may be.
 
 use super::State::*;
 use super::divisions::over_a_field;
@@ -30,7 +30,7 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
             let told = bench.swarm.iter().rev().find_map(|f| Intent::decode(f.padded(), SYSTEM));
             let (told, from) = (told.expect("five a second"), bench.enu);
             bench.neighbour = None;
-            beyond += usize::from(told.beyond > 0);
+            beyond += usize::from(told.first_unheard_point > 0);
             for _ in 0..500 {
                 bench.run(0.1);
                 if !matches!(bench.state(), TakeOff | Climb | Follow) {

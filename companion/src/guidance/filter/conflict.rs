@@ -2,13 +2,13 @@
 
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{self, Bounds, OwnSet, REACTION_S, Set};
+use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
 
-use super::super::{Guidance, Phase, Scene};
-use super::{Found, MAX_STOP_FOR_STRANGER};
+use super::super::{Guidance, GuidanceInputs, Phase};
+use super::{FilterConflict, MAX_STOP_FOR_STRANGER};
 use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
-use crate::swarm::neighbours::{Met, Neighbours, Reach};
+use crate::swarm::neighbours::{FilterNeighbour, Neighbours, ReachQuery};
 use crate::time::{Duration, Instant};
 
 /// Time of the other vehicle's path ahead that has to be free before the vehicle that yields goes
@@ -37,96 +37,96 @@ impl Guidance {
         &self,
         path: &Path<W>,
         telemetry: &Telemetry,
-        bounds: &Bounds,
+        bounds: &MotionBounds,
         extra_m: f32,
         back: bool,
-    ) -> Set {
+    ) -> ReachableSet {
         let velocity_mps = telemetry.velocity.norm();
-        // Beside the path it flies straight to where it goes on.
-        let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.settled);
+        // Beside the path it flies straight to where it continues.
+        let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
         let join = path.point_at(self.tracker.along_m).filter(|_| joins);
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
         let reference_mps = self.smoother.velocity().norm();
         let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
-        let braking_m = bounds.braking.stop_m(speed_mps).max(self.smoother.braking_m(true));
+        let braking_m = bounds.braking.stop_m(speed_mps).max(self.smoother.stopping_distance_m(true));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
         let here = self.smoother.position();
         let points = path.waypoints();
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);
             let behind = points[..next].iter().rev().map(|w| w.position);
-            return Set::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
+            return ReachableSet::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
         }
         // The vehicle stops for its gates in any case.
         let join_m = join.map_or(0.0, |join| (join - here).norm());
         let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
         let ahead = points[next..].iter().map(|w| w.position);
-        Set::along(here, core::iter::once(here).chain(join).chain(ahead), fly_m)
+        ReachableSet::along(here, core::iter::once(here).chain(join).chain(ahead), fly_m)
     }
 
     /// The first neighbour whose set meets `own`.
     pub(super) fn first_conflict<const V: usize, const W: usize, const G: usize>(
         &self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
         own: &OwnSet<'_>,
-        bounds: &Bounds,
+        bounds: &MotionBounds,
         now: Instant,
-    ) -> Option<Found> {
+    ) -> Option<FilterConflict> {
         let safety_m = self.deconflict.safety_distance_m;
         let place = scene.telemetry.position;
         let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
-        let hears_nobody = neighbours.is_deaf(now);
+        let hears_nobody = neighbours.hears_nobody(now);
         let deaf = lands && hears_nobody;
-        // Led down over an area it looks as in a landing for who lies there unheard.
-        let comes_down = lands || (self.descends() && neighbours.fleet().is_some());
-        let floor_m = scene.plan.filter(|_| comes_down).map(|plan| self.lands_at_m(state, scene, plan));
+        // In a guided descent over an area it checks, as in a landing, for unheard vehicles on the ground.
+        let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
+        let floor_m = scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
-        let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m()))
+        let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m()))
             .max(2.0 * self.track.radius_m + STRANGER_HULL_GAP_M);
-        let reach = Reach {
+        let reach = ReachQuery {
             place,
             within_m: own_reach_m + most_apart_m,
             bounds,
             ahead_s: if self.filter.is_stopped() { YIELD_LOOK_AHEAD_S } else { 0.0 },
             on_plan,
-            deaf: hears_nobody,
+            hears_nobody: hears_nobody,
             lands: comes_down,
         };
         let follows = !lands && !hears_nobody;
         let mut next = 0;
         while let Some((i, contact)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
-            let mut met = neighbours.met(contact, now);
+            let mut met = neighbours.filter_neighbour(contact, now);
             let by_gates = met.on_plan && on_plan;
-            if met.far && (by_gates || lands) {
+            if met.out_of_range && (by_gates || lands) {
                 // The neighbour is not within radio range, and is where the plan has it.
                 continue;
             }
             if by_gates {
                 // The gates keep two on the plan apart, however late their messages are.
-                met.heard.delay_s = 0.0;
+                met.motion.delay_s = 0.0;
             }
             if met.lost && !lands && hears_nobody {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // fly on.
-                (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
+                (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
             }
-            let silent = met.lost || met.heard.age_s > safety::FRESH_S;
+            let silent = met.lost || met.motion.age_s > safety::FRESH_S;
             if lands && silent {
                 // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
-                (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
-                met.heard.rests_within_m = 0.0;
+                (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
+                met.motion.rests_within_m = 0.0;
             }
             if follows && contact.is_leased() && !(by_gates || met.lost) {
-                contact.follow_unheard(&mut met.heard, bounds);
+                contact.follow_unheard(&mut met.motion, bounds);
             }
             let ahead_s = if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
-            let held = self.filter.held_for(now);
+            let held = self.filter.landing_held_for(now);
             if lands && met.stranger && held >= LANDING_WAITED_LONG {
                 // A place that anybody may claim keeps no vehicle in the air.
                 continue;
@@ -134,21 +134,21 @@ impl Guidance {
             // Only beside its own pad, where no path leads back to it, or where nobody is heard on the way: everywhere else
             // there is another place.
             let last_place = self.returning || !self.on_path || deaf;
-            let lies = met.heard.grounded || met.lost || (deaf && silent);
+            let lies = met.motion.grounded || met.lost || (deaf && silent);
             let rests = lies && last_place && held >= LANDING_WAITED_LONG;
             let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
-            } else if (met.heard.grounded || met.stands) && by_gates {
-                // Past a vehicle that waits the schedule leads as near as that and what both stray.
+            } else if (met.motion.grounded || met.stands) && by_gates {
+                // Past a vehicle that waits the schedule leads as near as that and what both deviate.
                 safety_m
-            } else if met.heard.grounded {
-                let vertical = lands || state == State::Climb || self.descends();
+            } else if met.motion.grounded {
+                let vertical = lands || state == State::Climb || self.is_descending();
                 safety_m + if vertical { 0.0 } else { TRACKING_MARGIN_M }
             } else if by_gates || met.lost {
                 safety_m + OVERSHOOT_MARGIN_M
             } else {
-                safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m())
+                safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m())
             };
             let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m);
             let below = || {
@@ -156,11 +156,11 @@ impl Guidance {
                     || (comes_down && contact.comes_home(now, &place, safety_m))
             };
             if silent && !hears_nobody && !met.stranger && below() {
-                return Some(Found { id: met.id, yields: true, stranger: false, rests: met.lost });
+                return Some(FilterConflict { id: met.id, yields: true, stranger: false, rests: met.lost });
             }
-            let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
-            let away = met.heard.position - place;
-            let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
+            let reach_m = own_reach_m + apart_m + met.motion.reach_m(bounds, ahead_s);
+            let away = met.motion.position - place;
+            let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
             if away.x * away.x + away.y * away.y + above_m * above_m >= reach_m * reach_m {
                 continue;
             }
@@ -168,14 +168,14 @@ impl Guidance {
             let meets = || {
                 // Between two on the plan the gates keep the order.
                 let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
-                let other = met.heard.set(bounds, if ahead { ahead_s } else { 0.0 });
-                let low = |low: Point| own.conflicts(&Set::at(low), &low, apart_m);
-                own.conflicts(&other, &met.heard.position, apart_m) || met.low.is_some_and(low)
+                let other = met.motion.reachable_set(bounds, if ahead { ahead_s } else { 0.0 });
+                let low = |low: Point| own.conflicts(&ReachableSet::at(low), &low, apart_m);
+                own.conflicts(&other, &met.motion.position, apart_m) || met.before_climb.is_some_and(low)
             };
             if near > MAX_NEAR_COMPARED || meets() {
                 let yields = self.yields_to(state, scene, &met);
-                let rests = met.heard.grounded || met.lost;
-                return Some(Found { id: met.id, yields, stranger: met.stranger, rests });
+                let rests = met.motion.grounded || met.lost;
+                return Some(FilterConflict { id: met.id, yields, stranger: met.stranger, rests });
             }
         }
         None
@@ -184,7 +184,7 @@ impl Guidance {
     pub(super) fn on_plan<const W: usize, const G: usize>(
         &self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
         !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld)
     }
@@ -194,8 +194,8 @@ impl Guidance {
     pub(super) fn yields_to<const W: usize, const G: usize>(
         &self,
         state: State,
-        scene: &Scene<'_, W, G>,
-        met: &Met<'_>,
+        scene: &GuidanceInputs<'_, W, G>,
+        met: &FilterNeighbour<'_>,
     ) -> bool {
         // Two vehicles with different plans do not follow each other's plan.
         let on_plan = self.on_plan(state, scene) && met.shares_plan;

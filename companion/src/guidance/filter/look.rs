@@ -3,14 +3,14 @@
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{OwnSet, REACTION_S, Set};
+use planner_core::safety::{OwnSet, REACTION_S, ReachableSet};
 
 use super::super::limits::bounds;
-use super::super::motion::within;
-use super::super::{Guidance, Scene};
+use super::super::motion::clamp_to;
+use super::super::{Guidance, GuidanceInputs};
 use super::{
-    Filter, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER, MAX_TURNING_SETPOINT_M, MAX_TURNING_SETPOINT_MPS,
-    RESUME_CLEAR_FOR, RESUME_CLEAR_M, STANDSTILL_WITHIN_M, Way,
+    FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER, MAX_TURNING_SETPOINT_M,
+    MAX_TURNING_SETPOINT_MPS, RESUME_CLEAR_FOR, RESUME_CLEAR_M, STANDSTILL_WITHIN_M, SafetyFilter,
 };
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -21,22 +21,26 @@ impl Guidance {
     pub(in crate::guidance) fn filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
         now: Instant,
     ) {
         let priority = self.deconflict.method == Method::Priority;
         let Some(plan) = scene.plan.filter(|_| priority) else {
-            self.filter = Filter { column_clear: true, ..Filter::default() };
+            self.filter = SafetyFilter { column_clear: true, ..SafetyFilter::default() };
             return;
         };
         let position = &scene.telemetry.position;
-        let ground_m = || self.lands_at_m(state, scene, plan);
+        let ground_m = || self.landing_height_m(state, scene, plan);
         let top_m = || plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let way = match state {
-            State::Scheduled => Way::Vertical { to_m: top_m(), speed_mps: 0.0 },
-            State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m(), speed_mps: 0.0 },
-            State::Climb => Way::Vertical { to_m: top_m(), speed_mps: self.smoother.velocity().z.max(0.0) },
+            State::Scheduled => FlightDirection::Vertical { to_m: top_m(), speed_mps: 0.0 },
+            State::Land | State::LandingHeld => {
+                FlightDirection::Vertical { to_m: ground_m(), speed_mps: 0.0 }
+            }
+            State::Climb => {
+                FlightDirection::Vertical { to_m: top_m(), speed_mps: self.smoother.velocity().z.max(0.0) }
+            }
             State::Follow
             | State::Paused
             | State::Alone
@@ -46,40 +50,42 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                // The filter goes on checking the neighbour that stopped the vehicle's descent
+                // The filter continues checking the neighbour that stopped the vehicle's descent
                 // while the vehicle stands.
-                match self.descends() {
-                    true => {
-                        Way::Vertical { to_m: ground_m(), speed_mps: (-self.smoother.velocity().z).max(0.0) }
-                    }
-                    false => Way::Path { back: self.flies_back(&plan.path) },
+                match self.is_descending() {
+                    true => FlightDirection::Vertical {
+                        to_m: ground_m(),
+                        speed_mps: (-self.smoother.velocity().z).max(0.0),
+                    },
+                    false => FlightDirection::Path { back: self.is_flying_back(&plan.path) },
                 }
             }
-            _ => Way::Stands,
+            _ => FlightDirection::Stands,
         };
         if !matches!(state, State::Scheduled | State::Land | State::LandingHeld) {
             (self.filter.column_clear, self.filter.column_since) = (true, None);
-            self.filter.barred_since = None;
-            self.filter.held_since = self.filter.held_since.filter(|_| state == State::Replanning);
+            self.filter.column_blocked_for_good_since = None;
+            self.filter.landing_held_since =
+                self.filter.landing_held_since.filter(|_| state == State::Replanning);
         }
-        if matches!(way, Way::Stands) {
+        if matches!(way, FlightDirection::Stands) {
             self.filter.reset();
             return;
         }
         let whole_column = matches!(state, State::Scheduled | State::Land | State::LandingHeld);
-        let back = matches!(way, Way::Path { back: true });
-        if back != self.filter.back {
+        let back = matches!(way, FlightDirection::Path { back: true });
+        if back != self.filter.scanned_backwards {
             self.filter.reset_stop();
-            self.filter.back = back;
+            self.filter.scanned_backwards = back;
         }
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_CLEAR_M } else { 0.0 };
         let bounds = bounds(&self.track);
         let set = match way {
-            Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
-            Way::Vertical { to_m, speed_mps } => {
+            FlightDirection::Vertical { to_m, .. } if whole_column => ReachableSet::vertical(*position, to_m),
+            FlightDirection::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
-                let stop_m = if stopped { 0.0 } else { self.smoother.braking_m(true) };
+                let stop_m = if stopped { 0.0 } else { self.smoother.stopping_distance_m(true) };
                 let braking_m = bounds.braking.stop_m(speed_mps).max(stop_m);
                 let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
                 let down = to_m < position.z;
@@ -89,10 +95,12 @@ impl Guidance {
                 } else {
                     (reference_m + fly_m).min(to_m).max(reference_m)
                 };
-                Set::vertical(Point::new(position.x, position.y, reference_m), end_m)
+                ReachableSet::vertical(Point::new(position.x, position.y, reference_m), end_m)
             }
-            Way::Path { back } => self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back),
-            Way::Stands => return,
+            FlightDirection::Path { back } => {
+                self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back)
+            }
+            FlightDirection::Stands => return,
         };
         let own = OwnSet::new(&set);
         let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
@@ -102,7 +110,7 @@ impl Guidance {
             self.filter.blocker = found.map_or(0, |found| found.id);
             return;
         }
-        self.filter.meets = found.is_some();
+        self.filter.sets_intersect = found.is_some();
         match found {
             Some(found) => {
                 if !stopped {
@@ -112,14 +120,14 @@ impl Guidance {
                 self.filter.clear_since = None;
                 // A stranger hinders it for good only where the hull would touch it.
                 if !found.stranger || self.filter.passes_stranger(now) {
-                    self.filter.hinder(found.yields, now);
+                    self.filter.note_hindered(found.yields, now);
                 }
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
-                (self.filter.stranger, self.filter.rests) = (found.stranger, found.rests);
+                (self.filter.blocker_is_stranger, self.filter.blocker_rests) = (found.stranger, found.rests);
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
-                // Past a stranger it goes on in the same stop, slowly.
+                // Past a stranger it continues in the same stop, slowly.
                 let clear_for =
                     if self.filter.passes_stranger(now) { MAX_STOP_FOR_STRANGER } else { RESUME_CLEAR_FOR };
                 if now - since >= clear_for {
@@ -131,10 +139,10 @@ impl Guidance {
     }
 
     /// How low the ground below it may be, metres: not above the vehicle.
-    pub(super) fn lands_at_m<const W: usize, const G: usize>(
+    pub(super) fn landing_height_m<const W: usize, const G: usize>(
         &self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         plan: &VehiclePlan<W, G>,
     ) -> f32 {
         let z_m = scene.telemetry.position.z;
@@ -146,16 +154,16 @@ impl Guidance {
         }
         // Between pad and goal the ground may be lower than below either.
         let lands = matches!(state, State::Land | State::LandingHeld);
-        let between = lands && self.on_path && !self.reached_end(&plan.path);
+        let between = lands && self.on_path && !self.has_reached_end(&plan.path);
         if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }
     }
 
     /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
     /// reference that turns back leaves the setpoint on its way.
-    fn flies_back<const W: usize>(&self, path: &Path<W>) -> bool {
+    fn is_flying_back<const W: usize>(&self, path: &Path<W>) -> bool {
         let along_m = self.tracker.along_m;
         let velocity = self.smoother.velocity();
-        let beside = |by_m: f32| path.point_at(within(self.setpoint_m + by_m, 0.0, path.length_m()));
+        let beside = |by_m: f32| path.point_at(clamp_to(self.setpoint_m + by_m, 0.0, path.length_m()));
         let onward = match (beside(-MAX_TURNING_SETPOINT_M), beside(MAX_TURNING_SETPOINT_M)) {
             (Some(from), Some(to)) => velocity.dot(&(to - from)),
             _ => 0.0,
@@ -171,7 +179,7 @@ impl Guidance {
     fn count_standstill<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
-        scene: &Scene<'_, W, G>,
+        scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
         now: Instant,
     ) {
@@ -184,11 +192,11 @@ impl Guidance {
         };
         if matches!(state, State::Follow | State::Blocked | State::Replanning)
             && id != 0
-            && self.advice.stop_within_m.min(self.waits_m) < STANDSTILL_WITHIN_M
+            && self.advice.stop_within_m.min(self.wait_distance_m) < STANDSTILL_WITHIN_M
             && !scene.plan.is_some_and(gate)
         {
-            self.filter.hinder(id < scene.id, now);
-            (self.filter.yields, self.filter.rests) = (id < scene.id, neighbours.rests(id, now));
+            self.filter.note_hindered(id < scene.id, now);
+            (self.filter.yields, self.filter.blocker_rests) = (id < scene.id, neighbours.is_at_rest(id, now));
         }
     }
 }

@@ -9,13 +9,13 @@ use proptest::prelude::*;
 
 use super::*;
 
-const LIMITS: Limits = Limits {
+const LIMITS: MotionLimits = MotionLimits {
     speed_mps: 2.0,
     climb_mps: 1.0,
     descend_mps: 1.0,
     accel_mps2: 1.5,
     accel_z_mps2: 1.5,
-    most_mps2: [2.25, 2.0],
+    max_accel_mps2: [2.25, 2.0],
     jerk_mps3: 4.0,
 };
 
@@ -39,32 +39,32 @@ proptest! {
         let first = path.point_at(0.0).unwrap();
         let fence = fenced.then(|| (first - Point::new(5.0, 5.0, 1.0), first + Point::new(5.0, 5.0, 1.0)));
         let cfg = TrackConfig::default();
-        let (mut tracker, mut smoother) = (Tracker::default(), Smoother::new(LIMITS, fence));
+        let (mut tracker, mut smoother) = (Tracker::default(), SetpointSmoother::new(LIMITS, fence));
         smoother.begin_at(first, 0.0);
         for (step, (kind, share, steps)) in
             paces.iter().flat_map(|p| (0..p.2).map(move |_| (p.0, p.1, p.2))).enumerate()
         {
             let pace = match kind {
-                0 => Pace { share: 0.0, urgent: false },
-                1 => Pace { share: 0.0, urgent: true },
-                2 => Pace { share, urgent: false },
-                _ => Pace { share: 1.0, urgent: false },
+                0 => ClockPace { speed_share: 0.0, urgent: false },
+                1 => ClockPace { speed_share: 0.0, urgent: true },
+                2 => ClockPace { speed_share: share, urgent: false },
+                _ => ClockPace { speed_share: 1.0, urgent: false },
             };
             // Most steps are on time.
             let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
             let (at, velocity, acceleration) = (smoother.position(), smoother.velocity(), smoother.acceleration());
-            for _ in 0..smoother.begin(pace, dt_s) {
+            for _ in 0..smoother.begin_step(pace, dt_s) {
                 let mut advice = Advice { stop_within_m: if steps % 3 == 0 { 0.0 } else { f32::INFINITY }, ..Advice::FREE };
                 // Guidance stops before the fence.
                 let v = tracker.speed_mps;
                 let braking_m = v * v / 3.0 + 2.0 * v * TICK_S + 0.05;
-                if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !smoother.allows(&ahead)) {
+                if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !smoother.is_place_allowed(&ahead)) {
                     advice.stop_within_m = advice.stop_within_m.min(braking_m);
                 }
                 let reference = track::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
-                smoother.push(reference.position);
+                smoother.push_raw_point(reference.position);
             }
-            smoother.finish();
+            smoother.make_setpoint();
             let dt_s = dt_s.min(0.2);
             let place = smoother.position();
             let moved = (smoother.position() - at).norm();
@@ -74,7 +74,7 @@ proptest! {
             let off = ((smoother.position() - at) / dt_s - mean).norm();
             prop_assert!(off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S, "velocity off by {off} m/s in {dt_s} s");
             let a = smoother.acceleration();
-            let [across, up] = LIMITS.most_mps2;
+            let [across, up] = LIMITS.max_accel_mps2;
             prop_assert!(a.xy().norm() <= across + 1e-4 && a.z.abs() <= up + 1e-4, "{a:?}");
             let jerk = (a - acceleration).norm() / dt_s;
             let most = LIMITS.jerk(smoother.stopping);
@@ -107,17 +107,17 @@ proptest! {
         late in proptest::collection::vec(0.03f32..0.25, 1..16),
         slow_climber in any::<bool>(),
     ) {
-        let limits = if slow_climber { Limits { accel_z_mps2: 1.0, most_mps2: [2.25, 1.0], ..LIMITS } } else { LIMITS };
+        let limits = if slow_climber { MotionLimits { accel_z_mps2: 1.0, max_accel_mps2: [2.25, 1.0], ..LIMITS } } else { LIMITS };
         let (low, size) = (Point::new(-7.0, 12.0, 0.0), Point::new(size.0, size.1, size.2));
         let high = low + size;
-        let mut smoother = Smoother::new(limits, Some((low, high)));
+        let mut smoother = SetpointSmoother::new(limits, Some((low, high)));
         let came_at = Point::new(came_at.0, came_at.1, came_at.2);
         let place = low + size.component_mul(&Point::new(share.0, share.1, share.2));
         for step in 0..8 {
-            smoother.go_with(place + came_at * (TICK_S * step as f32), TICK_S);
+            smoother.follow_vehicle(place + came_at * (TICK_S * step as f32), TICK_S);
             smoother.mark_sent();
         }
-        smoother.move_on(&came_at);
+        smoother.hold_with_velocity(&came_at);
         let mut step = 0;
         for (x, y, z, speed_mps, steps) in targets {
             let target = low + size.component_mul(&Point::new(x, y, z));
@@ -125,21 +125,21 @@ proptest! {
                 step += 1;
                 let (kind, share) = paces[step % paces.len()];
                 let pace = match kind {
-                    0 => Pace { share: 0.0, urgent: step % 3 == 0 },
-                    1 => Pace { share, urgent: false },
-                    _ => Pace { share: 1.0, urgent: false },
+                    0 => ClockPace { speed_share: 0.0, urgent: step % 3 == 0 },
+                    1 => ClockPace { speed_share: share, urgent: false },
+                    _ => ClockPace { speed_share: 1.0, urgent: false },
                 };
                 let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
                 let before = smoother.acceleration();
-                for _ in 0..smoother.begin(pace, dt_s) {
-                    let raw = smoother.raw();
-                    smoother.push(raw + shortened(target - raw, speed_mps * TICK_S));
+                for _ in 0..smoother.begin_step(pace, dt_s) {
+                    let raw = smoother.raw_point();
+                    smoother.push_raw_point(raw + clamp_length(target - raw, speed_mps * TICK_S));
                 }
-                smoother.finish();
+                smoother.make_setpoint();
                 let place = smoother.position();
                 prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]), "{place:?}");
                 let a = smoother.acceleration();
-                let [across, up] = limits.most_mps2;
+                let [across, up] = limits.max_accel_mps2;
                 // Two axes that begin to brake at once pass the disc's edge by a hair.
                 prop_assert!(a.xy().norm() <= across * 1.02 && a.z.abs() <= up + 1e-3, "{a:?}");
                 let jerk = (a - before).norm() / dt_s.min(0.2);

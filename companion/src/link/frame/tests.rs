@@ -299,7 +299,7 @@ proptest! {
         let mut framer = Framer::new();
         let mut now = Instant::ZERO;
         for (i, byte) in stream.iter().enumerate() {
-            // The garbage slowly, the frame at once, and then a stream that goes on.
+            // The garbage slowly, the frame at once, and then a stream that continues.
             now = now + Duration::from_micros(if i < garbage.len() { gap_us } else { 0 });
             let got = drain(&mut framer, now, &[*byte]);
             prop_assert!(got.is_empty() || i + 1 == stream.len());
@@ -307,7 +307,7 @@ proptest! {
                 return Ok(());
             }
         }
-        let due = now + Duration::from_micros(PARTIAL_LIFETIME.micros() + ARRIVAL_STEP_US);
+        let due = now + Duration::from_micros(PARTIAL_LIFETIME.as_micros() + ARRIVAL_STEP_US);
         let mut given = false;
         while !given && now <= due {
             now = now + Duration::from_millis(7);

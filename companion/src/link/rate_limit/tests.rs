@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::*;
 
 use super::*;
 use crate::link::frame::{self, Header};
-use crate::storage::store::{Erasing, MAX_READ};
+use crate::storage::store::{ErasePermission, MAX_READ};
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, obey, started};
 use crate::{Duration, Link, State};
@@ -28,7 +28,7 @@ struct Greedy {
 impl Greedy {
     fn new(mut bench: Bench) -> Self {
         let mut flash = Flash::new(3);
-        bench.companion.mount(started(&mut flash));
+        bench.companion.attach_store(started(&mut flash));
         Self { bench, flash, sequence: 0, packet: 0, sent: Vec::new(), told: 0 }
     }
 
@@ -73,7 +73,8 @@ impl Greedy {
         let now = self.bench.now;
         let mut read = [0; MAX_READ];
         while let Some(request) = self.bench.companion.poll_flash() {
-            let outcome = obey(&mut self.flash, request, Erasing::Allowed, &mut read).expect("no power cut");
+            let outcome =
+                obey(&mut self.flash, request, ErasePermission::Allowed, &mut read).expect("no power cut");
             self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
         }
         self.bench.drain();
@@ -119,11 +120,11 @@ fn the_radio_gets_no_more_whatever_is_asked() {
     ground.bench.until(State::Ready, 6.0);
     ground.run(20);
     assert!(
-        ground.most_in_a_second() <= state_bps(HZ) + DISARMED_BYTES_PER_S + saved,
+        ground.most_in_a_second() <= state_bytes_per_s(HZ) + DISARMED_BYTES_PER_S + saved,
         "{}",
         ground.most_in_a_second()
     );
-    assert!(ground.bytes() <= 20 * (state_bps(HZ) + DISARMED_BYTES_PER_S) + saved);
+    assert!(ground.bytes() <= 20 * (state_bytes_per_s(HZ) + DISARMED_BYTES_PER_S) + saved);
     assert!(ground.bytes() > 20 * DISARMED_BYTES_PER_S / 2, "it was asked for more: {}", ground.bytes());
 
     let mut air = Greedy::new(Bench::following(config()));
@@ -131,11 +132,11 @@ fn the_radio_gets_no_more_whatever_is_asked() {
     air.run(20);
     assert_eq!(air.bench.state(), State::Follow);
     assert!(
-        air.most_in_a_second() <= state_bps(HZ) + ARMED_BYTES_PER_S + saved,
+        air.most_in_a_second() <= state_bytes_per_s(HZ) + ARMED_BYTES_PER_S + saved,
         "{}",
         air.most_in_a_second()
     );
-    assert!(air.bytes() <= 20 * (state_bps(HZ) + ARMED_BYTES_PER_S) + saved, "{}", air.bytes());
+    assert!(air.bytes() <= 20 * (state_bytes_per_s(HZ) + ARMED_BYTES_PER_S) + saved, "{}", air.bytes());
     assert!(air.told >= 20 * usize::from(HZ) - 1, "the state goes out all the same: {}", air.told);
 }
 
@@ -150,7 +151,7 @@ fn state_is_as_long_as_said() {
     bench.drain();
     // Ten seconds; this plan has fewer points than an intent holds.
     assert!(
-        bench.bytes() <= 10 * state_bps(HZ) && bench.bytes() > 10 * state_bps(HZ) / 3,
+        bench.bytes() <= 10 * state_bytes_per_s(HZ) && bench.bytes() > 10 * state_bytes_per_s(HZ) / 3,
         "{}",
         bench.bytes()
     );
@@ -162,12 +163,12 @@ fn what_is_owed_is_paid_back_by_time() {
     let mut rate_limit = RateLimit::default();
     let at = |ms| Instant::ZERO + Duration::from_millis(ms);
     let mut sent = 0;
-    while rate_limit.allows(at(0), true) {
-        rate_limit.spend(MAX_FRAME_LEN);
+    while rate_limit.may_send(at(0), true) {
+        rate_limit.count_bytes(MAX_FRAME_LEN);
         sent += MAX_FRAME_LEN as u32;
     }
     assert!((MAX_SAVED_BYTES..=MAX_SAVED_BYTES + MAX_FRAME_LEN as u32).contains(&sent));
-    assert!(!rate_limit.allows(at(10), true));
-    assert!(rate_limit.allows(at(1100), true));
-    assert!(rate_limit.allows(at(u64::from(u32::MAX)), true), "and never overflows");
+    assert!(!rate_limit.may_send(at(10), true));
+    assert!(rate_limit.may_send(at(1100), true));
+    assert!(rate_limit.may_send(at(u64::from(u32::MAX)), true), "and never overflows");
 }

@@ -2,7 +2,7 @@
 
 /// Which path a vehicle is on, as its task sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum PathRelation {
     /// The plan's own.
     OnPath,
     /// A detour around a keep-out zone on the path, near the path and back to it.
@@ -13,9 +13,9 @@ pub(crate) enum Place {
 
 /// Progress of a vehicle along its path, as its task sees it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Along {
+pub(crate) struct PathProgress {
     /// Way made along the path, metres.
     pub(crate) progress_m: f32,
     /// Which path that is.
-    pub(crate) place: Place,
+    pub(crate) place: PathRelation,
 }

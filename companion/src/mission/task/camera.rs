@@ -3,13 +3,13 @@
 //! By distance, `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the trigger on at a stretch's first place, with a picture at once,
 //! and off at its last, with another. By waypoint, `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands go one after the
 //! other and are repeated until they are acknowledged. A vehicle that leaves its path switches the trigger off; where it comes
-//! back it goes on with a picture at once, so that no gap is wider than the spacing.
+//! back it continues with a picture at once, so that no gap is wider than the spacing.
 
 use heapless::Deque;
 use libm::atan2f;
-use planner_core::flight::{Look, Path, Photographs, Shots, Trigger};
+use planner_core::flight::{HeadingMode, Path, PicturePlan, PictureStretch, Trigger};
 
-use super::along::{Along, Place};
+use super::along::{PathProgress, PathRelation};
 use crate::autopilot::telemetry::Ack;
 use crate::events::Link;
 use crate::link::Links;
@@ -32,7 +32,7 @@ const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 
 /// A camera command to the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Order {
+enum CameraCommand {
     /// A picture now, and one after each distance in metres; 0 ends that.
     Every(f32),
     /// No more pictures.
@@ -41,15 +41,15 @@ enum Order {
     Picture,
 }
 
-impl Order {
-    fn command(self) -> u16 {
+impl CameraCommand {
+    fn mav_command(self) -> u16 {
         match self {
             Self::Every(_) | Self::Off => DO_SET_CAM_TRIGG_DIST,
             Self::Picture => DO_DIGICAM_CONTROL,
         }
     }
 
-    fn message(self) -> Outgoing {
+    fn to_message(self) -> Outgoing {
         match self {
             Self::Every(step_m) => Outgoing::TriggerEvery { step_m, at_once: true },
             Self::Off => Outgoing::TriggerEvery { step_m: 0.0, at_once: false },
@@ -60,7 +60,7 @@ impl Order {
 
 /// Progress of the pictures.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Camera {
+pub(super) struct CameraControl {
     /// The stretch at hand, and the next picture on it.
     stretch: usize,
     picture: u32,
@@ -69,8 +69,8 @@ pub(super) struct Camera {
     /// Whether it is beside its path.
     beside: bool,
     /// Whether the autopilot was commanded to trigger by distance.
-    on: bool,
-    orders: Deque<Order, MAX_COMMANDS>,
+    trigger_on: bool,
+    commands: Deque<CameraCommand, MAX_COMMANDS>,
     /// Number of times that the first command was sent, and the time of the last.
     tries: u8,
     sent_at: Option<Instant>,
@@ -78,54 +78,54 @@ pub(super) struct Camera {
     failed: bool,
 }
 
-impl Camera {
-    /// Commands what is due.
+impl CameraControl {
+    /// Queues and sends the camera commands that are due.
     pub(super) fn step<const W: usize>(
         &mut self,
-        photographs: &Photographs,
+        photographs: &PicturePlan,
         path: &Path<W>,
-        along: Along,
+        along: PathProgress,
         now: Instant,
         links: &mut Links,
     ) {
         if photographs.trigger != Trigger::None {
-            let beside = along.place == Place::Beside;
+            let beside = along.place == PathRelation::Beside;
             if core::mem::replace(&mut self.beside, beside) != beside {
                 // Pictures begin again where it leaves its path, and where it comes back: neither place may lie between two.
                 self.beside_m = 0.0;
                 self.switch_off();
             }
             match photographs.stretches(path).nth(self.stretch) {
-                _ if beside => self.go_around(photographs, along.progress_m),
-                Some(shots) if along.place == Place::OnPath => {
-                    self.photograph(photographs.trigger, &shots, along.progress_m);
+                _ if beside => self.photograph_on_detour(photographs, along.progress_m),
+                Some(shots) if along.place == PathRelation::OnPath => {
+                    self.update_trigger(photographs.trigger, &shots, along.progress_m);
                 }
                 _ => self.switch_off(),
             }
         }
-        self.send(now, links);
+        self.send_current_command(now, links);
     }
 
     fn switch_off(&mut self) {
-        if core::mem::take(&mut self.on) {
-            self.order(Order::Off);
+        if core::mem::take(&mut self.trigger_on) {
+            self.queue_command(CameraCommand::Off);
         }
     }
 
     /// Beside its path it takes pictures as far apart as on it, whether it would there or not.
-    fn go_around(&mut self, photographs: &Photographs, progress_m: f32) {
+    fn photograph_on_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
         let spacing_m = photographs.spacing_m;
         if photographs.trigger == Trigger::Distance {
-            if !core::mem::replace(&mut self.on, true) {
-                self.order(Order::Every(spacing_m));
+            if !core::mem::replace(&mut self.trigger_on, true) {
+                self.queue_command(CameraCommand::Every(spacing_m));
             }
         } else if progress_m >= self.beside_m {
             self.beside_m = progress_m + spacing_m;
-            self.order(Order::Picture);
+            self.queue_command(CameraCommand::Picture);
         }
     }
 
-    fn photograph(&mut self, trigger: Trigger, shots: &Shots<'_>, progress_m: f32) {
+    fn update_trigger(&mut self, trigger: Trigger, shots: &PictureStretch<'_>, progress_m: f32) {
         if progress_m < shots.from_m {
             self.switch_off();
             return;
@@ -133,69 +133,70 @@ impl Camera {
         let distance = trigger == Trigger::Distance;
         match trigger {
             Trigger::Distance if progress_m < shots.to_m => {
-                if !core::mem::replace(&mut self.on, true) {
-                    self.order(Order::Every(shots.step_m));
+                if !core::mem::replace(&mut self.trigger_on, true) {
+                    self.queue_command(CameraCommand::Every(shots.step_m));
                 }
                 return;
             }
-            Trigger::Distance => self.order(Order::Every(0.0)),
+            Trigger::Distance => self.queue_command(CameraCommand::Every(0.0)),
             _ => {
                 // Of several pictures that were passed at once one is enough: all would show the
                 // same.
                 let before = self.picture;
-                while self.picture < shots.count && shots.place_m(self.picture) <= progress_m {
+                while self.picture < shots.count && shots.picture_at_m(self.picture) <= progress_m {
                     self.picture += 1;
                 }
                 if self.picture > before {
-                    self.order(Order::Picture);
+                    self.queue_command(CameraCommand::Picture);
                 }
             }
         }
         if distance || self.picture == shots.count {
-            (self.stretch, self.picture, self.on) = (self.stretch + 1, 0, false);
+            (self.stretch, self.picture, self.trigger_on) = (self.stretch + 1, 0, false);
         }
     }
 
-    fn order(&mut self, order: Order) {
+    fn queue_command(&mut self, order: CameraCommand) {
         // Full where the autopilot is silent: the one that waits longest is worth least.
-        if self.orders.is_full() {
-            self.orders.pop_front();
+        if self.commands.is_full() {
+            self.commands.pop_front();
             (self.tries, self.sent_at, self.failed) = (0, None, true);
         }
-        let _ = self.orders.push_back(order);
+        let _ = self.commands.push_back(order);
     }
 
-    /// Sends the first that waits, again where it was not acknowledged.
-    fn send(&mut self, now: Instant, links: &mut Links) {
-        let Some(&order) = self.orders.front() else { return };
+    /// Sends the first queued command, and repeats it until it is acknowledged.
+    fn send_current_command(&mut self, now: Instant, links: &mut Links) {
+        let Some(&order) = self.commands.front() else { return };
         if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
             return;
         }
         if self.tries == MAX_TRIES {
-            self.next();
+            self.drop_current_command();
             if !core::mem::replace(&mut self.failed, true) {
-                links.say(true, "Camera trigger is not acknowledged");
+                links.send_text(true, "Camera trigger is not acknowledged");
             }
             return;
         }
-        links.push(Link::Autopilot, order.message());
+        links.push(Link::Autopilot, order.to_message());
         self.tries += 1;
         self.sent_at = Some(now);
     }
 
-    fn next(&mut self) {
-        self.orders.pop_front();
+    fn drop_current_command(&mut self) {
+        self.commands.pop_front();
         (self.tries, self.sent_at) = (0, None);
     }
 
     pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
-        let waits = self.sent_at.is_some() && self.orders.front().is_some_and(|o| o.command() == ack.command);
+        let waits =
+            self.sent_at.is_some() && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
         if !waits {
             return;
         }
-        self.next();
+        self.drop_current_command();
         if ack.result != ACCEPTED && !core::mem::replace(&mut self.failed, true) {
-            links.say_count(
+            links.send_text_with_numbers(
                 true,
                 "Autopilot refuses the camera: # (result #)",
                 [u32::from(ack.command), u32::from(ack.result)],
@@ -204,14 +205,14 @@ impl Camera {
     }
 }
 
-/// Heading of the vehicle `along_m` metres along its path: along the stretch at hand, and before a
+/// Heading of the vehicle `along_m` metres along its path: along the current stretch, and before a
 /// stretch along that stretch, so that the vehicle has turned before the first picture.
 pub(super) fn heading<const W: usize>(
-    photographs: &Photographs,
+    photographs: &PicturePlan,
     path: &Path<W>,
     along_m: f32,
 ) -> Option<f32> {
-    if let Look::Fixed(heading) = photographs.look {
+    if let HeadingMode::Fixed(heading) = photographs.heading_mode {
         return Some(heading);
     }
     let mut found = None;

@@ -34,7 +34,7 @@ pub mod op {
     pub const BURST_READ: u8 = 15;
 }
 
-/// Why not, as NAK says it.
+/// Error code of a NAK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NakError {
     /// With an `errno`.
@@ -122,8 +122,8 @@ impl Request {
         }
     }
 
-    pub fn is(&self, other: &Self) -> bool {
-        print(self) == print(other)
+    pub fn is_same_request(&self, other: &Self) -> bool {
+        request_fingerprint(self) == request_fingerprint(other)
     }
 
     /// The data that counts, or all of it where the size is too large.
@@ -140,7 +140,7 @@ impl Request {
         &path[start..]
     }
 
-    pub fn file(&self) -> Option<File> {
+    pub fn requested_file(&self) -> Option<File> {
         File::ALL.into_iter().find(|file| file.name().as_bytes() == self.path())
     }
 }
@@ -152,22 +152,22 @@ pub fn is_open(request: &Request) -> bool {
 
 /// The fields by which a repeated request is recognised. Two programs of one client's id may begin
 /// at the same sequence number: session and data may tell them apart.
-pub type Print = ((u8, u8), u16, (u8, u8), u32, u32);
+pub type RequestFingerprint = ((u8, u8), u16, (u8, u8), u32, u32);
 
-pub fn print(request: &Request) -> Print {
+pub fn request_fingerprint(request: &Request) -> RequestFingerprint {
     let Request { client, sequence, session, opcode, offset, .. } = *request;
     (client, sequence, (session, opcode), offset, crc32(request.bytes()))
 }
 
 /// Bytes asked for with each packet of a read.
-pub fn chunk(request: &Request) -> usize {
+pub fn chunk_len(request: &Request) -> usize {
     match usize::from(request.size) {
         0 => MAX_DATA,
         size => size.min(MAX_DATA),
     }
 }
 
-pub fn decimal(mut number: u32, digits: &mut [u8; 10]) -> &[u8] {
+pub fn format_decimal(mut number: u32, digits: &mut [u8; 10]) -> &[u8] {
     let mut at = digits.len();
     loop {
         at -= 1;

@@ -1,49 +1,49 @@
 //! A burst: one request that is answered by packets, each as if it had been asked for by itself.
 
-use super::packet::{Request, chunk};
+use super::packet::{Request, chunk_len};
 
 /// Packets of one burst; after it the client requests the next burst.
 pub const PACKETS_PER_BURST: u8 = 16;
 
 /// A burst that has begun.
 #[derive(Clone, Copy, Debug)]
-pub struct Stream {
+pub struct FtpBurst {
     request: Request,
     offset: u32,
     sequence: u16,
-    left: u8,
+    packets_left: u8,
 }
 
-impl Stream {
-    /// A burst of which nothing was sent yet.
+impl FtpBurst {
+    /// A burst before its first packet.
     pub fn new(request: &Request) -> Self {
         Self {
             request: *request,
             offset: request.offset,
             sequence: request.sequence,
-            left: PACKETS_PER_BURST,
+            packets_left: PACKETS_PER_BURST,
         }
     }
 
     /// The request that started the burst.
-    pub fn request(&self) -> Request {
+    pub fn first_request(&self) -> Request {
         self.request
     }
 
     /// The request that its next packet answers.
-    fn due(&self) -> Request {
+    fn next_request(&self) -> Request {
         Request { sequence: self.sequence, offset: self.offset, ..self.request }
     }
 
     /// The burst after a packet of `len` data bytes; `None` where that packet was the last.
     pub fn advanced_by(&self, len: usize) -> Option<Self> {
-        let last = self.left == 1 || len < chunk(&self.request);
+        let last = self.packets_left == 1 || len < chunk_len(&self.request);
         let (offset, sequence) = (self.offset + len as u32, self.sequence.wrapping_add(1));
-        (!last).then_some(Self { offset, sequence, left: self.left - 1, ..*self })
+        (!last).then_some(Self { offset, sequence, packets_left: self.packets_left - 1, ..*self })
     }
 }
 
 /// A request of one packet, or that of the next packet of the burst which it asked for.
-pub fn due(request: &Request, stream: Option<&Stream>) -> Request {
-    stream.filter(|stream| stream.request.is(request)).map_or(*request, Stream::due)
+pub fn next_request(request: &Request, stream: Option<&FtpBurst>) -> Request {
+    stream.filter(|stream| stream.request.is_same_request(request)).map_or(*request, FtpBurst::next_request)
 }

@@ -34,7 +34,7 @@ struct World {
     flash: Flash,
     store: Store,
     ftp: Ftp,
-    erasing: Erasing,
+    erasing: ErasePermission,
     now: Instant,
     rng: Pcg32,
     /// Share of frames lost, and share repeated, in 256ths.
@@ -56,7 +56,7 @@ impl World {
             flash,
             store,
             ftp: Ftp::default(),
-            erasing: Erasing::Allowed,
+            erasing: ErasePermission::Allowed,
             now: Instant::from_millis(1),
             rng: Pcg32::seed_from_u64(seed),
             loss,
@@ -113,14 +113,14 @@ impl World {
             let header = Header { system: self.client.0, component: self.client.1, sequence: 0 };
             let length = frame::encode_raw(header, MESSAGE, 84, &payload, &mut bytes);
             let frame = Framer::new().next(self.now, &mut &bytes[..length]).expect("it is whole");
-            self.ftp.handle(LINK, self.now, &frame);
+            self.ftp.queue_request(LINK, self.now, &frame);
         }
         let mut read = [0; MAX_READ];
         for _ in 0..2000 {
-            self.ftp.advance(&mut self.store, self.now, self.erasing);
-            self.texts.extend(self.ftp.text().map(|(_, text)| text));
-            assert!(self.ftp.poll(0).is_none(), "answered where it was asked");
-            let answer = self.ftp.poll(LINK);
+            self.ftp.continue_work(&mut self.store, self.now, self.erasing);
+            self.texts.extend(self.ftp.take_text().map(|(_, text)| text));
+            assert!(self.ftp.poll_reply(0).is_none(), "answered where it was asked");
+            let answer = self.ftp.poll_reply(LINK);
             if let Some(p) = answer {
                 assert_eq!((p[1], p[2]), self.client);
                 if !self.chance(self.loss) {
@@ -136,15 +136,15 @@ impl World {
                     });
                 }
             }
-            let Some(request) = self.store.poll(self.erasing) else {
+            let Some(request) = self.store.poll_request(self.erasing) else {
                 if answer.is_none() {
                     return;
                 }
                 continue;
             };
             let outcome = obey(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
-            if let Some(answer) = self.store.handle(outcome.map(|len| &read[..len])) {
-                self.ftp.answer(answer);
+            if let Some(answer) = self.store.handle_outcome(outcome.map(|len| &read[..len])) {
+                self.ftp.handle_read_outcome(answer);
             }
         }
     }
@@ -350,7 +350,7 @@ fn a_damaged_upload_keeps_the_old_file_and_says_so() {
 fn nothing_is_erased_while_armed() {
     let mut world = World::new(53, 0, 0);
     let file = roadmap(60);
-    world.erasing = Erasing::Forbidden;
+    world.erasing = ErasePermission::Forbidden;
     // Two areas were erased ahead; a third roadmap would need one.
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
     let mut store = Store::mount(LAYOUT, &mut world.flash);
@@ -364,19 +364,19 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
     world.heard.clear();
     // What was asked before that was known waits, and is refused once it is.
-    world.erasing = Erasing::NotYet;
+    world.erasing = ErasePermission::NotYet;
     let opens = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
     world.send(&opens);
     (0..3).for_each(|_| world.step());
     assert!(world.heard.is_empty());
-    world.erasing = Erasing::Forbidden;
+    world.erasing = ErasePermission::Forbidden;
     for _ in 0..3 {
         let refused = world.ask_again(&opens);
         assert_eq!((refused.opcode, refused.data), (NAK, vec![9]), "each time that it is asked");
         assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
         world.now = world.now + Duration::from_secs(2);
     }
-    world.erasing = Erasing::Allowed;
+    world.erasing = ErasePermission::Allowed;
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
 

@@ -6,12 +6,12 @@
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::pack::{Heights, Unit};
+use planner_core::coverage::pack::{Heights, TrackUnit};
 use planner_core::file::FileError;
 use planner_core::flight::Trigger;
 
 use super::error::MissionError;
-use super::numbers::{MAX_SPEED_MPS, f32_at, positive, put, u16_at, u32_at};
+use super::numbers::{MAX_SPEED_MPS, f32_at, is_positive_up_to, put_numbers, u16_at, u32_at};
 pub use crate::config::Ground;
 
 /// Bytes before the first vehicle's share.
@@ -27,7 +27,7 @@ pub const MAX_ORDER_CHANGES_OF_FILE: u32 = 20_000_000;
 
 /// Heading of vehicles along the lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heading {
+pub enum HeadingRule {
     /// One heading on all lanes.
     Sweep,
     /// The way they fly.
@@ -36,7 +36,7 @@ pub enum Heading {
 
 /// Which vehicles a part of the work may go to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Parts {
+pub enum PartEligibility {
     /// Any: the shares are those that POWELL found, or all alike.
     Anyone,
     /// Vehicles with equal weights: the shares are the weights.
@@ -47,15 +47,15 @@ pub enum Parts {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoverageHeader {
     /// The smallest part of the work.
-    pub unit: Unit,
+    pub unit: TrackUnit,
     /// Which vehicles it may go to.
-    pub parts: Parts,
+    pub parts: PartEligibility,
     /// Heading of the vehicles along their lanes.
-    pub heading: Heading,
+    pub heading: HeadingRule,
     /// Trigger of the pictures.
     pub trigger: Trigger,
-    /// Changes of the lanes' order that are looked at, at most.
-    pub looks: u32,
+    /// Changes of the lanes' order that are checked, at most.
+    pub search_steps: u32,
     /// Height of the pictures and of the layers.
     pub heights: Heights,
     /// Footprint and spacings.
@@ -70,7 +70,7 @@ pub struct CoverageHeader {
 
 /// Capability of one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Share {
+pub struct VehicleShare {
     /// Weight of the vehicle, or the size of the share that comes at its place: at least 0.
     pub weight: f32,
     /// Speed upwards, m/s.
@@ -85,7 +85,7 @@ pub struct CoverageParts<'a> {
     /// Settings that all vehicles share.
     pub header: CoverageHeader,
     /// Share of each vehicle, in the order of the mission's.
-    pub shares: &'a [Share],
+    pub shares: &'a [VehicleShare],
     /// The rings.
     pub rings: &'a [Ring],
     /// Vertices of the rings, metres east and north of the mission origin.
@@ -103,15 +103,15 @@ impl CoverageParts<'_> {
         let h = &self.header;
         out[..2].copy_from_slice(&(self.vertices.len() as u16).to_le_bytes());
         out[2..4].copy_from_slice(&(self.rings.len() as u16).to_le_bytes());
-        out[4] = u8::from(h.unit == Unit::Waypoint);
-        out[5] = u8::from(h.parts == Parts::SameWeight);
-        out[6] = u8::from(h.heading == Heading::Lane);
+        out[4] = u8::from(h.unit == TrackUnit::Waypoint);
+        out[5] = u8::from(h.parts == PartEligibility::SameWeight);
+        out[6] = u8::from(h.heading == HeadingRule::Lane);
         out[7] = match h.trigger {
             Trigger::Distance => 0,
             Trigger::Waypoint => 1,
             Trigger::None => 2,
         };
-        out[8..12].copy_from_slice(&h.looks.to_le_bytes());
+        out[8..12].copy_from_slice(&h.search_steps.to_le_bytes());
         let Spacing { footprint, lane_m, waypoint_m } = h.spacing;
         let angle_deg = h.angle_deg.unwrap_or(f32::NAN);
         let numbers = [
@@ -127,9 +127,9 @@ impl CoverageParts<'_> {
         .into_iter()
         .chain(h.ground.map_or([0.0; 4], |g| [g.height_m, g.tolerance_m, g.low_m, g.high_m]));
         let (head, rest) = out.split_at_mut(HEAD_LEN);
-        put(head, 12, numbers);
+        put_numbers(head, 12, numbers);
         let (shares, rest) = rest.split_at_mut(self.shares.len() * SHARE_LEN);
-        put(shares, 0, self.shares.iter().flat_map(|s| [s.weight, s.climb_mps, s.descend_mps]));
+        put_numbers(shares, 0, self.shares.iter().flat_map(|s| [s.weight, s.climb_mps, s.descend_mps]));
         let (rings, vertices) = rest.split_at_mut(self.rings.len() * RING_LEN);
         for (to, ring) in rings.chunks_exact_mut(RING_LEN).zip(self.rings) {
             to[..2].copy_from_slice(&ring.end.to_le_bytes());
@@ -140,7 +140,7 @@ impl CoverageParts<'_> {
             };
             to[3] = 0;
         }
-        put(vertices, 0, self.vertices.iter().flat_map(|v| [v.x, v.y]));
+        put_numbers(vertices, 0, self.vertices.iter().flat_map(|v| [v.x, v.y]));
     }
 }
 
@@ -164,8 +164,8 @@ pub struct CoverageView<'a> {
 const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
-    /// A vehicle that nobody hears any more is down after so many seconds, from the highest layer.
-    pub fn down_s(&self) -> f32 {
+    /// A vehicle that no other vehicle hears any more is down after so many seconds, from the highest layer.
+    pub fn time_to_ground_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
         let slowest_mps = self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
@@ -184,18 +184,18 @@ impl<'a> CoverageView<'a> {
         let [height_m, tolerance_m, low_m, high_m] = [44, 48, 52, 56].map(|at| f32_at(head, at));
         let header = CoverageHeader {
             unit: match head[4] {
-                0 => Unit::Lane,
-                1 => Unit::Waypoint,
+                0 => TrackUnit::Lane,
+                1 => TrackUnit::Waypoint,
                 _ => return refuse("unit"),
             },
             parts: match head[5] {
-                0 => Parts::Anyone,
-                1 => Parts::SameWeight,
+                0 => PartEligibility::Anyone,
+                1 => PartEligibility::SameWeight,
                 _ => return refuse("parts"),
             },
             heading: match head[6] {
-                0 => Heading::Sweep,
-                1 => Heading::Lane,
+                0 => HeadingRule::Sweep,
+                1 => HeadingRule::Lane,
                 _ => return refuse("heading"),
             },
             trigger: match head[7] {
@@ -204,7 +204,7 @@ impl<'a> CoverageView<'a> {
                 2 => Trigger::None,
                 _ => return refuse("trigger"),
             },
-            looks: u32_at(head, 8),
+            search_steps: u32_at(head, 8),
             heights: Heights { mission_m: f32_at(head, 12), layer_m: f32_at(head, 16) },
             spacing: Spacing {
                 footprint: Footprint { along_m: f32_at(head, 20), across_m: f32_at(head, 24) },
@@ -224,7 +224,7 @@ impl<'a> CoverageView<'a> {
             rings: rings.as_chunks().0,
             vertices: vertices.as_chunks().0,
         };
-        if let Some(i) = view.shares().position(|share| !share.is_sound()) {
+        if let Some(i) = view.shares().position(|share| !share.is_valid()) {
             return Err(MissionError::Vehicle(i as u16));
         }
         if view.rings.iter().any(|ring| ring[2] > 2 || ring[3] != 0) {
@@ -242,8 +242,8 @@ impl<'a> CoverageView<'a> {
     }
 
     /// Share of each vehicle, in the order of the mission's vehicles.
-    pub fn shares(&self) -> impl ExactSizeIterator<Item = Share> + '_ {
-        self.shares.iter().map(|b| Share {
+    pub fn shares(&self) -> impl ExactSizeIterator<Item = VehicleShare> + '_ {
+        self.shares.iter().map(|b| VehicleShare {
             weight: f32_at(b, 0),
             climb_mps: f32_at(b, 4),
             descend_mps: f32_at(b, 8),
@@ -273,12 +273,12 @@ impl<'a> CoverageView<'a> {
     }
 }
 
-impl Share {
-    fn is_sound(&self) -> bool {
+impl VehicleShare {
+    fn is_valid(&self) -> bool {
         self.weight >= 0.0
             && self.weight.is_finite()
-            && positive(self.climb_mps, MAX_SPEED_MPS)
-            && positive(self.descend_mps, MAX_SPEED_MPS)
+            && is_positive_up_to(self.climb_mps, MAX_SPEED_MPS)
+            && is_positive_up_to(self.descend_mps, MAX_SPEED_MPS)
     }
 }
 
@@ -289,10 +289,10 @@ impl CoverageHeader {
             return refuse("spacing");
         }
         let heights = [self.heights.mission_m, self.heights.layer_m];
-        if !heights.iter().all(|h| positive(*h, MAX_VERTEX_M)) {
+        if !heights.iter().all(|h| is_positive_up_to(*h, MAX_VERTEX_M)) {
             return refuse("heights");
         }
-        if self.looks > MAX_ORDER_CHANGES_OF_FILE {
+        if self.search_steps > MAX_ORDER_CHANGES_OF_FILE {
             return refuse("looks");
         }
         if self.angle_deg.is_some_and(|angle| !angle.is_finite()) {
@@ -303,8 +303,8 @@ impl CoverageHeader {
         }
         let sound = |ground: &Ground| {
             let ends = [ground.low_m, ground.high_m];
-            positive(ground.height_m, MAX_VERTEX_M)
-                && positive(ground.tolerance_m, MAX_VERTEX_M)
+            is_positive_up_to(ground.height_m, MAX_VERTEX_M)
+                && is_positive_up_to(ground.tolerance_m, MAX_VERTEX_M)
                 && ends.iter().all(|m| libm::fabsf(*m) <= MAX_VERTEX_M)
                 && ground.low_m <= ground.high_m
                 && ground.high_m + ground.height_m <= self.heights.mission_m

@@ -1,10 +1,10 @@
-//! Why a mission file is refused, for programs and for people.
+//! Reason why a mission file is refused, for programs and for people.
 
 use core::fmt;
 
 use planner_core::file::FileError;
 
-/// Why a mission file was refused, on reading or writing. Printed, it says so in at most 41 characters, so that a STATUSTEXT
+/// Reason why a mission file was refused, on reading or writing. Its text has at most 41 characters, so that a STATUSTEXT
 /// has room for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionError {

@@ -27,14 +27,14 @@ pub(super) fn point_at(b: &[u8], at: usize) -> Point {
 }
 
 /// Writes numbers one after the other.
-pub(super) fn put(b: &mut [u8], at: usize, numbers: impl Iterator<Item = f32>) {
+pub(super) fn put_numbers(b: &mut [u8], at: usize, numbers: impl Iterator<Item = f32>) {
     for (to, number) in b[at..].chunks_exact_mut(4).zip(numbers) {
         to.copy_from_slice(&number.to_le_bytes());
     }
 }
 
 /// Whether it is more than zero and at most `most`; false for NaN.
-pub(super) fn positive(value: f32, most: f32) -> bool {
+pub(super) fn is_positive_up_to(value: f32, most: f32) -> bool {
     value > 0.0 && value <= most
 }
 

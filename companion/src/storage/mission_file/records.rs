@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::plan::VehicleTask;
 use planner_core::roadmap::MAX_COORDINATE_M;
 
-use super::numbers::{MAX_SPEED_MPS, f32_at, in_range, point_at, positive, put, u16_at};
+use super::numbers::{MAX_SPEED_MPS, f32_at, in_range, is_positive_up_to, point_at, put_numbers, u16_at};
 
 /// Bytes of a vehicle.
 pub const VEHICLE_LEN: usize = 32;
@@ -36,15 +36,15 @@ pub struct MissionGoal {
 }
 
 impl MissionVehicle {
-    pub(super) fn is_sound(&self, goals: usize) -> bool {
+    pub(super) fn is_valid(&self, goals: usize) -> bool {
         let task = &self.task;
         task.id != 0
             && task.goal.is_none_or(|goal| usize::from(goal) < goals)
             && in_range(&self.start)
             && (0.0..=MAX_COORDINATE_M).contains(&task.climb_m)
-            && positive(task.required_clearance_m, MAX_COORDINATE_M)
-            && positive(self.radius_m, MAX_COORDINATE_M)
-            && positive(self.speed_max_mps, MAX_SPEED_MPS)
+            && is_positive_up_to(task.required_clearance_m, MAX_COORDINATE_M)
+            && is_positive_up_to(self.radius_m, MAX_COORDINATE_M)
+            && is_positive_up_to(self.speed_max_mps, MAX_SPEED_MPS)
     }
 
     pub(super) fn from_bytes(b: &[u8; VEHICLE_LEN]) -> Self {
@@ -67,13 +67,13 @@ impl MissionVehicle {
         b[0] = self.task.id;
         b[2..4].copy_from_slice(&self.task.goal.unwrap_or(NO_GOAL).to_le_bytes());
         let numbers = [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
-        put(&mut b, 4, self.start.iter().copied().chain(numbers));
+        put_numbers(&mut b, 4, self.start.iter().copied().chain(numbers));
         b
     }
 }
 
 impl MissionGoal {
-    pub(super) fn is_sound(&self) -> bool {
+    pub(super) fn is_valid(&self) -> bool {
         in_range(&self.position) && (0.0..=MAX_COORDINATE_M).contains(&self.descent_m)
     }
 

@@ -45,7 +45,7 @@ fn file() -> List<u8> {
     let vehicles = [vehicle(7, None), vehicle(2, Some(1)), vehicle(250, Some(0))];
     let goals = [goal(0), goal(1)];
     let mut out = vec![0xAA; encoded_len(3, 2)];
-    assert_eq!(write(&header(), &vehicles, &Block::Goals(&goals), &mut out), Ok(out.len()));
+    assert_eq!(write_mission(&header(), &vehicles, &MissionBlock::Goals(&goals), &mut out), Ok(out.len()));
     out
 }
 
@@ -68,7 +68,7 @@ fn comes_back_as_written() {
     assert_eq!(view.vehicles().nth(1), Some(vehicle(2, Some(1))));
     assert_eq!(view.goals().nth(1), Some(goal(1)));
     let (mut tasks, mut descents) = (Vec::<_, 3>::new(), Vec::new());
-    let request = view.request(&mut tasks, &mut descents, 128).unwrap();
+    let request = view.plan_request(&mut tasks, &mut descents, 128).unwrap();
     assert_eq!(
         (request.vehicles.len(), request.descents_m, request.mode),
         (3, &[1.5, 1.5][..], header().mode)
@@ -104,8 +104,8 @@ fn goals_are_flown_to_on_the_roadmap_they_are_made_for() {
         let crc = roadmap.crc() ^ u32::from(!same_crc);
         let file = forged(16, &crc.to_le_bytes());
         let view = MissionView::parse(&file).unwrap();
-        assert_eq!(view.fits(Some(&roadmap)), fits, "{starts} {goals} {same_crc}");
-        assert!(!view.fits(None));
+        assert_eq!(view.can_be_planned_with(Some(&roadmap)), fits, "{starts} {goals} {same_crc}");
+        assert!(!view.can_be_planned_with(None));
     }
 }
 
@@ -113,15 +113,15 @@ fn goals_are_flown_to_on_the_roadmap_they_are_made_for() {
 fn a_companion_is_configured_from_it() {
     let file = file();
     let view = MissionView::parse(&file).unwrap();
-    let config = view.config::<3>(2).unwrap();
+    let config = view.companion_config::<3>(2).unwrap();
     assert_eq!(config.check(), Ok(()));
     let ids: List<u8> = config.roster.iter().map(|e| e.system_id).collect();
     assert_eq!((ids, config.mission_crc), (vec![2, 7, 250], view.crc()));
     assert_eq!((config.cruise_mps, config.geofence), (1.5, header().geofence));
     assert_eq!(config.ground_stations, [255, 0, 245, 9]);
-    assert_eq!(view.config::<3>(9), Err(MissionError::NotInRoster(9)));
-    assert_eq!(view.config::<2>(2), Err(MissionError::RosterFull));
-    assert!(view.request(&mut Vec::<_, 2>::new(), &mut Vec::new(), 128).is_err());
+    assert_eq!(view.companion_config::<3>(9), Err(MissionError::NotInRoster(9)));
+    assert_eq!(view.companion_config::<2>(2), Err(MissionError::RosterFull));
+    assert!(view.plan_request(&mut Vec::<_, 2>::new(), &mut Vec::new(), 128).is_err());
 }
 
 #[test]
@@ -165,11 +165,11 @@ fn what_is_not_sound_is_refused_by_name() {
     let needed = encoded_len(1, 0);
     let one = [vehicle(1, None)];
     assert_eq!(
-        write(&header(), &one, &Block::Goals(&[]), &mut small),
+        write_mission(&header(), &one, &MissionBlock::Goals(&[]), &mut small),
         Err(MissionError::MissionFull { needed })
     );
     assert_eq!(
-        write(&header(), &[vehicle(1, Some(0))], &Block::Goals(&[]), &mut [0; 200]),
+        write_mission(&header(), &[vehicle(1, Some(0))], &MissionBlock::Goals(&[]), &mut [0; 200]),
         Err(MissionError::Vehicle(0))
     );
 }
@@ -179,8 +179,13 @@ fn labelled_no_two_vehicles_have_one_goal() {
     let goals = [goal(0), goal(1)];
     let written = |mode: Mode, goal: Option<u16>| {
         let vehicles = [vehicle(7, goal), vehicle(2, Some(1)), vehicle(250, goal)];
-        write(&MissionHeader { mode, ..header() }, &vehicles, &Block::Goals(&goals), &mut [0; 300])
-            .map(|_| ())
+        write_mission(
+            &MissionHeader { mode, ..header() },
+            &vehicles,
+            &MissionBlock::Goals(&goals),
+            &mut [0; 300],
+        )
+        .map(|_| ())
     };
     assert_eq!(written(Mode::Labelled, Some(0)), Err(MissionError::SameGoal(250)));
     assert_eq!(written(Mode::Labelled, Some(1)), Err(MissionError::SameGoal(2)));
@@ -210,7 +215,7 @@ fn a_text_has_room_for_why_a_mission_is_refused() {
 #[test]
 fn a_file_of_version_1_means_the_usual_ground_station() {
     let old = forged(8, &[1]);
-    let config = MissionView::parse(&old).unwrap().config::<3>(2).unwrap();
+    let config = MissionView::parse(&old).unwrap().companion_config::<3>(2).unwrap();
     assert_eq!(config.ground_stations, [255, 0, 0, 0], "what its reserved bytes hold does not count");
 }
 
@@ -239,7 +244,7 @@ proptest! {
         bytes[end..].copy_from_slice(&crc.to_le_bytes());
         if let Ok(view) = MissionView::parse(&bytes) {
             for vehicle in view.vehicles() {
-                let config = view.config::<8>(vehicle.task.id).unwrap();
+                let config = view.companion_config::<8>(vehicle.task.id).unwrap();
                 prop_assert_eq!(config.check(), Ok(()));
             }
         }

@@ -27,7 +27,7 @@ pub(crate) fn crc32(bytes: &[u8]) -> u32 {
 /// Layout of the storage bank, counted from its first byte: two slots, then two halves of the
 /// journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
+pub struct FlashLayout {
     /// Length of a sector, which is erased at once, bytes.
     pub sector_len: u32,
     /// Length of a roadmap slot, whole sectors.
@@ -38,7 +38,7 @@ pub struct Layout {
     pub stalls: bool,
 }
 
-impl Layout {
+impl FlashLayout {
     /// Bank 2 of the STM32H743: 8 sectors of 128 kB, roadmap slots in 0–2 and 3–5, journal in 6 and 7.
     pub const H743: Self =
         Self { sector_len: 128 << 10, slot_len: 384 << 10, half_len: 128 << 10, stalls: false };
@@ -57,9 +57,9 @@ impl Layout {
     }
 }
 
-/// Flash did not do what it was asked for: an erasure or program failed, or what was to be read is torn.
+/// A flash operation failed: an erase or program error, or a torn word on reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fault;
+pub struct FlashFault;
 
 /// Flash as it is read at the start, when nothing flies and waiting harms nobody.
 pub trait ReadFlash {
@@ -67,7 +67,7 @@ pub trait ReadFlash {
     ///
     /// # Errors
     /// They cannot be read: a word among them is torn.
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault>;
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault>;
 }
 
 /// Request to the shell at an offset of the storage bank.
@@ -96,7 +96,7 @@ pub enum FlashRequest<'a> {
 
 /// Whether areas may be erased now: it may stall the processor for seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Erasing {
+pub enum ErasePermission {
     /// Erasing is allowed: the vehicle does not fly.
     Allowed,
     /// The vehicle is armed, or about to be.
@@ -134,9 +134,9 @@ impl File {
 /// Result of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadOutcome<'a> {
-    /// The bytes asked for by [`Store::read`](super::Store::read).
+    /// The bytes asked for by [`Store::request_read`](super::Store::request_read).
     Bytes(&'a [u8]),
-    /// The running CRC asked for by [`Store::sum`](super::Store::sum).
+    /// The running CRC asked for by [`Store::request_crc`](super::Store::request_crc).
     Sum(u32),
     /// The bytes cannot be read.
     Failed,

@@ -1,35 +1,35 @@
 //! What the store has in hand.
 
-use super::area::{Area, Seal};
-use super::records::Record;
+use super::area::{FlashArea, Seal};
+use super::records::JournalRecord;
 
 /// Work of the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Job {
+pub enum FlashJob {
     /// No work.
     None,
     /// The result of the request under way does not matter any more.
     Ignored,
-    /// Reading for somebody.
+    /// Reads bytes for a caller of the store.
     Read { at: u32, len: usize },
-    /// Summing for somebody.
+    /// Computes the CRC of a file for a caller of the store.
     Sum { at: u32, end: u32, sum: u32 },
     /// Erasing an area, sector by sector.
-    Erase { area: Area, at: u32 },
+    Erase { area: FlashArea, at: u32 },
     /// Saying that it is clean.
-    MarkClean(Area),
+    MarkClean(FlashArea),
     /// Saying that it is written to.
-    MarkUsed(Area),
+    MarkUsed(FlashArea),
     /// The window's first block.
-    Flush(Area),
+    Flush(FlashArea),
     /// The window's last bytes, from there on.
-    FlushRest { slot: Area, done: u32 },
+    FlushRest { slot: FlashArea, done: u32 },
     /// Reading the roadmap back.
-    Check { slot: Area, done: u32, sum: u32, tail: [u8; 4] },
+    Check { slot: FlashArea, done: u32, sum: u32, tail: [u8; 4] },
     /// Sealing an area.
-    Seal(Area, Seal),
+    Seal(FlashArea, Seal),
     /// Reading the seal back.
-    SealCheck(Area, Seal),
+    SealCheck(FlashArea, Seal),
     /// A record of the journal.
-    Record(Record),
+    Record(JournalRecord),
 }

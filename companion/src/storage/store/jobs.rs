@@ -1,87 +1,91 @@
 //! What the store does with its flash, one request at a time: which job is next, what it asks for, what follows.
 
 use super::Store;
-use super::area::{self, Area, Condition, Seal};
+use super::area::{self, AreaCondition, FlashArea, Seal};
 use super::flash::{
-    CRC_START, Erasing, Fault, File, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome, WORD, crc_step,
+    CRC_START, ErasePermission, File, FlashFault, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome, WORD,
+    crc_step,
 };
-use super::job::Job;
+use super::job::FlashJob;
 use super::journal;
-use super::records::{Compaction, Record, Source, Step};
+use super::records::{Compaction, JournalRecord, RecordSource, RecordStep};
 use super::upload_state::{UploadError, UploadState};
 
 impl Store {
-    /// The shell's next request, once; its result goes to [`Self::handle`]. Areas are erased only
+    /// The shell's next request, once; its result goes to [`Self::handle_outcome`]. Areas are erased only
     /// where that is allowed; a flash that stalls the processor only reads where it is forbidden.
-    pub fn poll(&mut self, erasing: Erasing) -> Option<FlashRequest<'_>> {
-        if self.asked {
+    pub fn poll_request(&mut self, erasing: ErasePermission) -> Option<FlashRequest<'_>> {
+        if self.request_pending {
             return None;
         }
-        let reads = matches!(self.job, Job::Read { .. } | Job::Sum { .. });
-        if self.layout.stalls && erasing == Erasing::Forbidden && !reads {
+        let reads = matches!(self.job, FlashJob::Read { .. } | FlashJob::Sum { .. });
+        if self.layout.stalls && erasing == ErasePermission::Forbidden && !reads {
             return None;
         }
-        if self.job == Job::None {
-            self.job = self.choose(erasing)?;
+        if self.job == FlashJob::None {
+            self.job = self.choose_job(erasing)?;
         }
-        // An erasure goes on only while it may.
-        if matches!(self.job, Job::Erase { .. }) && erasing != Erasing::Allowed {
-            self.job = Job::None;
+        // An erasure continues only while it may.
+        if matches!(self.job, FlashJob::Erase { .. }) && erasing != ErasePermission::Allowed {
+            self.job = FlashJob::None;
             return None;
         }
-        self.prepare();
-        self.asked = true;
+        self.fill_buffer();
+        self.request_pending = true;
         let layout = &self.layout;
         Some(match self.job {
-            Job::None | Job::Ignored => {
-                self.asked = false;
+            FlashJob::None | FlashJob::Ignored => {
+                self.request_pending = false;
                 return None;
             }
-            Job::Read { at, len } => FlashRequest::Read { at, len },
-            Job::Sum { at, end, .. } => FlashRequest::Read { at, len: MAX_READ.min((end - at) as usize) },
-            Job::Erase { at, .. } => FlashRequest::Erase { at },
-            Job::MarkClean(_) | Job::MarkUsed(_) | Job::Seal(..) => {
+            FlashJob::Read { at, len } => FlashRequest::Read { at, len },
+            FlashJob::Sum { at, end, .. } => {
+                FlashRequest::Read { at, len: MAX_READ.min((end - at) as usize) }
+            }
+            FlashJob::Erase { at, .. } => FlashRequest::Erase { at },
+            FlashJob::MarkClean(_) | FlashJob::MarkUsed(_) | FlashJob::Seal(..) => {
                 let (at, word) = match self.job {
-                    Job::MarkClean(area) => area::clean(layout, area),
-                    Job::Seal(area, seal) => area::seal(layout, area, &seal),
-                    Job::MarkUsed(area) => area::used(layout, area),
+                    FlashJob::MarkClean(area) => area::clean_mark(layout, area),
+                    FlashJob::Seal(area, seal) => area::seal_mark(layout, area, &seal),
+                    FlashJob::MarkUsed(area) => area::used_mark(layout, area),
                     _ => return None,
                 };
-                self.word = word;
-                FlashRequest::Program { at, bytes: &self.word }
+                self.program_word = word;
+                FlashRequest::Program { at, bytes: &self.program_word }
             }
-            Job::Flush(slot) => {
-                FlashRequest::Program { at: slot.data_at(layout) + self.window.front(), bytes: &self.buffer }
-            }
-            Job::FlushRest { slot, done } => {
-                let at = self.window.front() + done;
-                let left = self.window.file_len() - at;
+            FlashJob::Flush(slot) => FlashRequest::Program {
+                at: slot.data_offset(layout) + self.reassembly.flushed_len(),
+                bytes: &self.buffer,
+            },
+            FlashJob::FlushRest { slot, done } => {
+                let at = self.reassembly.flushed_len() + done;
+                let left = self.reassembly.file_len() - at;
                 let count = left.next_multiple_of(WORD as u32).min(MAX_PROGRAM as u32) as usize;
-                FlashRequest::Program { at: slot.data_at(layout) + at, bytes: &self.buffer[..count] }
+                FlashRequest::Program { at: slot.data_offset(layout) + at, bytes: &self.buffer[..count] }
             }
-            Job::Check { slot, done, .. } => {
-                let left = (self.window.file_len() - done) as usize;
-                FlashRequest::Read { at: slot.data_at(layout) + done, len: left.min(MAX_READ) }
+            FlashJob::Check { slot, done, .. } => {
+                let left = (self.reassembly.file_len() - done) as usize;
+                FlashRequest::Read { at: slot.data_offset(layout) + done, len: left.min(MAX_READ) }
             }
-            Job::SealCheck(area, seal) => {
-                FlashRequest::Read { at: area::seal(layout, area, &seal).0, len: WORD }
+            FlashJob::SealCheck(area, seal) => {
+                FlashRequest::Read { at: area::seal_mark(layout, area, &seal).0, len: WORD }
             }
-            Job::Record(record) => {
+            FlashJob::Record(record) => {
                 let data_at = record.at + WORD as u32 + record.done;
-                let left = (record.whole() - record.done) as usize;
+                let left = (record.total_len() - record.done) as usize;
                 match (record.step, record.source) {
-                    (Step::Head, _) => {
-                        self.word = journal::head(record.kind, record.len, record.crc);
-                        FlashRequest::Program { at: record.at, bytes: &self.word }
+                    (RecordStep::Head, _) => {
+                        self.program_word = journal::record_head(record.kind, record.len, record.crc);
+                        FlashRequest::Program { at: record.at, bytes: &self.program_word }
                     }
-                    (Step::Load, Source::Flash(from)) => {
+                    (RecordStep::Load, RecordSource::Flash(from)) => {
                         FlashRequest::Read { at: from + record.done, len: left.min(MAX_PROGRAM) }
                     }
-                    (Step::Load | Step::Data, _) => {
+                    (RecordStep::Load | RecordStep::Data, _) => {
                         let count = left.next_multiple_of(WORD).min(MAX_PROGRAM);
                         FlashRequest::Program { at: data_at, bytes: &self.buffer[..count] }
                     }
-                    (Step::Verify, _) => {
+                    (RecordStep::Verify, _) => {
                         FlashRequest::Read { at: record.at + record.done, len: left.min(MAX_READ) }
                     }
                 }
@@ -90,13 +94,18 @@ impl Store {
     }
 
     /// Fills the buffer for what is programmed next.
-    fn prepare(&mut self) {
+    fn fill_buffer(&mut self) {
         let rest = match self.job {
-            Job::Flush(_) => self.window.block().map(|block| &block[..]),
-            Job::FlushRest { done, .. } => self.window.rest().and_then(|rest| rest.get(done as usize..)),
-            Job::Record(Record { step: Step::Load, source: Source::Window, done, .. }) => {
-                self.window.rest().and_then(|rest| rest.get(done as usize..))
+            FlashJob::Flush(_) => self.reassembly.next_block().map(|block| &block[..]),
+            FlashJob::FlushRest { done, .. } => {
+                self.reassembly.last_part().and_then(|rest| rest.get(done as usize..))
             }
+            FlashJob::Record(JournalRecord {
+                step: RecordStep::Load,
+                source: RecordSource::Window,
+                done,
+                ..
+            }) => self.reassembly.last_part().and_then(|rest| rest.get(done as usize..)),
             _ => return,
         };
         let rest = rest.unwrap_or_default();
@@ -105,22 +114,22 @@ impl Store {
         self.buffer[..count].copy_from_slice(&rest[..count]);
     }
 
-    fn choose(&mut self, erasing: Erasing) -> Option<Job> {
-        let may_erase = erasing == Erasing::Allowed;
+    fn choose_job(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
+        let may_erase = erasing == ErasePermission::Allowed;
         match self.upload {
             Some((File::Roadmap | File::Field, UploadState::Opening)) => {
-                let slot = self.target()?;
+                let slot = self.writable_slot()?;
                 return match self.slots[slot] {
-                    Condition::Clean => Some(Job::MarkUsed(Area::Slot(slot))),
+                    AreaCondition::Clean => Some(FlashJob::MarkUsed(FlashArea::Slot(slot))),
                     _ if self.erasure_failed => {
-                        self.end(Err(UploadError::Flash));
+                        self.end_upload(Err(UploadError::Flash));
                         None
                     }
                     _ => match erasing {
-                        Erasing::Allowed => Some(self.erase(Area::Slot(slot))),
-                        Erasing::NotYet => None,
-                        Erasing::Forbidden => {
-                            self.end(Err(UploadError::Armed));
+                        ErasePermission::Allowed => Some(self.erase_job(FlashArea::Slot(slot))),
+                        ErasePermission::NotYet => None,
+                        ErasePermission::Forbidden => {
+                            self.end_upload(Err(UploadError::Armed));
                             None
                         }
                     },
@@ -128,15 +137,15 @@ impl Store {
             }
             Some((File::Roadmap | File::Field, state)) => {
                 if let Some(slot) = self.open_slot() {
-                    if self.window.block().is_some() {
-                        return Some(Job::Flush(slot));
+                    if self.reassembly.next_block().is_some() {
+                        return Some(FlashJob::Flush(slot));
                     }
                     if state == UploadState::Closing {
-                        let all = self.window.front() >= self.window.file_len();
+                        let all = self.reassembly.flushed_len() >= self.reassembly.file_len();
                         return Some(if all {
-                            self.begin_check(slot)
+                            self.begin_crc_check(slot)
                         } else {
-                            Job::FlushRest { slot, done: 0 }
+                            FlashJob::FlushRest { slot, done: 0 }
                         });
                     }
                 }
@@ -146,35 +155,37 @@ impl Store {
         if let Some(job) = self.choose_record(erasing) {
             return Some(job);
         }
-        if let Job::Erase { .. } = self.paused {
-            return Some(core::mem::replace(&mut self.paused, Job::None));
+        if let FlashJob::Erase { .. } = self.paused_job {
+            return Some(core::mem::replace(&mut self.paused_job, FlashJob::None));
         }
         let uploads = matches!(self.upload, Some((_, UploadState::Taking | UploadState::Closing)));
-        let area = self.stale().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
-        Some(self.erase(area))
+        let area = self.next_area_to_erase().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
+        Some(self.erase_job(area))
     }
 
-    fn begin_check(&self, slot: Area) -> Job {
-        Job::Check { slot, done: 0, sum: CRC_START, tail: [0; 4] }
+    fn begin_crc_check(&self, slot: FlashArea) -> FlashJob {
+        FlashJob::Check { slot, done: 0, sum: CRC_START, tail: [0; 4] }
     }
 
-    pub(super) fn erase(&mut self, area: Area) -> Job {
-        *self.condition(area) = Condition::Dirty;
-        self.paused = Job::None;
-        Job::Erase { area, at: area.at(&self.layout) }
+    pub(super) fn erase_job(&mut self, area: FlashArea) -> FlashJob {
+        *self.condition_mut(area) = AreaCondition::Dirty;
+        self.paused_job = FlashJob::None;
+        FlashJob::Erase { area, at: area.offset(&self.layout) }
     }
 
-    /// Takes in how the last request went; `Ok` of an erasure or a program holds no bytes.
-    pub fn handle<'a>(&mut self, outcome: Result<&'a [u8], Fault>) -> Option<ReadOutcome<'a>> {
-        if !core::mem::take(&mut self.asked) {
+    /// Handles how the last request went; `Ok` of an erasure or a program holds no bytes.
+    pub fn handle_outcome<'a>(&mut self, outcome: Result<&'a [u8], FlashFault>) -> Option<ReadOutcome<'a>> {
+        if !core::mem::take(&mut self.request_pending) {
             return None;
         }
-        let job = core::mem::replace(&mut self.job, Job::None);
+        let job = core::mem::replace(&mut self.job, FlashJob::None);
         match (job, outcome) {
-            (Job::None | Job::Ignored, _) => {}
-            (Job::Read { .. }, Ok(bytes)) => return Some(ReadOutcome::Bytes(bytes)),
-            (Job::Read { .. } | Job::Sum { .. }, Err(Fault)) => return Some(ReadOutcome::Failed),
-            (Job::Sum { at, end, sum }, Ok(bytes)) => {
+            (FlashJob::None | FlashJob::Ignored, _) => {}
+            (FlashJob::Read { .. }, Ok(bytes)) => return Some(ReadOutcome::Bytes(bytes)),
+            (FlashJob::Read { .. } | FlashJob::Sum { .. }, Err(FlashFault)) => {
+                return Some(ReadOutcome::Failed);
+            }
+            (FlashJob::Sum { at, end, sum }, Ok(bytes)) => {
                 let (at, sum) = (at + bytes.len() as u32, crc_step(sum, bytes));
                 if bytes.is_empty() {
                     return Some(ReadOutcome::Failed);
@@ -182,63 +193,69 @@ impl Store {
                 if at >= end {
                     return Some(ReadOutcome::Sum(sum));
                 }
-                self.job = Job::Sum { at, end, sum };
+                self.job = FlashJob::Sum { at, end, sum };
             }
-            (Job::Erase { .. } | Job::MarkClean(_), Err(Fault)) => self.erasure_failed = true,
-            (Job::Erase { area, at }, Ok(_)) => {
+            (FlashJob::Erase { .. } | FlashJob::MarkClean(_), Err(FlashFault)) => self.erasure_failed = true,
+            (FlashJob::Erase { area, at }, Ok(_)) => {
                 let at = at + self.layout.sector_len;
                 let more = at < area.end(&self.layout);
-                self.job = if more { Job::Erase { area, at } } else { Job::MarkClean(area) };
+                self.job = if more { FlashJob::Erase { area, at } } else { FlashJob::MarkClean(area) };
             }
-            (Job::MarkClean(area), Ok(_)) => *self.condition(area) = Condition::Clean,
-            (Job::MarkUsed(area), Ok(_)) => self.begin(area),
-            (Job::Flush(_), Ok(_)) => self.window.advance(),
-            (Job::FlushRest { slot, done }, Ok(_)) => {
+            (FlashJob::MarkClean(area), Ok(_)) => *self.condition_mut(area) = AreaCondition::Clean,
+            (FlashJob::MarkUsed(area), Ok(_)) => self.open_area(area),
+            (FlashJob::Flush(_), Ok(_)) => self.reassembly.drop_first_block(),
+            (FlashJob::FlushRest { slot, done }, Ok(_)) => {
                 let done = done + MAX_PROGRAM as u32;
-                let more = self.window.front() + done < self.window.file_len();
-                self.job = if more { Job::FlushRest { slot, done } } else { self.begin_check(slot) };
+                let more = self.reassembly.flushed_len() + done < self.reassembly.file_len();
+                self.job = if more { FlashJob::FlushRest { slot, done } } else { self.begin_crc_check(slot) };
             }
-            (Job::Check { slot, done, sum, tail }, Ok(bytes)) => {
+            (FlashJob::Check { slot, done, sum, tail }, Ok(bytes)) => {
                 self.check_upload_crc(slot, done, sum, tail, bytes);
             }
-            (Job::Seal(area, seal), Ok(_)) => self.job = Job::SealCheck(area, seal),
-            (Job::SealCheck(area, seal), Ok(bytes)) => {
-                if bytes == area::seal(&self.layout, area, &seal).1 {
-                    self.sealed(area, seal);
+            (FlashJob::Seal(area, seal), Ok(_)) => self.job = FlashJob::SealCheck(area, seal),
+            (FlashJob::SealCheck(area, seal), Ok(bytes)) => {
+                if bytes == area::seal_mark(&self.layout, area, &seal).1 {
+                    self.handle_sealed(area, seal);
                 } else {
-                    self.fail(area);
+                    self.handle_area_failure(area);
                 }
             }
-            (Job::Record(record), Ok(bytes)) => self.record(record, bytes),
-            (Job::Record(_), Err(Fault)) => self.fail_record(),
-            (Job::MarkUsed(area) | Job::Seal(area, _) | Job::SealCheck(area, _), Err(Fault)) => {
-                self.fail(area);
+            (FlashJob::Record(record), Ok(bytes)) => self.continue_record(record, bytes),
+            (FlashJob::Record(_), Err(FlashFault)) => self.fail_record(),
+            (
+                FlashJob::MarkUsed(area) | FlashJob::Seal(area, _) | FlashJob::SealCheck(area, _),
+                Err(FlashFault),
+            ) => {
+                self.handle_area_failure(area);
             }
-            (Job::Flush(slot) | Job::FlushRest { slot, .. } | Job::Check { slot, .. }, Err(Fault)) => {
-                self.fail(slot);
+            (
+                FlashJob::Flush(slot) | FlashJob::FlushRest { slot, .. } | FlashJob::Check { slot, .. },
+                Err(FlashFault),
+            ) => {
+                self.handle_area_failure(slot);
             }
         }
         None
     }
 
     /// An area is marked as used: what goes into it may come.
-    fn begin(&mut self, area: Area) {
-        *self.condition(area) = Condition::Open;
+    fn open_area(&mut self, area: FlashArea) {
+        *self.condition_mut(area) = AreaCondition::Open;
         match area {
-            Area::Slot(_) => self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking)),
-            Area::Half(half) => {
-                let at = area.data_at(&self.layout);
+            FlashArea::Slot(_) => self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking)),
+            FlashArea::Half(half) => {
+                let at = area.data_offset(&self.layout);
                 self.journal.compacting = Some(Compaction { half, at, step: 0, mission: None });
             }
         }
     }
 
     /// A request to an area failed: the area is to be erased.
-    pub(super) fn fail(&mut self, area: Area) {
-        *self.condition(area) = Condition::Dirty;
+    pub(super) fn handle_area_failure(&mut self, area: FlashArea) {
+        *self.condition_mut(area) = AreaCondition::Dirty;
         match area {
-            Area::Slot(_) => self.end(Err(UploadError::Flash)),
-            Area::Half(_) => {
+            FlashArea::Slot(_) => self.end_upload(Err(UploadError::Flash)),
+            FlashArea::Half(_) => {
                 self.journal.compacting = None;
                 self.journal.failures += 1;
                 (self.unsaved, self.unsaved_photographed) = (true, !self.photographed.is_empty());
@@ -246,11 +263,11 @@ impl Store {
         }
     }
 
-    fn check_upload_crc(&mut self, slot: Area, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
-        let len = self.window.file_len();
+    fn check_upload_crc(&mut self, slot: FlashArea, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
+        let len = self.reassembly.file_len();
         let field = matches!(self.upload, Some((File::Field, _)));
         if (done == 0 && !Self::declares(field, bytes, len)) || bytes.is_empty() {
-            return self.end(Err(UploadError::Damaged));
+            return self.end_upload(Err(UploadError::Damaged));
         }
         // The file's own CRC is its last four bytes, and covers all others.
         let covered = (len - 4).saturating_sub(done) as usize;
@@ -260,23 +277,23 @@ impl Store {
         let at = 4 - (len - (done - end.len() as u32)).min(4) as usize;
         tail[at..at + end.len()].copy_from_slice(end);
         if done < len {
-            self.job = Job::Check { slot, done, sum, tail };
+            self.job = FlashJob::Check { slot, done, sum, tail };
             return;
         }
         let crc = u32::from_le_bytes(tail);
         if !sum != crc {
-            return self.end(Err(UploadError::Damaged));
+            return self.end_upload(Err(UploadError::Damaged));
         }
-        let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
+        let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
         let newest = self.slots.iter().map(number).max().unwrap_or(0).max(self.forgotten);
-        self.job = Job::Seal(slot, Seal { sequence: newest + 1, len, crc, field });
+        self.job = FlashJob::Seal(slot, Seal { sequence: newest + 1, len, crc, field });
     }
 
-    fn sealed(&mut self, area: Area, seal: Seal) {
-        *self.condition(area) = Condition::Sealed(seal);
+    fn handle_sealed(&mut self, area: FlashArea, seal: Seal) {
+        *self.condition_mut(area) = AreaCondition::Sealed(seal);
         match area {
-            Area::Slot(_) => self.end(Ok(())),
-            Area::Half(half) => {
+            FlashArea::Slot(_) => self.end_upload(Ok(())),
+            FlashArea::Half(half) => {
                 if let Some(compaction) = self.journal.compacting.take() {
                     self.journal.active = Some(half);
                     self.journal.end = compaction.at;
@@ -287,13 +304,13 @@ impl Store {
         }
     }
 
-    /// Gives up what was being done for an upload.
+    /// Cancels the job of an upload.
     pub(super) fn drop_job(&mut self) {
         match self.job {
-            Job::MarkUsed(area @ Area::Slot(_)) => *self.condition(area) = Condition::Dirty,
-            Job::Flush(_) => {}
+            FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => *self.condition_mut(area) = AreaCondition::Dirty,
+            FlashJob::Flush(_) => {}
             _ => return,
         }
-        self.job = if self.asked { Job::Ignored } else { Job::None };
+        self.job = if self.request_pending { FlashJob::Ignored } else { FlashJob::None };
     }
 }

@@ -5,9 +5,9 @@
 //! last whole record of a kind counts. A word that is neither blank nor whole ends the journal: the next record goes to the
 //! other half.
 
-use super::area::{Condition, close};
+use super::area::{AreaCondition, append_word_crc};
 use super::flash::{MAX_PROGRAM, WORD};
-use super::records::{Compaction, Kind};
+use super::records::{Compaction, RecordKind};
 use crate::services::parameters::STORED_LEN;
 use core::ops::Range;
 
@@ -17,7 +17,7 @@ pub(super) const MAGIC: [u8; 4] = *b"FLKR";
 #[derive(Clone, Debug)]
 pub struct Journal {
     /// Condition of both halves.
-    pub halves: [Condition; 2],
+    pub halves: [AreaCondition; 2],
     /// The half that counts.
     pub active: Option<usize>,
     /// Offset of the next record in the storage bank; the end of the half when it is full.
@@ -37,7 +37,7 @@ pub struct Journal {
 impl Default for Journal {
     fn default() -> Self {
         Self {
-            halves: [Condition::Dirty; 2],
+            halves: [AreaCondition::Dirty; 2],
             active: None,
             end: 0,
             mission: None,
@@ -55,13 +55,13 @@ pub fn record_len(data: u32) -> u32 {
 }
 
 /// The word before a record's data.
-pub fn head(kind: Kind, len: u32, crc: u32) -> [u8; WORD] {
+pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD] {
     let mut word = [0; WORD];
     word[..4].copy_from_slice(&MAGIC);
     word[4] = kind as u8;
     word[8..12].copy_from_slice(&len.to_le_bytes());
     word[12..16].copy_from_slice(&crc.to_le_bytes());
-    close(&mut word);
+    append_word_crc(&mut word);
     word
 }
 

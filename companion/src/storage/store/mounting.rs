@@ -1,20 +1,20 @@
 //! The journal, read when the store is mounted.
 
 use super::Store;
-use super::area::{self, Area, is_closed, u32_at};
+use super::area::{self, FlashArea, has_valid_word_crc, u32_at};
 use super::flash::{MAX_PROGRAM, ReadFlash, WORD};
 use super::journal::*;
-use super::records::Kind;
+use super::records::RecordKind;
 
 impl Store {
     pub(super) fn mount_journal(&mut self, flash: &mut impl ReadFlash) {
         let layout = self.layout;
-        self.journal.halves = [0, 1].map(|i| area::look(&layout, Area::Half(i), flash));
+        self.journal.halves = [0, 1].map(|i| area::read_condition(&layout, FlashArea::Half(i), flash));
         let number = |i: &usize| self.journal.halves[*i].seal().map(|seal| seal.sequence);
         let Some(active) = (0..2).filter(|i| number(i).is_some()).max_by_key(number) else { return };
         self.journal.active = Some(active);
-        let half = Area::Half(active);
-        let (mut at, end) = (half.data_at(&layout), half.end(&layout));
+        let half = FlashArea::Half(active);
+        let (mut at, end) = (half.data_offset(&layout), half.end(&layout));
         while at + WORD as u32 <= end {
             let mut word = [0; WORD];
             if flash.read(at, &mut word).is_err() {
@@ -26,7 +26,7 @@ impl Store {
             }
             let len = u32_at(&word, 8);
             let fits = len <= end - at && record_len(len) <= end - at;
-            if word[..4] != MAGIC || !is_closed(&word) || !fits {
+            if word[..4] != MAGIC || !has_valid_word_crc(&word) || !fits {
                 at = end;
                 break;
             }
@@ -50,15 +50,15 @@ impl Store {
         if !sum != crc {
             return;
         }
-        if kind == Kind::Mission as u8 {
+        if kind == RecordKind::Mission as u8 {
             self.journal.mission = (len > 0).then_some(at..at + len);
             self.journal.mission_crc = crc;
-        } else if kind == Kind::Parameters as u8 && (4..=MAX_PROGRAM as u32).contains(&len) {
+        } else if kind == RecordKind::Parameters as u8 && (4..=MAX_PROGRAM as u32).contains(&len) {
             // Short enough to be in the block whole.
             self.forgotten = u32_at(&block, 0);
             let (entries, _) = block[4..len as usize].as_chunks();
             entries.iter().for_each(|entry| self.parameters.restore(entry));
-        } else if kind == Kind::Photographed as u8 && len <= MAX_PROGRAM as u32 {
+        } else if kind == RecordKind::Photographed as u8 && len <= MAX_PROGRAM as u32 {
             self.photographed = block[..len as usize].iter().copied().collect();
         }
     }

@@ -6,7 +6,7 @@ use core::ops::Range;
 /// Kind of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Kind {
+pub enum RecordKind {
     /// Which roadmaps were removed, and the parameters.
     Parameters = 1,
     /// The mission file; of length 0 when it was removed.
@@ -20,27 +20,27 @@ pub(super) const MAX_JOURNAL_TRIES: u8 = 4;
 
 /// A record being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Record {
-    pub kind: Kind,
+pub struct JournalRecord {
+    pub kind: RecordKind,
     /// Offset of the record.
     pub at: u32,
     pub len: u32,
     pub crc: u32,
-    pub source: Source,
-    pub step: Step,
+    pub source: RecordSource,
+    pub step: RecordStep,
     pub done: u32,
     pub sum: u32,
 }
 
-impl Record {
+impl JournalRecord {
     /// Bytes of its step: what is read back begins with the head.
-    pub fn whole(&self) -> u32 {
-        if self.step == Step::Verify { WORD as u32 + self.len } else { self.len }
+    pub fn total_len(&self) -> u32 {
+        if self.step == RecordStep::Verify { WORD as u32 + self.len } else { self.len }
     }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub enum RecordSource {
     /// The record is in the buffer, whole.
     Buffer,
     Window,
@@ -48,7 +48,7 @@ pub enum Source {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum RecordStep {
     Head,
     Load,
     Data,

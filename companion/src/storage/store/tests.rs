@@ -8,7 +8,7 @@ use planner_core::field::{self, FieldShape};
 use planner_core::roadmap::RoadmapView;
 use rand_core::Rng;
 
-use super::window::Taken;
+use super::window::PieceOutcome;
 use super::*;
 use crate::testing::fake_flash::*;
 
@@ -20,17 +20,17 @@ fn upload(
     bytes: &[u8],
     piece: usize,
 ) -> Result<Result<(), UploadError>, Cut> {
-    if let Err(why) = store.open(file, Erasing::Allowed) {
+    if let Err(why) = store.open_upload(file, ErasePermission::Allowed) {
         return Ok(Err(why));
     }
-    run(store, flash, Erasing::Allowed)?;
+    run(store, flash, ErasePermission::Allowed)?;
     for (i, part) in bytes.chunks(piece).enumerate() {
-        assert_eq!(store.take((i * piece) as u32, part), Taken::Yes);
-        run(store, flash, Erasing::Allowed)?;
+        assert_eq!(store.take_piece((i * piece) as u32, part), PieceOutcome::Yes);
+        run(store, flash, ErasePermission::Allowed)?;
     }
-    store.close();
-    run(store, flash, Erasing::Allowed)?;
-    match store.upload() {
+    store.finish_upload();
+    run(store, flash, ErasePermission::Allowed)?;
+    match store.upload_state() {
         Some(UploadState::Ended(result)) => Ok(result),
         other => panic!("{other:?}"),
     }
@@ -40,17 +40,17 @@ fn upload(
 fn files_come_back_after_a_restart() {
     let mut flash = Flash::new(1);
     let mut store = started(&mut flash);
-    assert_eq!((store.roadmap(), store.mission(), store.size(File::Roadmap)), (None, None, None));
+    assert_eq!((store.roadmap(), store.mission(), store.file_size(File::Roadmap)), (None, None, None));
     for (round, nodes) in [300, 10, 600].into_iter().enumerate() {
         let (road, flown) = (roadmap(nodes), mission(nodes as u8 % 50 + 1));
         for (file, bytes) in [(File::Roadmap, &road), (File::Mission, &flown)] {
             assert_eq!(upload(&mut store, &mut flash, file, bytes, 239).unwrap(), Ok(()));
-            assert_eq!(store.size(file), Some(bytes.len() as u32));
+            assert_eq!(store.file_size(file), Some(bytes.len() as u32));
         }
         assert_eq!(store.roadmap().is_some(), round > 0, "used from the next start on");
         if round > 0 {
             assert_eq!(
-                store.open(File::Roadmap, Erasing::Allowed),
+                store.open_upload(File::Roadmap, ErasePermission::Allowed),
                 Err(UploadError::Waiting),
                 "one waits already"
             );
@@ -60,10 +60,10 @@ fn files_come_back_after_a_restart() {
         assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
         assert!(RoadmapView::parse(held(&flash, store.roadmap()).unwrap()).is_ok());
     }
-    store.remove(File::Roadmap);
-    store.remove(File::Mission);
-    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
-    assert_eq!((store.size(File::Roadmap), store.size(File::Mission)), (None, None));
+    store.remove_file(File::Roadmap);
+    store.remove_file(File::Mission);
+    run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
+    assert_eq!((store.file_size(File::Roadmap), store.file_size(File::Mission)), (None, None));
     store = started(&mut flash);
     assert_eq!((store.roadmap(), store.mission()), (None, None));
     assert_eq!(upload(&mut store, &mut flash, File::Roadmap, &roadmap(20), 80).unwrap(), Ok(()));
@@ -88,11 +88,11 @@ fn a_field_takes_the_place_of_the_roadmap_and_gives_it_back() {
         store = started(&mut flash);
         assert_eq!(upload(&mut store, &mut flash, own, bytes, 239).unwrap(), Ok(()));
         store = started(&mut flash);
-        assert_eq!((store.size(own), store.size(other)), (Some(bytes.len() as u32), None));
+        assert_eq!((store.file_size(own), store.file_size(other)), (Some(bytes.len() as u32), None));
         assert_eq!(held(&flash, store.roadmap()), Some(bytes.as_slice()));
     }
-    store.remove(File::Field);
-    assert!(store.size(File::Roadmap).is_some(), "the field was not there");
+    store.remove_file(File::Field);
+    assert!(store.file_size(File::Roadmap).is_some(), "the field was not there");
 }
 
 #[test]
@@ -114,75 +114,75 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
             assert_eq!(upload(&mut store, &mut flash, file, bytes, 100).unwrap(), Err(why));
         }
         store = started(&mut flash);
-        store.open(file, Erasing::Allowed).unwrap();
-        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
-        assert_eq!(store.take(0, &whole[..100]), Taken::Yes);
-        assert_eq!(store.take(101, &whole[101..150]), Taken::Yes);
-        store.close();
-        assert_eq!(store.upload(), Some(UploadState::Ended(Err(UploadError::Incomplete))));
+        store.open_upload(file, ErasePermission::Allowed).unwrap();
+        run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
+        assert_eq!(store.take_piece(0, &whole[..100]), PieceOutcome::Yes);
+        assert_eq!(store.take_piece(101, &whole[101..150]), PieceOutcome::Yes);
+        store.finish_upload();
+        assert_eq!(store.upload_state(), Some(UploadState::Ended(Err(UploadError::Incomplete))));
     }
     store = started(&mut flash);
     assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
     assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
-    assert_eq!(store.open(File::Mission, Erasing::Allowed), Ok(()));
-    assert_eq!(store.take(4000, &[0; 97]), Taken::TooLarge);
-    assert_eq!(store.open(File::Roadmap, Erasing::Allowed), Ok(()));
-    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
-    assert_eq!(store.take(24 << 10, &[0; 1]), Taken::TooLarge);
+    assert_eq!(store.open_upload(File::Mission, ErasePermission::Allowed), Ok(()));
+    assert_eq!(store.take_piece(4000, &[0; 97]), PieceOutcome::TooLarge);
+    assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Allowed), Ok(()));
+    run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
+    assert_eq!(store.take_piece(24 << 10, &[0; 1]), PieceOutcome::TooLarge);
 }
 
 /// Does what the store asks for while armed, which must be reading alone.
 fn run_armed(store: &mut Store, flash: &mut Flash) {
     let mut read = [0; MAX_READ];
-    while let Some(request) = store.poll(Erasing::Forbidden) {
+    while let Some(request) = store.poll_request(ErasePermission::Forbidden) {
         assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
-        let outcome = obey(flash, request, Erasing::Forbidden, &mut read).expect("the power is on");
-        store.handle(outcome.map(|len| &read[..len]));
+        let outcome = obey(flash, request, ErasePermission::Forbidden, &mut read).expect("the power is on");
+        store.handle_outcome(outcome.map(|len| &read[..len]));
     }
 }
 
 #[test]
 fn a_flash_that_stalls_only_reads_while_armed() {
     let mut flash = Flash::new(1);
-    let layout = Layout { stalls: true, ..LAYOUT };
+    let layout = FlashLayout { stalls: true, ..LAYOUT };
     let mut store = Store::mount(layout, &mut flash);
-    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+    run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     let (road, flown) = (roadmap(300), mission(9));
     assert_eq!(upload(&mut store, &mut flash, File::Mission, &flown, 239).unwrap(), Ok(()));
     for file in File::ALL {
-        assert_eq!(store.open(file, Erasing::Forbidden), Err(UploadError::Armed));
+        assert_eq!(store.open_upload(file, ErasePermission::Forbidden), Err(UploadError::Armed));
     }
     // A parameter is kept when it is over.
     store.set_parameter(0, 3.5).unwrap();
     run_armed(&mut store, &mut flash);
     assert!(store.is_unsaved());
-    assert!(store.read(File::Mission, 0, 10), "what is there can be read");
+    assert!(store.request_read(File::Mission, 0, 10), "what is there can be read");
     run_armed(&mut store, &mut flash);
-    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+    run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     assert!(!store.is_unsaved());
-    // Armed at any moment of an upload: nothing is programmed, and it goes on when it is over.
+    // Armed at any moment of an upload: nothing is programmed, and it continues when it is over.
     let pieces: Vec<_> = road.chunks(239).collect();
     for armed_at in 0..=pieces.len() {
         let mut flash = Flash::new(2);
         let mut store = Store::mount(layout, &mut flash);
-        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
-        store.open(File::Roadmap, Erasing::Allowed).unwrap();
-        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
+        store.open_upload(File::Roadmap, ErasePermission::Allowed).unwrap();
+        run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         for (i, piece) in pieces.iter().enumerate() {
             if i == armed_at {
                 run_armed(&mut store, &mut flash);
             }
-            assert_eq!(store.take((i * 239) as u32, piece), Taken::Yes);
+            assert_eq!(store.take_piece((i * 239) as u32, piece), PieceOutcome::Yes);
             if i == armed_at {
                 run_armed(&mut store, &mut flash);
             }
-            run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+            run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         }
-        store.close();
+        store.finish_upload();
         run_armed(&mut store, &mut flash);
-        assert_ne!(store.upload(), Some(UploadState::Ended(Ok(()))), "it cannot be sealed yet");
-        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
-        assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+        assert_ne!(store.upload_state(), Some(UploadState::Ended(Ok(()))), "it cannot be sealed yet");
+        run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
+        assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     }
 }
 
@@ -190,25 +190,25 @@ fn a_flash_that_stalls_only_reads_while_armed() {
 fn nothing_is_erased_while_armed() {
     let mut flash = Flash::new(3);
     let mut store = Store::mount(LAYOUT, &mut flash);
-    assert_eq!(store.open(File::Roadmap, Erasing::Forbidden), Err(UploadError::Armed));
+    assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Forbidden), Err(UploadError::Armed));
     store.set_parameter(0, 2.5).unwrap();
-    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
+    run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     assert!(store.is_unsaved(), "there is no clean half to keep it in yet");
-    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+    run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     assert!(!store.is_unsaved());
     // With areas erased ahead, parameters are kept and a roadmap is taken in while armed.
     store.set_parameter(0, 3.5).unwrap();
-    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
+    run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     let road = roadmap(50);
-    store.open(File::Roadmap, Erasing::Forbidden).unwrap();
-    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
+    store.open_upload(File::Roadmap, ErasePermission::Forbidden).unwrap();
+    run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     for (i, part) in road.chunks(200).enumerate() {
-        assert_eq!(store.take(200 * i as u32, part), Taken::Yes);
-        run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
+        assert_eq!(store.take_piece(200 * i as u32, part), PieceOutcome::Yes);
+        run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     }
-    store.close();
-    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
-    assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    store.finish_upload();
+    run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
+    assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     let store = Store::mount(LAYOUT, &mut flash);
     assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", 3.5)));
     assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
@@ -223,7 +223,7 @@ fn parameters_outlive_many_changes_and_the_mission_with_them() {
     for i in 0..300u32 {
         let value = 0.5 + (i % 40) as f32 * 0.1;
         store.set_parameter(0, value).unwrap();
-        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         if i % 13 == 0 {
             store = started(&mut flash);
         }
@@ -244,14 +244,15 @@ fn a_read_goes_first_between_two_sectors() {
     let (mut erased, mut read, mut given) = (Vec::new(), [0; MAX_READ], 0);
     for turn in 0..100 {
         if turn % 2 == 1 {
-            store.read(File::Roadmap, 0, 100);
+            store.request_read(File::Roadmap, 0, 100);
         }
-        let Some(request) = store.poll(Erasing::Allowed) else { break };
+        let Some(request) = store.poll_request(ErasePermission::Allowed) else { break };
         if let FlashRequest::Erase { at } = request {
             erased.push(at);
         }
-        let outcome = obey(&mut flash, request, Erasing::Allowed, &mut read).expect("the power is on");
-        if let Some(answer) = store.handle(outcome.map(|len| &read[..len])) {
+        let outcome =
+            obey(&mut flash, request, ErasePermission::Allowed, &mut read).expect("the power is on");
+        if let Some(answer) = store.handle_outcome(outcome.map(|len| &read[..len])) {
             assert_eq!(answer, ReadOutcome::Bytes(&road[..100]));
             given += 1;
         }
@@ -259,8 +260,8 @@ fn a_read_goes_first_between_two_sectors() {
     assert_eq!(given, 2, "one between each two sectors");
     let sectors: Vec<u32> = (0..3).map(|i| LAYOUT.slot_len + i * LAYOUT.sector_len).collect();
     assert_eq!(erased, sectors, "each once");
-    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
-    assert_eq!(store.open(File::Roadmap, Erasing::Forbidden), Ok(()), "and it is ready");
+    run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
+    assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Forbidden), Ok(()), "and it is ready");
 }
 
 /// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or `after`, whole.
@@ -277,7 +278,7 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
         store = started(&mut flash);
         assert!(store.parameters().get(0).unwrap().1 == 1.5, "never asked to keep it");
         store.set_parameter(0, 1.0).unwrap();
-        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         // How many words the change takes, from a first go without a cut.
         let (bytes, torn, rng) = (flash.bytes.clone(), flash.torn.clone(), flash.rng.clone());
         let begun = flash.programmed;
@@ -291,7 +292,7 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
         if cut % 3 == 0 {
             flash.power = Some(flash.rng.next_u32() % 40);
             let mut store = Store::mount(LAYOUT, &mut flash);
-            let _ = run(&mut store, &mut flash, Erasing::Allowed);
+            let _ = run(&mut store, &mut flash, ErasePermission::Allowed);
             flash.power = None;
         }
         let mut store = started(&mut flash);
@@ -324,10 +325,10 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
 fn a_cut_anywhere_leaves_the_old_roadmap_or_the_new_one_whole() {
     let change = |store: &mut Store, flash: &mut Flash| {
         let road = roadmap(500);
-        run(store, flash, Erasing::Allowed)?;
+        run(store, flash, ErasePermission::Allowed)?;
         upload(store, flash, File::Roadmap, &road, 239)?.expect("it is sound");
         *store = Store::mount(LAYOUT, flash);
-        run(store, flash, Erasing::Allowed)
+        run(store, flash, ErasePermission::Allowed)
     };
     cut_anywhere(1000, change, 300);
 }
@@ -336,11 +337,11 @@ fn a_cut_anywhere_leaves_the_old_roadmap_or_the_new_one_whole() {
 fn a_cut_anywhere_leaves_the_old_mission_or_the_new_one_whole() {
     let change = |store: &mut Store, flash: &mut Flash| {
         let flown = mission(50);
-        run(store, flash, Erasing::Allowed)?;
+        run(store, flash, ErasePermission::Allowed)?;
         for _ in 0..5 {
             upload(store, flash, File::Mission, &flown, 239)?.expect("it is sound");
             store.set_parameter(0, 2.0).unwrap();
-            run(store, flash, Erasing::Allowed)?;
+            run(store, flash, ErasePermission::Allowed)?;
         }
         Ok(())
     };
@@ -353,12 +354,12 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
         let mut flash = Flash::new(6);
         let mut store = started(&mut flash);
         store.set_parameter(0, 2.0).unwrap();
-        let opened = store.open(File::Roadmap, Erasing::Allowed);
+        let opened = store.open_upload(File::Roadmap, ErasePermission::Allowed);
         assert_eq!(opened, Ok(()));
         let mut asked = 0;
         let road = roadmap(50);
         loop {
-            while let Some(request) = store.poll(Erasing::Allowed) {
+            while let Some(request) = store.poll_request(ErasePermission::Allowed) {
                 asked += 1;
                 assert!(asked < 10_000, "it asks for ever");
                 let bad = match request {
@@ -368,10 +369,12 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
                 };
                 let nothing = [0; MAX_READ];
                 let len = if let FlashRequest::Read { len, .. } = request { len } else { 0 };
-                store.handle(if bad { Err(Fault) } else { Ok(&nothing[..len]) });
+                store.handle_outcome(if bad { Err(FlashFault) } else { Ok(&nothing[..len]) });
             }
-            match store.upload() {
-                Some(UploadState::Taking) if store.take(0, &road[..200]) == Taken::Yes => store.close(),
+            match store.upload_state() {
+                Some(UploadState::Taking) if store.take_piece(0, &road[..200]) == PieceOutcome::Yes => {
+                    store.finish_upload()
+                }
                 Some(UploadState::Ended(result)) => break assert!(result.is_err()),
                 _ => break,
             }
@@ -385,23 +388,23 @@ fn an_upload_waits_until_it_is_known_whether_the_vehicle_is_armed() {
         // As it comes: nothing was erased ahead of time.
         let mut flash = Flash::new(77);
         let mut store = Store::mount(LAYOUT, &mut flash);
-        store.open(file, Erasing::NotYet).expect("it may be allowed yet");
-        run(&mut store, &mut flash, Erasing::NotYet).unwrap();
+        store.open_upload(file, ErasePermission::NotYet).expect("it may be allowed yet");
+        run(&mut store, &mut flash, ErasePermission::NotYet).unwrap();
         if file == File::Roadmap {
-            assert_eq!(store.upload(), Some(UploadState::Opening));
-            run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+            assert_eq!(store.upload_state(), Some(UploadState::Opening));
+            run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         }
         for (i, part) in bytes.chunks(200).enumerate() {
-            assert_eq!(store.take(i as u32 * 200, part), Taken::Yes);
-            run(&mut store, &mut flash, Erasing::NotYet).unwrap();
+            assert_eq!(store.take_piece(i as u32 * 200, part), PieceOutcome::Yes);
+            run(&mut store, &mut flash, ErasePermission::NotYet).unwrap();
         }
-        store.close();
-        run(&mut store, &mut flash, Erasing::NotYet).unwrap();
+        store.finish_upload();
+        run(&mut store, &mut flash, ErasePermission::NotYet).unwrap();
         if file == File::Mission {
-            assert_eq!(store.upload(), Some(UploadState::Closing));
-            run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+            assert_eq!(store.upload_state(), Some(UploadState::Closing));
+            run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         }
-        assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))), "{file:?}");
+        assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))), "{file:?}");
     }
 }
 
@@ -410,33 +413,33 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
     let mut flash = Flash::new(78);
     let mut store = started(&mut flash);
     let flown = mission(3);
-    store.open(File::Mission, Erasing::Allowed).unwrap();
-    flown.chunks(200).enumerate().for_each(|(i, part)| _ = store.take(i as u32 * 200, part));
-    store.close();
+    store.open_upload(File::Mission, ErasePermission::Allowed).unwrap();
+    flown.chunks(200).enumerate().for_each(|(i, part)| _ = store.take_piece(i as u32 * 200, part));
+    store.finish_upload();
     let mut read = [0; MAX_READ];
     let mut heads = 0;
-    while let Some(request) = store.poll(Erasing::Allowed) {
+    while let Some(request) = store.poll_request(ErasePermission::Allowed) {
         let head = match request {
             FlashRequest::Program { at, bytes } if bytes[..4] == flown_head(&flown)[..4] => Some(at as usize),
             _ => None,
         };
-        let outcome = obey(&mut flash, request, Erasing::Allowed, &mut read).unwrap();
+        let outcome = obey(&mut flash, request, ErasePermission::Allowed, &mut read).unwrap();
         if let Some(at) = head {
             heads += 1;
             if heads == 1 {
                 flash.bytes[at + 20] ^= 1;
             }
         }
-        store.handle(outcome.map(|len| &read[..len]));
+        store.handle_outcome(outcome.map(|len| &read[..len]));
     }
     assert!(heads > 1, "{heads}");
-    assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     let store = started(&mut flash);
     assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
 }
 
 fn flown_head(flown: &[u8]) -> [u8; WORD] {
-    journal::head(records::Kind::Mission, flown.len() as u32, 0)
+    journal::record_head(records::RecordKind::Mission, flown.len() as u32, 0)
 }
 
 #[test]

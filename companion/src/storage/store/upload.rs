@@ -1,59 +1,61 @@
 //! A file coming in: from the first piece in the window to the seal.
 
 use super::Store;
-use super::area::{Area, Condition, DATA_OFFSET};
-use super::flash::{Erasing, File};
+use super::area::{AreaCondition, DATA_OFFSET, FlashArea};
+use super::flash::{ErasePermission, File};
 use super::upload_state::{UploadError, UploadState};
-use super::window::{Taken, WINDOW_LEN};
+use super::window::{PieceOutcome, WINDOW_LEN};
 use crate::storage::mission_file::MissionView;
 use planner_core::{field, roadmap};
 
 impl Store {
     /// Progress of the upload, if there is one.
-    pub fn upload(&self) -> Option<UploadState> {
+    pub fn upload_state(&self) -> Option<UploadState> {
         self.upload.map(|(_, state)| state)
     }
 
-    /// Begins an upload; one under way is given up. Pieces are taken once [`Self::upload`] says so.
+    /// Begins an upload; one under way is given up. Pieces are taken once [`Self::upload_state`] says so.
     ///
     /// # Errors
     /// [`UploadError::Armed`] or [`UploadError::Waiting`].
-    pub fn open(&mut self, file: File, erasing: Erasing) -> Result<(), UploadError> {
-        if self.upload() == Some(UploadState::Closing) {
+    pub fn open_upload(&mut self, file: File, erasing: ErasePermission) -> Result<(), UploadError> {
+        if self.upload_state() == Some(UploadState::Closing) {
             return Err(UploadError::Waiting);
         }
-        self.abandon();
-        if self.layout.stalls && erasing == Erasing::Forbidden {
+        self.abandon_upload();
+        if self.layout.stalls && erasing == ErasePermission::Forbidden {
             return Err(UploadError::Armed);
         }
         if file != File::Mission {
-            let slot = self.target().ok_or(UploadError::Waiting)?;
-            if self.slots[slot] != Condition::Clean && erasing == Erasing::Forbidden {
+            let slot = self.writable_slot().ok_or(UploadError::Waiting)?;
+            if self.slots[slot] != AreaCondition::Clean && erasing == ErasePermission::Forbidden {
                 return Err(UploadError::Armed);
             }
             self.erasure_failed = false;
         }
-        self.window.reset();
+        self.reassembly.reset();
         let state = if file == File::Mission { UploadState::Taking } else { UploadState::Opening };
         self.upload = Some((file, state));
         Ok(())
     }
 
-    /// Takes a piece of the file.
-    pub fn take(&mut self, offset: u32, piece: &[u8]) -> Taken {
+    /// Accepts a piece of the file.
+    pub fn take_piece(&mut self, offset: u32, piece: &[u8]) -> PieceOutcome {
         match self.upload {
-            Some((File::Mission, UploadState::Taking)) => self.window.take(offset, piece, WINDOW_LEN as u32),
-            Some((File::Roadmap | File::Field, UploadState::Taking)) => {
-                self.window.take(offset, piece, self.layout.slot_len - DATA_OFFSET)
+            Some((File::Mission, UploadState::Taking)) => {
+                self.reassembly.insert(offset, piece, WINDOW_LEN as u32)
             }
-            _ => Taken::Later,
+            Some((File::Roadmap | File::Field, UploadState::Taking)) => {
+                self.reassembly.insert(offset, piece, self.layout.slot_len - DATA_OFFSET)
+            }
+            _ => PieceOutcome::Later,
         }
     }
 
-    /// All was sent: the file is to be checked and kept. [`Self::upload`] says when that has ended.
-    pub fn close(&mut self) {
+    /// All was sent: the file is to be checked and kept. [`Self::upload_state`] says when that has ended.
+    pub fn finish_upload(&mut self) {
         let Some((file, UploadState::Taking)) = self.upload else { return };
-        let state = match (file, self.window.rest()) {
+        let state = match (file, self.reassembly.last_part()) {
             (_, Some([])) => UploadState::Ended(Err(UploadError::Damaged)),
             (_, None) => UploadState::Ended(Err(UploadError::Incomplete)),
             (File::Mission, Some(rest))
@@ -66,12 +68,12 @@ impl Store {
         };
         self.upload = Some((file, state));
         if let UploadState::Ended(result) = state {
-            self.end(result);
+            self.end_upload(result);
         }
     }
 
     /// Gives an upload up, unless all of it was sent: then it is kept.
-    pub fn abandon(&mut self) {
+    pub fn abandon_upload(&mut self) {
         if !matches!(self.upload, Some((_, UploadState::Closing))) {
             self.drop_job();
             self.clear_slot();
@@ -79,7 +81,7 @@ impl Store {
         }
     }
 
-    pub(super) fn end(&mut self, result: Result<(), UploadError>) {
+    pub(super) fn end_upload(&mut self, result: Result<(), UploadError>) {
         if let Some((file, _)) = self.upload {
             self.upload = Some((file, UploadState::Ended(result)));
         }
@@ -91,21 +93,21 @@ impl Store {
     /// A slot that was being written is to be erased before it is written again.
     fn clear_slot(&mut self) {
         for slot in &mut self.slots {
-            if *slot == Condition::Open {
-                *slot = Condition::Dirty;
+            if *slot == AreaCondition::Open {
+                *slot = AreaCondition::Dirty;
             }
         }
     }
 
     /// The slot that may be written: not in use, and not the newest.
-    pub(super) fn target(&self) -> Option<usize> {
-        let newest = self.newest();
+    pub(super) fn writable_slot(&self) -> Option<usize> {
+        let newest = self.newest_slot();
         (0..2).find(|i| Some(*i) != self.in_use && Some(*i) != newest)
     }
 
     /// The slot that is being written.
-    pub(super) fn open_slot(&self) -> Option<Area> {
-        self.slots.iter().position(|slot| *slot == Condition::Open).map(Area::Slot)
+    pub(super) fn open_slot(&self) -> Option<FlashArea> {
+        self.slots.iter().position(|slot| *slot == AreaCondition::Open).map(FlashArea::Slot)
     }
 
     /// Whether the first bytes are those of a roadmap file, or a field, of this length that can be read.

@@ -1,6 +1,6 @@
 //! How far an upload is, and why it failed.
 
-/// Why an upload came to nothing. What was there before is still there.
+/// Reason why an upload failed. The earlier file is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UploadError {
     /// An area would have to be erased, and the vehicle is armed.

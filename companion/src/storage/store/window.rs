@@ -6,9 +6,9 @@ use super::flash::MAX_PROGRAM;
 /// and 512 bytes of marks.
 pub const WINDOW_LEN: usize = 4096;
 
-/// Fate of a piece of the upload.
+/// What became of a received piece of the upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Taken {
+pub enum PieceOutcome {
     /// The piece is here, or was already.
     Yes,
     /// The window has no room for the piece yet.
@@ -19,7 +19,7 @@ pub enum Taken {
 
 /// The window. All zero when new.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub struct UploadReassembly {
     bytes: [u8; WINDOW_LEN],
     /// A bit for each byte that is here.
     marks: [u64; WINDOW_LEN / 64],
@@ -29,13 +29,13 @@ pub struct Window {
     high: u32,
 }
 
-impl Default for Window {
+impl Default for UploadReassembly {
     fn default() -> Self {
         Self { bytes: [0; WINDOW_LEN], marks: [0; WINDOW_LEN / 64], front: 0, high: 0 }
     }
 }
 
-impl Window {
+impl UploadReassembly {
     /// Begins with an empty file.
     pub fn reset(&mut self) {
         self.marks.fill(0);
@@ -43,7 +43,7 @@ impl Window {
     }
 
     /// Bytes of the file that are no longer here.
-    pub fn front(&self) -> u32 {
+    pub fn flushed_len(&self) -> u32 {
         self.front
     }
 
@@ -53,12 +53,12 @@ impl Window {
     }
 
     /// Takes a piece of a file of at most `most` bytes.
-    pub fn take(&mut self, offset: u32, piece: &[u8], most: u32) -> Taken {
+    pub fn insert(&mut self, offset: u32, piece: &[u8], most: u32) -> PieceOutcome {
         let Some(end) = offset.checked_add(piece.len() as u32).filter(|end| *end <= most) else {
-            return Taken::TooLarge;
+            return PieceOutcome::TooLarge;
         };
         if end > self.front + WINDOW_LEN as u32 {
-            return Taken::Later;
+            return PieceOutcome::Later;
         }
         self.high = self.high.max(end);
         // The part before the window is in flash already.
@@ -69,29 +69,29 @@ impl Window {
         for i in at..at + piece.len() {
             self.marks[i / 64] |= 1 << (i % 64);
         }
-        Taken::Yes
+        PieceOutcome::Yes
     }
 
-    /// Bytes that are here from the front on, without a gap, at most `most`.
-    fn run(&self, most: usize) -> usize {
+    /// Number of bytes received from the front on without a gap, at most `most`.
+    fn contiguous_len(&self, most: usize) -> usize {
         let gap = self.marks.iter().position(|marks| *marks != u64::MAX);
         let run = gap.map_or(WINDOW_LEN, |i| 64 * i + self.marks[i].trailing_ones() as usize);
         run.min(most)
     }
 
     /// The next block for flash, once it is whole.
-    pub fn block(&self) -> Option<&[u8; MAX_PROGRAM]> {
-        if self.run(MAX_PROGRAM) < MAX_PROGRAM { None } else { self.bytes.first_chunk() }
+    pub fn next_block(&self) -> Option<&[u8; MAX_PROGRAM]> {
+        if self.contiguous_len(MAX_PROGRAM) < MAX_PROGRAM { None } else { self.bytes.first_chunk() }
     }
 
     /// The end of the file, if nothing is missing before it.
-    pub fn rest(&self) -> Option<&[u8]> {
+    pub fn last_part(&self) -> Option<&[u8]> {
         let len = (self.high - self.front.min(self.high)) as usize;
-        (len <= WINDOW_LEN && self.run(len) == len).then(|| &self.bytes[..len])
+        (len <= WINDOW_LEN && self.contiguous_len(len) == len).then(|| &self.bytes[..len])
     }
 
-    /// Lets the first block go: it is in flash.
-    pub fn advance(&mut self) {
+    /// Drops the first block: it was written to flash.
+    pub fn drop_first_block(&mut self) {
         self.bytes.copy_within(MAX_PROGRAM.., 0);
         self.marks.copy_within(MAX_PROGRAM / 64.., 0);
         self.marks[(WINDOW_LEN - MAX_PROGRAM) / 64..].fill(0);
@@ -114,7 +114,7 @@ mod tests {
             order in proptest::collection::vec(any::<u16>(), 64),
         ) {
             let file: Vec<u8> = (0..len).map(|i| (i * 7 + i / 251) as u8).collect();
-            let mut window = Window::default();
+            let mut window = UploadReassembly::default();
             let mut flash = Vec::new();
             let mut missing: Vec<usize> = (0..len.div_ceil(piece)).collect();
             let mut turn = 0;
@@ -124,27 +124,27 @@ mod tests {
                 let pick = usize::from(order[turn % order.len()]) % missing.len().min(5);
                 let start = missing[pick] * piece;
                 let bytes = &file[start..(start + piece).min(len)];
-                if window.take(start as u32, bytes, 20_000) == Taken::Yes && turn % 7 != 0 {
+                if window.insert(start as u32, bytes, 20_000) == PieceOutcome::Yes && turn % 7 != 0 {
                     missing.remove(pick);
                 }
                 turn += 1;
-                while let Some(block) = window.block() {
+                while let Some(block) = window.next_block() {
                     flash.extend_from_slice(block);
-                    window.advance();
+                    window.drop_first_block();
                 }
             }
-            flash.extend_from_slice(window.rest().expect("nothing is missing"));
+            flash.extend_from_slice(window.last_part().expect("nothing is missing"));
             prop_assert_eq!(flash, file);
         }
     }
 
     #[test]
     fn what_does_not_fit_is_told() {
-        let mut window = Window::default();
-        assert_eq!(window.take(4000, &[0; 100], 9000), Taken::Later);
-        assert_eq!(window.take(8990, &[0; 11], 9000), Taken::TooLarge);
-        assert_eq!(window.take(u32::MAX, &[0; 2], 9000), Taken::TooLarge);
-        assert_eq!(window.take(300, &[1; 10], 9000), Taken::Yes);
-        assert!(window.block().is_none() && window.rest().is_none(), "a hole is seen");
+        let mut window = UploadReassembly::default();
+        assert_eq!(window.insert(4000, &[0; 100], 9000), PieceOutcome::Later);
+        assert_eq!(window.insert(8990, &[0; 11], 9000), PieceOutcome::TooLarge);
+        assert_eq!(window.insert(u32::MAX, &[0; 2], 9000), PieceOutcome::TooLarge);
+        assert_eq!(window.insert(300, &[1; 10], 9000), PieceOutcome::Yes);
+        assert!(window.next_block().is_none() && window.last_part().is_none(), "a hole is seen");
     }
 }

@@ -1,15 +1,16 @@
-//! What is asked of the shell: a way around, aside or home; and what becomes of its answer.
+//! What is asked of the shell: a detour, aside or home; and what becomes of its answer.
 //!
-//! Cost: a request names everything that is known to be in the way.
+//! Cost: a request lists every known obstacle on the path.
 
-use planner_core::detour::{DetourRequest, Goal, KeepOff};
+use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, DETOUR_MARGIN_M};
 use super::{
-    Aim, BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER,
+    BLOCKED_WITHIN_M, DETOUR_RETRY_S, DetourPurpose, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES,
+    STUCK_AFTER,
 };
 use crate::guidance::evade;
-use crate::swarm::view::View;
+use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
 /// Time from a search that found no landing place aside to the next search, seconds.
@@ -19,9 +20,9 @@ const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Two searches from places nearer than this are searches from the same place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
 
-/// Whether a way around that was not found may be found later.
+/// Whether a detour that was not found may be found later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outlook {
+pub(crate) enum RetryOutlook {
     /// A silent vehicle may still come down, and leave more room once it lies.
     Settles,
     /// Some vehicle may still move.
@@ -31,50 +32,52 @@ pub(crate) enum Outlook {
 }
 
 impl Detours {
-    /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
+    /// Whether it may search for a landing place beside its path: it is on its path, hears another vehicle, and did not
+    /// just fail.
     pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
         &self,
-        view: &View<'_, V, W, G>,
+        view: &DetourView<'_, V, W, G>,
     ) -> bool {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(SIDESTEP_RETRY_S);
-        view.mission.plan().is_some_and(|plan| plan.task.flies())
-            && (!view.neighbours.is_deaf(view.now)
-                || view.neighbours.all_rest()
+        view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
+            && (!view.neighbours.hears_nobody(view.now)
+                || view.neighbours.are_all_at_rest()
                 || view.guidance.filter.column_blocked_for(view.now) >= UNHEARD_SIDESTEP_AFTER)
             && self.no_way_aside_at.is_none_or(retries)
     }
 
-    /// Whether enough ways around were not found, or led nowhere.
-    pub(crate) fn gives_up(&self) -> bool {
-        self.hopeless || self.failed.saturating_add(self.fruitless) >= MAX_DETOUR_SEARCHES
+    /// Whether enough detours were not found, or led nowhere.
+    pub(crate) fn has_given_up(&self) -> bool {
+        self.no_retry || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
     }
 
-    /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
-    pub(crate) fn underneath<const V: usize, const W: usize, const G: usize>(
+    /// Time for which it has waited below a landing vehicle without another place; zero for a while after no way aside
+    /// was found.
+    pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
-        view: &View<'_, V, W, G>,
+        view: &DetourView<'_, V, W, G>,
     ) -> Duration {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
         let trapped = view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
-    /// A way around, or just aside, is requested of the shell.
-    pub(crate) fn request(&mut self, aim: Aim) {
-        self.aside = matches!(aim, Aim::Aside | Aim::Landing);
-        self.lands = aim == Aim::Landing;
-        if aim != Aim::Beyond {
-            self.beside.end();
+    /// Notes that a detour, or a path aside, is requested of the shell.
+    pub(crate) fn note_request(&mut self, aim: DetourPurpose) {
+        self.detour_aside = matches!(aim, DetourPurpose::Aside | DetourPurpose::Landing);
+        self.lands_at_end = aim == DetourPurpose::Landing;
+        if aim != DetourPurpose::Beyond {
+            self.field_detour.abort();
         }
-        self.obstacles.request();
-        self.ready = false;
+        self.obstacles.mark_requested();
+        self.detour_ready = false;
     }
 
     /// The requested detour; `None` without a plan. `tell` is given all keep-out zones.
-    pub(crate) fn requested<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn detour_request<const V: usize, const W: usize, const G: usize>(
         &self,
-        view: &View<'_, V, W, G>,
-        mut tell: impl FnMut(KeepOff),
+        view: &DetourView<'_, V, W, G>,
+        mut tell: impl FnMut(KeepOutZone),
     ) -> Option<DetourRequest> {
         let plan = view.mission.plan()?;
         let points = plan.path.waypoints();
@@ -83,41 +86,41 @@ impl Detours {
         let ahead = points.get(next)?;
         let behind = points.get(next.saturating_sub(1))?;
         let apart_m = view.config.safety_distance_m;
-        self.obstacles.known().iter().for_each(|obstacle| tell(*obstacle));
+        self.obstacles.all().iter().for_each(|obstacle| tell(*obstacle));
         match view.config.division {
-            Some(_) if !self.aside => beside::others(view, &mut tell),
+            Some(_) if !self.detour_aside => beside::zones_of_others(view, &mut tell),
             _ => {
                 // No nearer than blocks the way: a goal that is planned beside one that lies can be flown to.
                 let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
-                view.neighbours.places(view.now, apart, &mut tell);
+                view.neighbours.for_each_place(view.now, apart, &mut tell);
             }
         }
-        if self.aside {
-            view.neighbours.landing_columns(view.now, apart_m + evade::EVADE_MARGIN_M, &mut tell);
+        if self.detour_aside {
+            view.neighbours.for_each_landing_column(view.now, apart_m + evade::EVADE_MARGIN_M, &mut tell);
         }
-        if self.lands {
+        if self.lands_at_end {
             let height_m = plan.path.point_at(along_m)?.z;
-            view.neighbours.lands_on(view.now, [apart_m + DETOUR_MARGIN_M, height_m], tell);
+            view.neighbours.for_each_landing_zone(view.now, [apart_m + DETOUR_MARGIN_M, height_m], tell);
         }
         let (goal, descent_m) = match view.config.division {
-            Some(_) => match self.beside.back_m() {
+            Some(_) => match self.field_detour.rejoin_m() {
                 Some(back_m) => {
                     // The way that it is on ends there.
-                    let at_m = if self.beside.flies() { plan.path.length_m() } else { back_m };
+                    let at_m = if self.field_detour.is_flying() { plan.path.length_m() } else { back_m };
                     let over = plan.path.point_at(at_m)?;
                     (Goal::Home { over, layer_m: over.z }, (over.z - view.guidance.ground_m(plan)).max(0.0))
                 }
-                None => view.mission.home(),
+                None => view.mission.home_goal(),
             },
             None => match plan.task.goal() {
                 Some(goal) => (Goal::Node(goal), plan.descent_m),
                 // The flight ends over the vehicle's own pad.
-                None if plan.task.flies() => view.mission.home(),
+                None if plan.task.leaves_pad() => view.mission.home_goal(),
                 None => return None,
             },
         };
         Some(DetourRequest {
-            aside: self.aside,
+            aside: self.detour_aside,
             here: plan.path.point_at(along_m)?,
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
@@ -128,53 +131,63 @@ impl Detours {
         })
     }
 
-    /// The way around has come: it is flown from here on. `progress_m` is the progress on the plan.
-    pub(crate) fn take(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
-        if !self.flying {
+    /// The detour has come: it is flown from here on. `progress_m` is the progress on the plan.
+    pub(crate) fn begin_detour(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
+        if !self.on_detour {
             self.left_at_m = progress_m;
         }
-        let stuck = self.flying && now - progress_at > STUCK_AFTER;
-        let fruitless = if stuck { self.fruitless.saturating_add(1) } else { 0 };
+        let stuck = self.on_detour && now - progress_at > STUCK_AFTER;
+        let fruitless = if stuck { self.detours_without_progress.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
-        let Self { aside, lands, left_at_m, .. } = *self;
-        let (home, beside) = (self.home.taken(aside), self.beside.taken());
+        let Self { detour_aside: aside, lands_at_end: lands, left_at_m, .. } = *self;
+        let (home, beside) =
+            (self.home.after_detour_received(aside), self.field_detour.after_detour_received());
         // The vehicle comes back to its plan.
-        let left = self.left || !beside.flies();
+        let left = self.left_plan || !beside.is_flying();
         let obstacles = core::mem::take(&mut self.obstacles);
-        let flying = Self { left, flying: true, ready: true, obstacles, ..Self::default() };
-        *self = Self { aside, lands, left_at_m, fruitless, home, beside, ..flying };
+        let flying =
+            Self { left_plan: left, on_detour: true, detour_ready: true, obstacles, ..Self::default() };
+        *self = Self {
+            detour_aside: aside,
+            lands_at_end: lands,
+            left_at_m,
+            detours_without_progress: fruitless,
+            home,
+            field_detour: beside,
+            ..flying
+        };
     }
 
     /// The requested detour has not come; `along_m` is the place on the path.
-    pub(crate) fn miss(&mut self, along_m: f32, outlook: Outlook, now: Instant) {
+    pub(crate) fn note_failure(&mut self, along_m: f32, outlook: RetryOutlook, now: Instant) {
         // The way home is sought again.
-        if self.home.seeks() {
-            self.home.miss(now);
+        if self.home.is_seeking() {
+            self.home.note_failure(now);
             return;
         }
-        if self.beside.miss(now) {
+        if self.field_detour.note_failure(now) {
             return;
         }
         // Where no path aside is found a detour may yet exist.
-        if self.aside {
+        if self.detour_aside {
             self.no_way_aside_at = Some(now);
             return;
         }
-        if outlook == Outlook::Settles {
+        if outlook == RetryOutlook::Settles {
             // The vehicle requests a detour later and later, and once more when that vehicle lies.
-            self.failed = self.failed.saturating_add(1).min(MAX_DETOUR_SEARCHES - 1);
+            self.failures = self.failures.saturating_add(1).min(MAX_DETOUR_SEARCHES - 1);
             return;
         }
         if (along_m - self.failed_at_m).abs() > SAME_SEARCH_PLACE_M {
-            (self.failed_here, self.failed_at_m) = (0, along_m);
+            (self.failures_here, self.failed_at_m) = (0, along_m);
         }
-        if self.failed_here == 0 {
+        if self.failures_here == 0 {
             self.failed_since = now;
         }
-        self.failed = self.failed.saturating_add(1);
-        self.failed_here = self.failed_here.saturating_add(1);
+        self.failures = self.failures.saturating_add(1);
+        self.failures_here = self.failures_here.saturating_add(1);
         let long = now - self.failed_since >= Duration::from_secs(GIVE_UP_AFTER_S);
-        let often = long && self.failed_here >= MAX_DETOUR_SEARCHES - 1;
-        self.hopeless = often || outlook == Outlook::Closed;
+        let often = long && self.failures_here >= MAX_DETOUR_SEARCHES - 1;
+        self.no_retry = often || outlook == RetryOutlook::Closed;
     }
 }

@@ -1,22 +1,22 @@
 //! Around what hovers or lies on a path over a field, and back to that path beyond it.
 //!
 //! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
-//! plan, and then asks for its own plan again, to go on from there. It keeps its part: no division follows, its progress stays
+//! plan, and then asks for its own plan again, to continue from there. It keeps its part: no division follows, its progress stays
 //! where it left its path until it is back, and others wait for it. It comes back no further than its gates are open.
 //!
-//! ENU metres. Constant work but for [`returns_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
+//! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{KeepOff, Nature};
+use planner_core::detour::{KeepOutZone, ZoneKind};
 
-use crate::swarm::view::View;
+use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
 /// Distance ahead along the path within which a keep-out zone blocks it, metres: from 8 m/s a
 /// vehicle stops in less than half of it.
 pub(super) const LOOK_AHEAD_M: f32 = 60.0;
-/// Margin beyond the safety distance on a detour, metres: a zone that strays a little does not
+/// Margin beyond the safety distance on a detour, metres: a zone that deviates a little does not
 /// block the detour again.
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
@@ -36,7 +36,7 @@ const DETOUR_BEGINS_BEFORE_M: f32 = 1.0;
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-enum Phase {
+enum FieldDetourPhase {
     /// The vehicle is on its path.
     #[default]
     Off,
@@ -54,125 +54,132 @@ enum Phase {
 
 /// Progress of a vehicle on its detour.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Beside {
-    phase: Phase,
+pub(crate) struct FieldDetour {
+    phase: FieldDetourPhase,
     missed_at: Option<Instant>,
-    turns: u8,
+    attempts: u8,
 }
 
-impl Beside {
+impl FieldDetour {
     /// Starts to seek a path back to the plan: to the place that the vehicle was flying to if it was stopped on such a path, else to
-    /// `back_m`, metres along the plan. False where there is no such place.
-    pub(crate) fn seek(&mut self, back_m: Option<f32>) -> bool {
+    /// `rejoin_m`, metres along the plan. False where there is no such place.
+    pub(crate) fn start_seeking(&mut self, back_m: Option<f32>) -> bool {
         self.phase = match self.phase {
-            Phase::Flies(back_m) | Phase::SeeksAgain(back_m) => Phase::SeeksAgain(back_m),
-            _ => back_m.map_or(Phase::Off, Phase::Seeks),
+            FieldDetourPhase::Flies(back_m) | FieldDetourPhase::SeeksAgain(back_m) => {
+                FieldDetourPhase::SeeksAgain(back_m)
+            }
+            _ => back_m.map_or(FieldDetourPhase::Off, FieldDetourPhase::Seeks),
         };
-        self.is_on()
+        self.is_off_plan_path()
     }
 
-    /// The way there was not found. Whether one was sought.
-    pub(crate) fn miss(&mut self, now: Instant) -> bool {
+    /// Notes that no path was found. Returns whether one was sought.
+    pub(crate) fn note_failure(&mut self, now: Instant) -> bool {
         let before = self.phase;
         self.phase = match before {
-            Phase::SeeksAgain(back_m) => Phase::Flies(back_m),
-            Phase::Seeks(_) => Phase::Off,
+            FieldDetourPhase::SeeksAgain(back_m) => FieldDetourPhase::Flies(back_m),
+            FieldDetourPhase::Seeks(_) => FieldDetourPhase::Off,
             other => other,
         };
         self.missed_at = Some(now);
-        matches!(before, Phase::Seeks(_) | Phase::SeeksAgain(_))
+        matches!(before, FieldDetourPhase::Seeks(_) | FieldDetourPhase::SeeksAgain(_))
     }
 
     /// The requested detour has come, or another one.
-    pub(super) fn taken(self) -> Self {
+    pub(super) fn after_detour_received(self) -> Self {
         let phase = match self.phase {
-            Phase::Seeks(back_m) | Phase::SeeksAgain(back_m) => Phase::Flies(back_m),
-            _ => Phase::Off,
+            FieldDetourPhase::Seeks(back_m) | FieldDetourPhase::SeeksAgain(back_m) => {
+                FieldDetourPhase::Flies(back_m)
+            }
+            _ => FieldDetourPhase::Off,
         };
-        Self { phase, turns: self.turns.saturating_add(1), ..self }
+        Self { phase, attempts: self.attempts.saturating_add(1), ..self }
     }
 
     /// The state that remains where the vehicle turns to another task.
-    pub(crate) fn end(&mut self) {
-        self.phase = Phase::Off;
+    pub(crate) fn abort(&mut self) {
+        self.phase = FieldDetourPhase::Off;
     }
 
     /// The vehicle's own plan has come, or will not.
-    pub(super) fn answered(&mut self, came: bool) {
-        self.phase = if came { Phase::Back } else { Phase::Lost };
+    pub(super) fn handle_own_plan(&mut self, came: bool) {
+        self.phase = if came { FieldDetourPhase::Back } else { FieldDetourPhase::Lost };
     }
 
     /// Place where the vehicle is to come back to its path, metres, while it seeks the detour or
     /// flies it.
-    pub(crate) fn back_m(&self) -> Option<f32> {
+    pub(crate) fn rejoin_m(&self) -> Option<f32> {
         match self.phase {
-            Phase::Seeks(back_m) | Phase::Flies(back_m) | Phase::SeeksAgain(back_m) => Some(back_m),
+            FieldDetourPhase::Seeks(back_m)
+            | FieldDetourPhase::Flies(back_m)
+            | FieldDetourPhase::SeeksAgain(back_m) => Some(back_m),
             _ => None,
         }
     }
 
     /// Whether it is beside its path, to come back to it.
-    pub(crate) fn flies(&self) -> bool {
-        matches!(self.phase, Phase::Flies(_) | Phase::SeeksAgain(_))
+    pub(crate) fn is_flying(&self) -> bool {
+        matches!(self.phase, FieldDetourPhase::Flies(_) | FieldDetourPhase::SeeksAgain(_))
     }
 
     /// Whether its path is not that of its plan yet, or has not been taken up.
-    pub(crate) fn is_on(&self) -> bool {
-        self.phase != Phase::Off
+    pub(crate) fn is_off_plan_path(&self) -> bool {
+        self.phase != FieldDetourPhase::Off
     }
 
     /// Whether its plan has come.
     pub(crate) fn is_back(&self) -> bool {
-        self.phase == Phase::Back
+        self.phase == FieldDetourPhase::Back
     }
 
-    /// Whether there is none.
+    /// Whether its own plan will not come.
     pub(crate) fn is_lost(&self) -> bool {
-        self.phase == Phase::Lost
+        self.phase == FieldDetourPhase::Lost
     }
 
     /// Whether it may seek a way now.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
-        (!self.is_on() || self.flies())
-            && self.turns < MAX_DETOURS
+        (!self.is_off_plan_path() || self.is_flying())
+            && self.attempts < MAX_DETOURS
             && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
     }
 }
 
 /// Zones that other vehicles occupy over a field: their places, and the columns in which those in
 /// the air off the plan may come down.
-pub(super) fn others<const V: usize, const W: usize, const G: usize>(
-    view: &View<'_, V, W, G>,
-    tell: &mut dyn FnMut(KeepOff),
+pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'_, V, W, G>,
+    tell: &mut dyn FnMut(KeepOutZone),
 ) {
     let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
-    view.neighbours.places(view.now, [apart_m; 2], &mut *tell);
-    let beside_m = apart_m + view.neighbours.stray_m();
-    view.neighbours
-        .landing_columns(view.now, beside_m, |column| tell(KeepOff { nature: Nature::Solid, ..column }));
+    view.neighbours.for_each_place(view.now, [apart_m; 2], &mut *tell);
+    let beside_m = apart_m + view.neighbours.pair_position_error_m();
+    view.neighbours.for_each_landing_column(view.now, beside_m, |column| {
+        tell(KeepOutZone { kind: ZoneKind::Static, ..column })
+    });
 }
 
 /// The first free place of its path behind what blocks that, metres; none before its last descent, or before the gate that is
 /// closed.
-pub(super) fn returns_m<const V: usize, const W: usize, const G: usize>(
-    view: &View<'_, V, W, G>,
-    known: &[KeepOff],
+pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'_, V, W, G>,
+    known: &[KeepOutZone],
 ) -> Option<f32> {
     let plan = view.mission.plan()?;
     let (from_m, here) = (view.guidance.along_m(), view.telemetry.position);
     let waypoints = plan.path.waypoints();
     let home_m = waypoints.iter().nth_back(1)?.along_m;
-    let most_m = view.guidance.clear_m(&view.scene).min(home_m);
-    let far_m = |thing: &KeepOff, place: &Point| {
+    let most_m = view.guidance.gates_open_up_to_m(&view.scene).min(home_m);
+    let far_m = |thing: &KeepOutZone, place: &Point| {
         let (axis, away) = (thing.to - thing.from, place - thing.from);
         let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
         (away - axis * share).norm() - thing.radius_m
     };
-    let mut things = Vec::<KeepOff, MAX_ZONES>::new();
+    let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
     // Full beyond what may be near at once: the search for the way knows them all.
-    let mut add = |thing: KeepOff| _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
+    let mut add = |thing: KeepOutZone| _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     known.iter().for_each(|thing| add(*thing));
-    others(view, &mut add);
+    zones_of_others(view, &mut add);
     let (mut at_m, mut met) = (from_m, false);
     for _ in 0..MAX_SAMPLES {
         let far = !met && at_m > from_m + LOOK_AHEAD_M + DETOUR_BEGINS_BEFORE_M;

@@ -4,7 +4,7 @@
 //!
 //! Constant work.
 
-use crate::swarm::view::View;
+use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
 /// Time from a search that found no way home to the next search.
@@ -13,67 +13,67 @@ const RETURN_RETRY: Duration = Duration::from_secs(5);
 /// around.
 const MAX_RETURNS: u8 = 4;
 
-/// Progress of a vehicle on its way home.
+/// Progress of a vehicle on its path home.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Homeward {
+pub(crate) struct HomewardFlight {
     /// Time since which the vehicle stands and seeks its way.
     seeks_since: Option<Instant>,
     /// When it was last not found.
     missed_at: Option<Instant>,
-    /// The vehicle flies its way home.
+    /// The vehicle flies its path home.
     flies: bool,
-    turns: u8,
+    attempts: u8,
 }
 
-impl Homeward {
+impl HomewardFlight {
     /// The state that remains when a detour has come; `aside` if the detour leads aside only.
-    pub(super) fn taken(self, aside: bool) -> Self {
-        Self { flies: !aside && self.seeks_since.is_some(), turns: self.turns, ..Self::default() }
+    pub(super) fn after_detour_received(self, aside: bool) -> Self {
+        Self { flies: !aside && self.seeks_since.is_some(), attempts: self.attempts, ..Self::default() }
     }
 
     /// The vehicle turns home.
-    pub(crate) fn turn(&mut self, now: Instant) {
-        let turns = self.turns.saturating_add(1);
-        *self = Self { seeks_since: Some(now), turns, ..Self::default() };
+    pub(crate) fn begin(&mut self, now: Instant) {
+        let turns = self.attempts.saturating_add(1);
+        *self = Self { seeks_since: Some(now), attempts: turns, ..Self::default() };
     }
 
     /// The vehicle flies back another way.
-    pub(crate) fn forget(&mut self) {
-        *self = Self { turns: self.turns, ..Self::default() };
+    pub(crate) fn cancel(&mut self) {
+        *self = Self { attempts: self.attempts, ..Self::default() };
     }
 
-    /// The way home was not found.
-    pub(crate) fn miss(&mut self, now: Instant) {
+    /// Notes that no path home was found.
+    pub(crate) fn note_failure(&mut self, now: Instant) {
         self.missed_at = Some(now);
     }
 
-    /// Whether it stops for its way home, seeks it, or flies it.
+    /// Whether it stops for its path home, seeks it, or flies it.
     pub(crate) fn is_on(&self) -> bool {
-        self.seeks() || self.flies
+        self.is_seeking() || self.flies
     }
 
-    /// Whether it stops for its way home, or seeks it.
-    pub(crate) fn seeks(&self) -> bool {
+    /// Whether it stops for its path home, or seeks it.
+    pub(crate) fn is_seeking(&self) -> bool {
         self.seeks_since.is_some()
     }
 
     /// Time for which the vehicle has been seeking its path home.
-    pub(crate) fn sought_for(&self, now: Instant) -> Option<Duration> {
+    pub(crate) fn seeking_for(&self, now: Instant) -> Option<Duration> {
         self.seeks_since.map(|since| now - since)
     }
 
     /// Whether the shell may be asked for the path home now: not within [`RETURN_RETRY`] of the last failure.
-    pub(crate) fn may_ask(&self, now: Instant) -> bool {
-        self.seeks() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
+    pub(crate) fn may_request(&self, now: Instant) -> bool {
+        self.is_seeking() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
     }
 
     /// Whether it can turn home: over a field, on a path, and not too often before.
     pub(crate) fn can_turn<const V: usize, const W: usize, const G: usize>(
         &self,
-        view: &View<'_, V, W, G>,
+        view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        let flies = view.mission.plan().is_some_and(|plan| plan.task.flies());
+        let flies = view.mission.plan().is_some_and(|plan| plan.task.leaves_pad());
         let on_path = view.guidance.along_m() >= 0.0 && !view.guidance.returning;
-        view.config.division.is_some() && flies && on_path && self.turns < MAX_RETURNS
+        view.config.division.is_some() && flies && on_path && self.attempts < MAX_RETURNS
     }
 }

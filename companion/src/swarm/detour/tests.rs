@@ -1,20 +1,24 @@
 extern crate std;
 use std::vec::Vec;
 
-use super::asking::Outlook;
+use super::asking::RetryOutlook;
 use super::*;
 use crate::link::intent::{BLOCKED, FLYING, GROUNDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
 use crate::swarm::obstacles::MAX_OBSTACLES;
 use crate::swarm::obstacles::tests::sphere;
 use crate::testing::fake_autopilot::*;
 use mavlink::dialects::ardupilotmega::MavCmd;
-use planner_core::detour::{KeepOff, Nature};
+use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::flight::Gate;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 fn exclude(bench: &mut Bench, command: &Command) -> u8 {
-    bench.companion.detours.exclude(command, &ORIGIN, bench.companion.config.required_clearance_m)
+    bench.companion.detours.handle_obstacle_command(
+        command,
+        &ORIGIN,
+        bench.companion.config.required_clearance_m,
+    )
 }
 
 #[test]
@@ -26,7 +30,7 @@ fn a_revoked_obstacle_does_not_block_any_more() {
     assert_eq!(exclude(&mut bench, &sphere(at, 0.5)), ACCEPTED);
     bench.until(State::Blocked, 5.0);
     assert_eq!(exclude(&mut bench, &sphere(at, -1.0)), ACCEPTED);
-    assert_eq!(bench.companion.detours.obstacles(), 1);
+    assert_eq!(bench.companion.detours.obstacle_count(), 1);
     bench.until(State::Follow, 3.0);
     assert_eq!(exclude(&mut bench, &sphere(at, 0.0)), ACCEPTED, "nothing is there: so it is revoked");
 }
@@ -58,7 +62,10 @@ fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
     bench.neighbour = other(BLOCKED);
     bench.run(4.0);
     assert_eq!(bench.state(), State::Blocked, "two would begin at once");
-    assert!(!bench.companion.detours.waits(&bench.companion.view()), "the lower system id goes on claiming");
+    assert!(
+        !bench.companion.detours.is_waiting(&bench.companion.detour_view()),
+        "the lower system id goes on claiming"
+    );
     bench.neighbour = other(BLOCKED | WAITING);
     bench.until(State::Follow, 1.0);
 }
@@ -81,14 +88,16 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     bench.neighbour = other(BLOCKED);
     bench.until(State::Blocked, 3.0);
     bench.run(8.0);
-    assert!(bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked);
+    assert!(
+        bench.companion.detours.is_waiting(&bench.companion.detour_view()) && bench.state() == State::Blocked
+    );
     // It flies: what was quiet is not any more.
     bench.neighbour = other(ON_DETOUR);
     bench.run(1.0);
     bench.neighbour = other(BLOCKED | WAITING);
     bench.run(4.0);
     assert!(
-        bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked,
+        bench.companion.detours.is_waiting(&bench.companion.detour_view()) && bench.state() == State::Blocked,
         "it waits from the start again"
     );
     bench.until(State::Follow, 5.0);
@@ -97,7 +106,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
 #[test]
 fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
     let mut bench = beside_a_lower_id();
-    while bench.companion.guidance.stands() || bench.enu.z > 1.2 {
+    while bench.companion.guidance.is_standing() || bench.enu.z > 1.2 {
         bench.run(0.05);
     }
     assert_eq!(bench.state(), State::Follow);
@@ -106,7 +115,9 @@ fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
     bench.neighbour = Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | BLOCKED, 0.0, 5));
     bench.until(State::Blocked, 3.0);
     bench.run(8.0);
-    assert!(bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked);
+    assert!(
+        bench.companion.detours.is_waiting(&bench.companion.detour_view()) && bench.state() == State::Blocked
+    );
 }
 
 #[test]
@@ -120,12 +131,12 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     bench.neighbour = None;
     bench.run(60.0);
     let mut told = Vec::new();
-    bench.companion.neighbours.places(bench.now, [1.5; 2], |place| told.push(place));
+    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| told.push(place));
     assert!(told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5), "{told:?}");
 }
 
-/// What is kept off vehicle 77 half a minute on.
-fn kept_off(flags: u8, moves: bool) -> Vec<KeepOff> {
+/// What is kept clear vehicle 77 half a minute on.
+fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
     let mut bench = Bench::accompanied(two_vehicles());
     let at = Point::new(8.0, 40.0, 9.0);
     bench.neighbour = Some((at, flags, 0.0, 5));
@@ -135,16 +146,18 @@ fn kept_off(flags: u8, moves: bool) -> Vec<KeepOff> {
     }
     bench.run(30.0);
     let mut told = Vec::new();
-    bench.companion.neighbours.places(bench.now, [1.5; 2], |place| told.push(place));
+    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| told.push(place));
     told
 }
 
 #[test]
 fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
     let known = kept_off(GROUNDED | OUT_OF_PLAN, true);
-    assert!(matches!(known[..], [KeepOff { nature: Nature::Solid, .. }]) && known[0].from == known[0].to);
+    assert!(
+        matches!(known[..], [KeepOutZone { kind: ZoneKind::Static, .. }]) && known[0].from == known[0].to
+    );
     let vague = kept_off(GROUNDED | OUT_OF_PLAN, false);
-    assert!(matches!(vague[..], [KeepOff { nature: Nature::Lying, .. }]) && vague[0].to.z < -40.0);
+    assert!(matches!(vague[..], [KeepOutZone { kind: ZoneKind::Grounded, .. }]) && vague[0].to.z < -40.0);
 }
 
 #[test]
@@ -158,7 +171,10 @@ fn the_column_of_one_that_lands_is_deeper_the_older_its_place_is() {
         }
         bench.run(10.0);
         let mut depth_m = 0.0;
-        bench.companion.neighbours.landing_columns(bench.now, 2.0, |column| depth_m = 9.0 - column.to.z);
+        bench
+            .companion
+            .neighbours
+            .for_each_landing_column(bench.now, 2.0, |column| depth_m = 9.0 - column.to.z);
         depth_m
     };
     assert!((depth_m(true) - 15.0).abs() < 1.0, "{}", depth_m(true));
@@ -170,7 +186,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-        // So many things beside the path that the one on it is looked at in a later step.
+        // So many things beside the path that the one on it is checked in a later step.
         for i in 0..MAX_OBSTACLES {
             exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }
@@ -216,12 +232,12 @@ fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
     bench.no_position = true;
     bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     bench.run(3.0);
-    bench.companion.neighbours.avoid(bench.now);
+    bench.companion.neighbours.mark_avoided(bench.now);
     bench.no_position = false;
     bench.until(State::Ready, 20.0);
     bench.start();
     bench.run(0.7);
-    assert!(bench.companion.detours.in_the_way, "{:?}", bench.state());
+    assert!(bench.companion.detours.obstructed, "{:?}", bench.state());
 }
 
 #[test]
@@ -233,10 +249,10 @@ fn a_look_among_many_takes_several_steps_and_finds_what_is_last() {
     }
     bench.run(1.0);
     let mut steps = 0;
-    while bench.companion.detours.look_began.is_none() {
+    while bench.companion.detours.scan_began.is_none() {
         bench.run(0.05);
     }
-    while bench.companion.detours.look_began.is_some() {
+    while bench.companion.detours.scan_began.is_some() {
         bench.run(0.05);
         steps += 1;
     }
@@ -255,12 +271,13 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
         let along_m = (rng.next_u32() % 20) as f32;
         for _ in 0..rng.next_u32() % 9 {
             now = now + Duration::from_millis(1_000 + u64::from(rng.next_u32() % 29_000));
-            detours.miss(along_m, Outlook::Settles, now);
-            assert!(!detours.gives_up(), "that vehicle may yet leave more room");
+            detours.note_failure(along_m, RetryOutlook::Settles, now);
+            assert!(!detours.has_given_up(), "that vehicle may yet leave more room");
         }
-        let (mut asked, outlook) = (0, if rng.next_u32() % 2 == 0 { Outlook::Open } else { Outlook::Closed });
-        while !detours.gives_up() {
-            detours.miss(along_m, outlook, now);
+        let (mut asked, outlook) =
+            (0, if rng.next_u32() % 2 == 0 { RetryOutlook::Open } else { RetryOutlook::Closed });
+        while !detours.has_given_up() {
+            detours.note_failure(along_m, outlook, now);
             asked += 1;
         }
         assert!((1..=MAX_DETOUR_SEARCHES).contains(&asked), "{asked}");

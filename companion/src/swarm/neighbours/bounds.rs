@@ -71,8 +71,8 @@ pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
 pub(super) const LEVEL_M: f32 = 1.0;
 /// Position error of a vehicle whose own knowledge of its place is old, metres.
 pub(super) const VAGUE_POSITION_M: f32 = 0.5;
-/// Distance beside its path at which a vehicle may come down unheard, beyond the stray that counts beside a vehicle on the
-/// ground, metres: it leads its landing as at its goal, so it is kept off as the schedule keeps others off landed vehicles in
+/// Distance beside its path at which a vehicle may come down unheard, beyond the deviation that counts beside a vehicle on the
+/// ground, metres: it leads its landing as at its goal, so it is kept clear as the schedule keeps others off landed vehicles in
 /// announced gusts of 3 m/s.
 pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
 /// Stray of two vehicles in the air together, one of which hovers, metres.
@@ -86,7 +86,7 @@ pub(super) const MAX_STRANGERS: usize = 4;
 pub(super) const STRANGER_LIFETIME: Duration = Duration::from_secs(60);
 /// Rank of a stranger: behind every vehicle of the roster.
 pub(super) const STRANGER_RANK: u16 = u16::MAX;
-/// Time of standing after which a vehicle is not about to go on.
+/// Time of standing after which a vehicle is not about to continue.
 pub(super) const STANDS_AFTER: Duration = Duration::from_secs(5);
 /// Greatest delay of a message, seconds: progress is believed as if this much later, since messages
 /// come up to a second late, and then at once.

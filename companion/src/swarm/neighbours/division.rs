@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::config::Ground;
-use crate::link::roster::{MAX_ENTRIES, Roster};
-use crate::swarm::fleet::{Hearing, LEASE_HEARD_WITHIN, Limits, Own};
+use crate::link::roster::{MAX_ENTRIES, RosterReport};
+use crate::swarm::fleet::{FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport};
 
 /// Time for which a vehicle's report of its plan counts.
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
@@ -12,10 +12,11 @@ impl<const V: usize> Neighbours<V> {
     /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds;
     /// `ground` is what is not level. By `stray_m` two may be nearer than they believe.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
-        (self.ground, self.stray_m) = (ground, stray_m);
+        (self.ground, self.pair_position_error_m) = (ground, stray_m);
         self.down = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
-        self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));
+        self.fleet =
+            Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, FleetTimeouts::of_flight(down)));
     }
 
     /// The fleet; none where the mission is no area.
@@ -29,42 +30,44 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Updates which vehicles of the fleet are heard.
-    pub(crate) fn step_fleet(&mut self, own: &Own, now: Instant) {
+    pub(crate) fn step_fleet(&mut self, own: &OwnReport, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
         let roster = &self.contacts[..self.roster];
-        let lately = |c: &&Contact| c.belongs_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
-        let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.hears);
+        let lately = |c: &&NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
+        let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.heard_bits);
         let own_rank = usize::from(self.own_rank);
         fleet.step(now, own, |rank| {
             let contact = rank.checked_sub(usize::from(rank > own_rank)).and_then(|at| roster.get(at));
             let bit = 1u32.checked_shl(rank as u32).unwrap_or(0);
-            contact.filter(|_| rank != own_rank).map_or(Hearing::default(), |contact| Hearing {
-                direct_at: contact.belongs_at,
-                hears_us: contact.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
-                by_others: by_others & bit != 0,
+            contact.filter(|_| rank != own_rank).map_or(MemberReception::default(), |contact| {
+                MemberReception {
+                    heard_at: contact.intent_at,
+                    hears_us: contact.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
+                    heard_by_others: by_others & bit != 0,
+                }
             })
         });
     }
 
     /// Whether one that follows another plan of this mission was heard lately.
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
-        let lately = |c: &Contact| c.belongs_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
+        let lately = |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
-    /// Takes in what another vehicle reports of all. `waits`: this one has not been started.
-    pub(crate) fn handle_roster(&mut self, id: u8, roster: &Roster, waits: bool) {
-        let rank = self.in_roster(id).map(|at| usize::from(self.contacts[at].rank));
+    /// Handles what another vehicle reports of all. `waits`: this one has not been started.
+    pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, waits: bool) {
+        let rank = self.roster_index(id).map(|at| usize::from(self.contacts[at].rank));
         if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {
-            fleet.handle(rank, roster, waits);
+            fleet.handle_roster(rank, roster, waits);
         }
     }
 
     /// The next of the reports of all vehicles.
-    pub(crate) fn roster(&mut self) -> Option<Roster> {
+    pub(crate) fn roster(&mut self) -> Option<RosterReport> {
         let fleet = self.fleet.as_ref()?;
-        let first = if self.roster_next < fleet.count_all() { self.roster_next } else { 0 };
+        let first = if self.roster_next < fleet.vehicle_count() { self.roster_next } else { 0 };
         self.roster_next = first + MAX_ENTRIES;
-        Some(fleet.message(first))
+        Some(fleet.roster_message(first))
     }
 }

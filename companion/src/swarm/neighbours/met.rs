@@ -1,20 +1,20 @@
 //! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it is too far away to matter.
 
 use planner_core::Point;
-use planner_core::safety::{Bounds, Heard, Joint, OFF_REPORTED_PATH_M};
+use planner_core::safety::{MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, PlaceOnPoints};
 
 use super::*;
 
 /// A neighbour as the safety filter sees it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Met<'a> {
+pub(crate) struct FilterNeighbour<'a> {
     pub(crate) id: u8,
     /// Whether the roster does not name it.
     pub(crate) stranger: bool,
     /// Whether it follows the shared plan.
     pub(crate) on_plan: bool,
     /// Whether it does so out of range, as others report.
-    pub(crate) far: bool,
+    pub(crate) out_of_range: bool,
     /// Whether it knows that plan.
     pub(crate) shares_plan: bool,
     /// Whether it has stood for a while.
@@ -24,133 +24,135 @@ pub(crate) struct Met<'a> {
     /// Whether it has been silent for so long that it counts as lost.
     pub(crate) lost: bool,
     /// Inputs of the neighbour's set.
-    pub(crate) heard: Heard<'a>,
+    pub(crate) motion: NeighbourMotion<'a>,
     /// Place where the neighbour was last heard, if its set is that of a climb since: it may not
     /// have begun the climb.
-    pub(crate) low: Option<Point>,
+    pub(crate) before_climb: Option<Point>,
 }
 
 /// Inputs of the first comparison of a vehicle with its neighbours.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reach<'a> {
+pub(crate) struct ReachQuery<'a> {
     /// Place of the vehicle.
     pub(crate) place: Point,
     /// Reach of the vehicle's own set, and the greatest distance kept, metres.
     pub(crate) within_m: f32,
     /// Bounds expected of the neighbours.
-    pub(crate) bounds: &'a Bounds,
+    pub(crate) bounds: &'a MotionBounds,
     /// Time of the neighbours' flight that counts as well, seconds.
     pub(crate) ahead_s: f32,
     /// Whether it follows the shared plan: gates keep it apart from those that do.
     pub(crate) on_plan: bool,
-    /// Whether it hears nobody: then those that it does not hear fly on.
-    pub(crate) deaf: bool,
+    /// Whether it hears no other vehicle: then those that it does not hear fly on.
+    pub(crate) hears_nobody: bool,
     /// Whether it lands: then it looks for where those that it does not hear may lie.
     pub(crate) lands: bool,
 }
 
-impl Contact {
+impl NeighbourEntry {
     /// Whether it stays out of reach wherever it can be: what most of them do, seen without making a set of it. Never where
-    /// [`Neighbours::met`] and its reach say otherwise.
+    /// [`Neighbours::filter_neighbour`] and its reach say otherwise.
     #[inline(always)]
-    fn is_beyond(&self, placed_at: Instant, down: Duration, now: Instant, reach: &Reach<'_>) -> bool {
+    fn is_beyond(&self, placed_at: Instant, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> bool {
         let away = self.state.position - reach.place;
         let across_sq = away.x * away.x + away.y * away.y;
         let age = now - placed_at;
         if age > MAX_HEIGHT_AGE {
-            let lies = age >= down && !self.floor_m.is_nan();
+            let lies = age >= down && !self.ground_m.is_nan();
             return self.is_silent_beyond((age, lies), across_sq, now, reach);
         }
-        let heard = Heard {
+        let heard = NeighbourMotion {
             position: self.state.position,
             velocity: self.state.velocity,
             speed_mps: self.speed_mps,
-            age_s: age.secs_f32(),
-            delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.late.delay_s },
+            age_s: age.as_secs_f32(),
+            delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.message_delay.delay_s },
             // The first alone is asked for.
             points: &self.points,
-            joint: self.joint,
+            place_on_points: self.place_on_points,
             extent_m: self.extent_m,
             rests_within_m: 0.0,
-            grounded: self.tells(GROUNDED | LANDED),
+            grounded: self.has_flag(GROUNDED | LANDED),
             column_to_m: None,
         };
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
-        let column = !heard.grounded && (self.column || self.tells(OUT_OF_PLAN) || self.floor_m.is_nan());
+        let column =
+            !heard.grounded && (self.may_come_down || self.has_flag(OUT_OF_PLAN) || self.ground_m.is_nan());
         let above_m = if column { 0.0 } else { away.z };
         across_sq + above_m * above_m >= most_m * most_m
     }
 
     /// The same where its place is old. Seen from above it is where it was or, known by its intents, at the first of its points;
-    /// or as far from there as it can have flown: as long as it may not have noticed that nobody hears it, in a climb to its top
+    /// or as far from there as it can have flown: as long as it may not have noticed that no other vehicle hears it, in a climb to its top
     /// and a little further, and once it counts as dead along its points alone. What lies after so long moves no more.
     fn is_silent_beyond(
         &self,
         (age, lies): (Duration, bool),
         across_sq: f32,
         now: Instant,
-        reach: &Reach<'_>,
+        reach: &ReachQuery<'_>,
     ) -> bool {
-        let delay_s = self.late.delay_s;
+        let delay_s = self.message_delay.delay_s;
         let dead = self.rests_silently(age, now);
         let mut most_m = 0.0;
         let mut reaches = |far_m: f32| most_m = if far_m > most_m { far_m } else { most_m };
-        if reach.deaf || !dead {
+        if reach.hears_nobody || !dead {
             let silent_s = reach.bounds.silent_s;
-            let age_s = if reach.deaf { silent_s } else { age.secs_f32().min(silent_s) };
+            let age_s = if reach.hears_nobody { silent_s } else { age.as_secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
         let flies_on = self.is_leased() && !(reach.on_plan && self.on_plan());
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
-            reaches(self.stretch_m() + self.joint.more_m() + OFF_REPORTED_PATH_M);
+            reaches(self.unheard_distance_m() + self.place_on_points.flown_beyond_m() + OFF_REPORTED_PATH_M);
         }
-        if reach.lands || self.climbs_to().is_some() {
-            reaches(self.rests_m(reach));
+        if reach.lands || self.climb_top_m().is_some() {
+            reaches(self.rest_radius_m(reach));
         }
         let mut away_sq = across_sq;
-        let told = self.belongs_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
+        let told = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| told) {
             away_sq = away_sq.min((first - reach.place).xy().norm_squared());
-            reaches(if self.is_leased() { self.stretch_m() } else { self.extent_m });
+            reaches(if self.is_leased() { self.unheard_distance_m() } else { self.extent_m });
         }
         most_m += reach.within_m;
         away_sq >= most_m * most_m
     }
 
     /// Points that it may have flown along, all of them once it is dead, and no less than the distance to which they lead, metres.
-    fn leads(&self, dead: bool) -> (&[Point], f32) {
+    fn points_flown(&self, dead: bool) -> (&[Point], f32) {
         match dead {
-            true if self.is_leased() => (&self.points, self.stretch_m()),
+            true if self.is_leased() => (&self.points, self.unheard_distance_m()),
             true => (&self.points, self.extent_m),
-            false => (self.near(), self.extent_m),
+            false => (self.points_for_now(), self.extent_m),
         }
     }
 
     /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its points, and is no ball.
-    pub(crate) fn follow_unheard<'a>(&'a self, heard: &mut Heard<'a>, bounds: &Bounds) {
+    pub(crate) fn follow_unheard<'a>(&'a self, heard: &mut NeighbourMotion<'a>, bounds: &MotionBounds) {
         let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
-        let follows = !heard.points.is_empty() && matches!(self.joint, Joint::On { .. });
+        let follows = !heard.points.is_empty() && matches!(self.place_on_points, PlaceOnPoints::On { .. });
         if !follows || heard.age_s <= stopped_s || heard.grounded {
             return;
         }
         let fastest_mps = libm::fmaxf(bounds.speed_max_mps, heard.speed_mps);
         let flown_m = fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
         (heard.age_s, heard.delay_s, heard.speed_mps) = (0.0, 0.0, 0.0);
-        (heard.points, heard.joint, heard.extent_m) = (&self.points, self.joint, f32::INFINITY);
-        heard.rests_within_m = libm::fminf(flown_m, self.stretch_m());
+        (heard.points, heard.place_on_points, heard.extent_m) =
+            (&self.points, self.place_on_points, f32::INFINITY);
+        heard.rests_within_m = libm::fminf(flown_m, self.unheard_distance_m());
     }
 
     /// Greatest distance of the vehicle from where it stopped unheard, metres.
     #[inline(never)]
-    fn rests_m(&self, reach: &Reach<'_>) -> f32 {
-        let rests = Heard {
+    fn rest_radius_m(&self, reach: &ReachQuery<'_>) -> f32 {
+        let rests = NeighbourMotion {
             position: self.state.position,
             velocity: self.state.velocity,
             speed_mps: 0.0,
             age_s: 0.0,
-            delay_s: self.late.delay_s.max(UNHEARD_BEYOND_TOP_S),
+            delay_s: self.message_delay.delay_s.max(UNHEARD_BEYOND_TOP_S),
             points: &[],
-            joint: Joint::Beside,
+            place_on_points: PlaceOnPoints::Beside,
             extent_m: 0.0,
             rests_within_m: 0.0,
             grounded: false,
@@ -161,16 +163,18 @@ impl Contact {
 
     /// Whether it follows the plan out of range, as others report or as it was heard last.
     fn is_out_of_range(&self, now: Instant) -> bool {
-        let silent = !self.tells(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
-        let unheard = silent && self.at_edge && self.on_plan();
-        let flies_on = || self.flies_on() || self.heard_within(now, UNHEARD_WAIT);
-        self.is_far(now) || (unheard && flies_on())
+        let silent = !self.has_flag(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
+        let unheard = silent && self.at_range_edge && self.on_plan();
+        let flies_on = || self.flies_plan_unheard() || self.heard_within(now, UNHEARD_WAIT);
+        self.is_reported_out_of_range(now) || (unheard && flies_on())
     }
 
     /// Whether it counts as dead and rests on its points, its place so old.
     #[inline(never)]
     fn rests_silently(&self, age: Duration, now: Instant) -> bool {
-        age >= LOST_AFTER && !self.points.is_empty() && (self.is_dead(now) || !self.is_far(now))
+        age >= LOST_AFTER
+            && !self.points.is_empty()
+            && (self.is_dead(now) || !self.is_reported_out_of_range(now))
     }
 }
 
@@ -180,46 +184,54 @@ impl<const V: usize> Neighbours<V> {
         &self,
         from: usize,
         now: Instant,
-        reach: &Reach<'_>,
-    ) -> Option<(usize, &Contact)> {
-        let within = |c: &Contact| c.position_at.is_some_and(|at| !c.is_beyond(at, self.down, now, reach));
+        reach: &ReachQuery<'_>,
+    ) -> Option<(usize, &NeighbourEntry)> {
+        let within =
+            |c: &NeighbourEntry| c.position_at.is_some_and(|at| !c.is_beyond(at, self.down, now, reach));
         self.contacts.iter().enumerate().skip(from).find(|(_, contact)| within(contact))
     }
 
     /// A contact as the safety filter sees it; one that was never placed as if it had been at the start.
     #[inline(always)]
-    pub(crate) fn met<'a>(&'a self, contact: &'a Contact, now: Instant) -> Met<'a> {
+    pub(crate) fn filter_neighbour<'a>(
+        &'a self,
+        contact: &'a NeighbourEntry,
+        now: Instant,
+    ) -> FilterNeighbour<'a> {
         let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
-        let placed_s = placed_for.secs_f32();
+        let placed_s = placed_for.as_secs_f32();
         // Most are heard: then nothing of what follows is so.
         let silent = placed_for >= MAX_HEIGHT_AGE;
         // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
-        let told_at = contact
-            .belongs_at
-            .filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
-        let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
+        let told_at =
+            contact.intent_at.filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
+        let told_s = told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let dead = silent && contact.rests_silently(placed_for, now);
-        let down = silent && (placed_for >= self.down || (contact.tells(GROUNDED) && contact.is_vague()));
-        let lies = down && (dead || contact.tells(GROUNDED)) && !contact.floor_m.is_nan();
+        let down = silent
+            && (placed_for >= self.down || (contact.has_flag(GROUNDED) && contact.is_position_imprecise()));
+        let lies = down && (dead || contact.has_flag(GROUNDED)) && !contact.ground_m.is_nan();
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
-        let top = if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climbs_to() } else { None };
-        let mut highest_m = contact.floor_m;
+        let top = if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
+        let mut highest_m = contact.ground_m;
         if lies {
-            highest_m = self.field().map_or(contact.floor_m, |field| contact.lies_at_most_m(field, &here));
+            highest_m = self
+                .area_ground()
+                .map_or(contact.ground_m, |field| contact.max_ground_height_m(field, &here));
             here.z = libm::fminf(highest_m, here.z);
         } else if let Some(top) = top {
             here.z = top;
         }
-        let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
-        let down = contact.column || contact.tells(OUT_OF_PLAN) || dead || contact.floor_m.is_nan();
-        let floor_m = if contact.floor_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.floor_m };
+        let grounded = (contact.has_flag(GROUNDED | LANDED) && top.is_none()) || lies;
+        let down =
+            contact.may_come_down || contact.has_flag(OUT_OF_PLAN) || dead || contact.ground_m.is_nan();
+        let floor_m = if contact.ground_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.ground_m };
         let rests = dead || top.is_some();
-        let (points, extent_m) = contact.leads(dead);
-        let heard = Heard {
+        let (points, extent_m) = contact.points_flown(dead);
+        let heard = NeighbourMotion {
             position: here,
             velocity: contact.state.velocity,
             speed_mps: if rests { 0.0 } else { contact.speed_mps },
@@ -228,26 +240,30 @@ impl<const V: usize> Neighbours<V> {
             delay_s: match (dead, top) {
                 (false, Some(_)) => UNHEARD_BEYOND_TOP_S,
                 (true, _) => 0.0,
-                _ => contact.late.delay_s,
+                _ => contact.message_delay.delay_s,
             },
             points: if top.is_some() || lies { &[] } else { points },
-            joint: if by_intent || lies || top.is_some() { Joint::Unknown } else { contact.joint },
+            place_on_points: if by_intent || lies || top.is_some() {
+                PlaceOnPoints::Unknown
+            } else {
+                contact.place_on_points
+            },
             extent_m,
-            rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
+            rests_within_m: if dead && top.is_none() { contact.unheard_distance_m() } else { 0.0 },
             grounded,
             column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),
         };
-        Met {
+        FilterNeighbour {
             id: contact.id,
             stranger: contact.rank == STRANGER_RANK,
             on_plan: contact.on_plan(),
-            far: silent && contact.is_out_of_range(now),
+            out_of_range: silent && contact.is_out_of_range(now),
             shares_plan: contact.shares_plan,
             lost: dead,
-            waits: contact.tells(WAITING) && contact.heard_within(now, HEARD_WITHIN),
+            waits: contact.has_flag(WAITING) && contact.heard_within(now, HEARD_WITHIN),
             stands: grounded || (now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S),
-            heard,
-            low: top.map(|_| contact.state.position),
+            motion: heard,
+            before_climb: top.map(|_| contact.state.position),
         }
     }
 }

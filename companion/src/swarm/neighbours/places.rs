@@ -1,9 +1,9 @@
-//! Where others are and may come to be, as the search for a way around asks for it.
+//! Where others are and may come to be, as the search for a detour asks for it.
 
 use planner_core::Point;
-use planner_core::detour::{KeepOff, Nature};
+use planner_core::detour::{KeepOutZone, ZoneKind};
 
-use super::contact::{Contact, Field};
+use super::contact::{AreaGround, NeighbourEntry};
 use super::{
     LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M,
 };
@@ -12,83 +12,103 @@ use crate::time::Instant;
 impl<const V: usize> Neighbours<V> {
     /// Distance by which vehicles in the air, off the plan, may be nearer than they believe,
     /// metres: 0 where walls leave no room for it.
-    pub(crate) fn stray_m(&self) -> f32 {
-        self.stray_m
+    pub(crate) fn pair_position_error_m(&self) -> f32 {
+        self.pair_position_error_m
     }
 
     /// The ground, where the mission is an area.
-    pub(super) fn field(&self) -> Option<Field> {
-        self.fleet.is_some().then_some(Field { ground: self.ground, down: self.down, stray_m: self.stray_m })
+    pub(super) fn area_ground(&self) -> Option<AreaGround> {
+        self.fleet.is_some().then_some(AreaGround {
+            ground: self.ground,
+            down: self.down,
+            pair_position_error_m: self.pair_position_error_m,
+        })
     }
 
-    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears nobody has lost its own radio
-    /// rather: the others fly on, nobody knows where.
+    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears no other vehicle
+    /// has lost its own radio rather: the others fly on, nobody knows where.
     #[inline(never)]
-    fn upto_m(&self, contact: &Contact, now: Instant) -> f32 {
+    fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !contact.heard_within(now, LANDS_UNHEARD);
-        let far = lands && contact.may_fly_on(now) && !self.is_deaf(now);
-        if far { contact.stretch_m() } else { contact.stops_m() }
+        let far = lands && contact.may_fly_on(now) && !self.hears_nobody(now);
+        if far { contact.unheard_distance_m() } else { contact.unheard_stop_m() }
     }
 
     /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
     /// detour says so: `apart_m` away from it is far enough.
-    pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let avoided = |c: &Contact| (c.avoided - c.state.position).norm() < VAGUE_POSITION_M;
-        let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
+    pub fn for_each_zone_of(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
+        let avoided = |c: &NeighbourEntry| (c.avoided_at - c.state.position).norm() < VAGUE_POSITION_M;
+        let unknown = |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.obstacles(now, [apart_m, self.upto_m(contact, now)], self.field(), &mut tell);
+            contact.keep_out_zones(
+                now,
+                [apart_m, self.unheard_progress_m(contact, now)],
+                self.area_ground(),
+                &mut tell,
+            );
         }
     }
 
-    /// Every vehicle that was out at `at` was looked at, and none blocks the path.
-    pub fn found_clear(&mut self, at: Instant) {
+    /// Notes that every vehicle out of the plan at time `at` was checked and none blocks the path.
+    pub fn mark_path_clear(&mut self, at: Instant) {
         self.clear_at = at;
     }
 
-    /// Whether that was found at `at` or later.
-    pub fn is_clear_since(&self, at: Instant) -> bool {
+    /// Whether the path was found clear at `at` or later.
+    pub fn is_path_clear_since(&self, at: Instant) -> bool {
         self.clear_at >= at
     }
 
     /// Places of the other vehicles of the roster while they stand, those out of the plan among
     /// them: `apart_m` away from one in the air is far enough, and `lying_m` from one that lies,
-    /// and no longer strays.
-    pub fn places(&self, now: Instant, [apart_m, lying_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
+    /// and no longer deviates.
+    pub fn for_each_place(
+        &self,
+        now: Instant,
+        [apart_m, lying_m]: [f32; 2],
+        mut tell: impl FnMut(KeepOutZone),
+    ) {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
         placed.for_each(|c| {
-            let far_m = if c.lies(now, self.down) { lying_m } else { apart_m };
-            c.obstacles(now, [far_m, self.upto_m(c, now)], self.field(), &mut tell);
+            let far_m = if c.is_on_ground(now, self.down) { lying_m } else { apart_m };
+            c.keep_out_zones(now, [far_m, self.unheard_progress_m(c, now)], self.area_ground(), &mut tell);
         });
     }
 
     /// Columns in which vehicles that land without looking may come nearer than `apart_m`.
-    pub fn landing_columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    pub fn for_each_landing_column(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
         (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
     }
 
     /// The columns of contact `i`.
-    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
+    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
+        let landing = |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_unseen(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
-            contact.columns(now, [apart_m, self.upto_m(contact, now)], &mut tell);
+            contact.landing_columns(now, [apart_m, self.unheard_progress_m(contact, now)], &mut tell);
         }
     }
 
     /// Zones in which a landing would end within `apart_m` of a vehicle that is there: a path may
     /// lead over them, and not end there. Over an area a silent one may come down anywhere on its way, or at
     /// its pad: that bars places at `height_m`.
-    pub fn lands_on(&self, now: Instant, [apart_m, height_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
+    pub fn for_each_landing_zone(
+        &self,
+        now: Instant,
+        [apart_m, height_m]: [f32; 2],
+        mut tell: impl FnMut(KeepOutZone),
+    ) {
         for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
             let mut zone = |from: Point, to: Point, radius_m: f32| {
-                tell(KeepOff { from, to, radius_m, nature: Nature::Landing });
+                tell(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
             };
             let from = contact.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
             if contact.may_fly_on(now) {
                 // A place to land at is sought at one height, and as far away as the landing keeps.
                 let level = |at: Point| Point::new(at.x, at.y, height_m);
-                let mut bar = |a: Point, b: Point| zone(level(a), level(b), apart_m + self.stray_m);
-                contact.legs(contact.stretch_m(), &mut |[at, next], _| bar(at, next));
+                let mut bar =
+                    |a: Point, b: Point| zone(level(a), level(b), apart_m + self.pair_position_error_m);
+                contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], _| bar(at, next));
                 contact.pad.into_iter().for_each(|pad| bar(pad, pad));
             }
         }
@@ -96,11 +116,11 @@ impl<const V: usize> Neighbours<V> {
 
     /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as
     /// near beside it.
-    pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    pub fn column_above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;
             let to = from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M);
-            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Solid });
+            tell(KeepOutZone { from, to, radius_m: apart_m, kind: ZoneKind::Static });
         }
     }
 
@@ -115,7 +135,7 @@ impl<const V: usize> Neighbours<V> {
             let high_m = libm::fmaxf(a.z, b.z);
             below |= (away - leg * share).norm_squared() < apart_m * apart_m && high_m > floor_m - apart_m;
         };
-        contact.legs(contact.stretch_m(), &mut |[at, next], [leg_m, flown_m]| {
+        contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
             // Elsewhere than over an area to the last of the places that a reroute keeps off.
             let share = libm::floorf(flown_m / UNHEARD_STRETCH_STEP_M) * UNHEARD_STRETCH_STEP_M / leg_m;
             near(at, if flown_m < leg_m { at + (next - at) * share } else { next });
@@ -129,16 +149,16 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
-    /// A way around what rests now was planned.
-    pub fn avoid(&mut self, now: Instant) {
+    /// Marks the vehicles that now rest: a detour around them was planned.
+    pub fn mark_avoided(&mut self, now: Instant) {
         for contact in &mut self.contacts {
-            contact.avoided = if contact.is_out(now) { contact.state.position } else { NO_PLACE };
+            contact.avoided_at = if contact.is_out_of_plan(now) { contact.state.position } else { NO_PLACE };
         }
     }
 
     /// Vehicles that a detour led around count again.
     pub(crate) fn forget_avoided(&mut self) {
-        self.contacts.iter_mut().for_each(|contact| contact.avoided = NO_PLACE);
+        self.contacts.iter_mut().for_each(|contact| contact.avoided_at = NO_PLACE);
     }
 }
 

@@ -24,7 +24,7 @@
 
 use heapless::Vec;
 
-use super::contact::Contact;
+use super::contact::NeighbourEntry;
 use super::{HEARD_WITHIN, Neighbours};
 use crate::time::{Duration, Instant};
 
@@ -52,7 +52,7 @@ const AGE_TICK_US: u64 = 100_000;
 
 /// Progress of the vehicle of a rank, and the age of that progress in 0.1 s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Item {
+struct RelayedProgress {
     rank: u8,
     age: u8,
     progress_m: f32,
@@ -65,7 +65,7 @@ struct Item {
 pub(crate) struct Relay {
     pub(crate) mission_crc: u32,
     pub(crate) plan_crc: u32,
-    items: Vec<Item, MAX_RELAYED>,
+    items: Vec<RelayedProgress, MAX_RELAYED>,
 }
 
 impl Relay {
@@ -102,7 +102,7 @@ impl Relay {
         for item in body[HEADER_LEN..].get(..ITEM_LEN * usize::from(body[2]))?.chunks_exact(ITEM_LEN) {
             let progress_m = f32::from_le_bytes([item[2], item[3], item[4], item[5]]);
             let [rank, age, .., clear, clear_in_s] = *item else { return None };
-            let item = Item { rank, age, progress_m, clear, clear_in_s };
+            let item = RelayedProgress { rank, age, progress_m, clear, clear_in_s };
             // Room for all that fits into a payload.
             relay.items.push(item).ok().filter(|()| progress_m.is_finite())?;
         }
@@ -110,12 +110,12 @@ impl Relay {
     }
 }
 
-impl Contact {
+impl NeighbourEntry {
     /// Progress of the vehicle on the shared plan, metres: as it reports it, or as others do while
     /// it is not heard. None if it was last heard off the plan.
     pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
-        if self.heard_within(now, HEARD_DIRECTLY_WITHIN) || (own_m.is_none() && self.belongs_at.is_some()) {
+        if self.heard_within(now, HEARD_DIRECTLY_WITHIN) || (own_m.is_none() && self.intent_at.is_some()) {
             return own_m;
         }
         match (own_m, self.relayed_m) {
@@ -131,37 +131,44 @@ impl Contact {
 
     /// Whether it is out of range, and was lately reported to follow the plan.
     #[inline(never)]
-    pub(super) fn is_far(&self, now: Instant) -> bool {
+    pub(super) fn is_reported_out_of_range(&self, now: Instant) -> bool {
         self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME)
             && !self.heard_within(now, OUT_OF_RANGE_AFTER)
             && self.progress_m(now).is_some()
     }
 
     /// The relayed report of this vehicle: none off the plan.
-    fn item(&self, now: Instant) -> Option<Item> {
+    fn relayed_progress(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.progress_m(now)?;
-        let age = (now - self.belongs_at.max(self.relayed_at)?).micros().div_ceil(AGE_TICK_US);
+        let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
         // The difference is not below zero, and 0 where it is no number.
-        let clear = (self.clear_m - progress_m) as u8;
+        let clear = (self.gates_open_up_to_m - progress_m) as u8;
         let age = age.min(u64::from(u8::MAX)) as u8;
-        Some(Item { rank: self.rank as u8, age, progress_m, clear, clear_in_s: self.clear_in_s })
+        Some(RelayedProgress {
+            rank: self.rank as u8,
+            age,
+            progress_m,
+            clear,
+            clear_in_s: self.gates_open_in_s,
+        })
     }
 }
 
 impl<const V: usize> Neighbours<V> {
     /// Reports of vehicles that neighbours do not hear themselves, beginning where the last message
     /// was full.
-    pub(crate) fn relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
+    pub(crate) fn next_relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));
         // A report that one neighbour misses is sent to all.
-        let missed = |c: &Contact| speaking().any(|by| by.rank != c.rank && by.hears & (1 << c.rank) == 0);
+        let missed =
+            |c: &NeighbourEntry| speaking().any(|by| by.rank != c.rank && by.heard_bits & (1 << c.rank) == 0);
         let first = roster.partition_point(|c| c.rank < self.relay_next);
         let mut next = self.relay_next;
         let turn = roster[first..].iter().chain(&roster[..first]);
         for contact in turn.filter(|c| c.rank < 32 && missed(c)) {
-            let Some(item) = contact.item(now) else { continue };
+            let Some(item) = contact.relayed_progress(now) else { continue };
             if relay.items.push(item).is_err() {
                 next = contact.rank;
                 break;
@@ -173,7 +180,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Takes what a vehicle of the roster passes on of the plan that is ours.
     pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
-        if self.member(from, now).is_none() {
+        if self.roster_rank(from, now).is_none() {
             return;
         }
         for item in &relay.items {
@@ -186,16 +193,16 @@ impl<const V: usize> Neighbours<V> {
             if item.progress_m > known_m {
                 // Progress that others report of a vehicle is believed no faster than progress that
                 // the vehicle reports itself.
-                let believed_m = contact.believed_m(item.progress_m, fastest_mps, now);
+                let believed_m = contact.plausible_progress_m(item.progress_m, fastest_mps, now);
                 contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
                 // Gates that are open stay open.
                 let clear_m = believed_m + f32::from(item.clear);
-                if clear_m > contact.clear_m {
-                    (contact.clear_m, contact.clear_in_s) = (clear_m, item.clear_in_s);
+                if clear_m > contact.gates_open_up_to_m {
+                    (contact.gates_open_up_to_m, contact.gates_open_in_s) = (clear_m, item.clear_in_s);
                 }
             }
             let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US;
-            let then = Instant::from_micros(now.micros().saturating_sub(age_us));
+            let then = Instant::from_micros(now.as_micros().saturating_sub(age_us));
             contact.relayed_at = contact.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
         }
     }

@@ -1,6 +1,6 @@
 extern crate std;
 
-use planner_core::safety::{Bounds, Braking};
+use planner_core::safety::{Braking, MotionBounds};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -33,8 +33,8 @@ pub(super) fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
         mission_crc,
         plan_crc,
         progress_m: 4.0,
-        clear_m: -1e6,
-        heard: 2,
+        gates_open_up_to_m: -1e6,
+        heard_bits: 2,
         ..Intent::default()
     }
 }
@@ -43,7 +43,7 @@ pub(super) fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
 pub(super) fn joined(at_ms: u64) -> Neighbours<4> {
     let mut table = table();
     for system_id in [3, 9] {
-        let told = Intent { system_id, heard: 0, ..intent(0, 1, 2) };
+        let told = Intent { system_id, heard_bits: 0, ..intent(0, 1, 2) };
         table.handle_intent(Instant::from_millis(at_ms), 1, &told, 1, None);
     }
     table
@@ -52,9 +52,9 @@ pub(super) fn joined(at_ms: u64) -> Neighbours<4> {
 #[test]
 fn a_position_reaches_the_mission_frame_and_ages() {
     let mut table = joined(0);
-    assert!(table.at(Instant::ZERO).is_empty());
+    assert!(table.states_at(Instant::ZERO).is_empty());
     table.handle_position(Instant::from_millis(100), &ORIGIN, 9, &place(50, 1000));
-    let heard = table.at(Instant::from_millis(600))[0];
+    let heard = table.states_at(Instant::from_millis(600))[0];
     assert_eq!((heard.id, heard.rank), (9, 2));
     // A ten-thousandth of a degree of latitude is 11.1 m.
     assert!((heard.position - Point::new(0.0, 11.1, 2.5)).norm() < 0.02, "{:?}", heard.position);
@@ -78,10 +78,10 @@ fn late_and_repeated_positions_change_nothing_but_a_restart_does() {
     table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(20_000, 1000));
     for late in [20_000, 19_900, 10_001] {
         table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(late, 0));
-        assert!(table.at(Instant::from_millis(500))[0].age_s > 0.4, "{late}");
+        assert!(table.states_at(Instant::from_millis(500))[0].age_s > 0.4, "{late}");
     }
     table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(100, 0));
-    assert_eq!(table.at(Instant::from_millis(500))[0].age_s, 0.0);
+    assert_eq!(table.states_at(Instant::from_millis(500))[0].age_s, 0.0);
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn progress_counts_only_on_our_mission_and_plan() {
         (ON_PLAN, 1, 2, None, None),
     ] {
         table.handle_intent(Instant::ZERO, 1, &intent(flags, mission, plan), 1, own_plan);
-        assert_eq!(table.at(Instant::ZERO)[0].progress_m, progress);
+        assert_eq!(table.states_at(Instant::ZERO)[0].progress_m, progress);
     }
 }
 
@@ -109,12 +109,12 @@ fn strangers_rank_last_are_capped_and_expire() {
     for id in [200, 201, 202] {
         table.handle_position(at(0), &ORIGIN, id, &place(0, 0));
     }
-    assert_eq!((table.at(at(0)).len(), table.dropped()), (2, 1));
-    assert!(table.at(at(0)).iter().all(|n| n.rank == u16::MAX));
+    assert_eq!((table.states_at(at(0)).len(), table.dropped_count()), (2, 1));
+    assert!(table.states_at(at(0)).iter().all(|n| n.rank == u16::MAX));
     table.handle_position(at(59_000), &ORIGIN, 201, &place(59_000, 0));
     let ids = |table: &mut Neighbours<4>, ms| {
         let mut ids = Vec::<u8, 4>::new();
-        table.at(at(ms)).iter().for_each(|n| ids.push(n.id).unwrap());
+        table.states_at(at(ms)).iter().for_each(|n| ids.push(n.id).unwrap());
         ids
     };
     assert_eq!(ids(&mut table, 59_900), [200, 201]);
@@ -130,14 +130,14 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
     let mut table = table();
     table.handle_intent(at(0), 1, &intent(OUT_OF_PLAN | BLOCKED, 7, 8), 1, None);
     table.handle_position(at(0), &ORIGIN, 9, &place(0, 0));
-    assert_eq!(table.at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
-    assert_eq!((table.heard_bits(at(0)), table.blocked_before(200)), (0, 0), "and its flags do not count");
+    assert_eq!(table.states_at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
+    assert_eq!((table.heard_bits(at(0)), table.blocked_count_before(200)), (0, 0), "nor do its flags");
     table.handle_intent(at(100), 1, &intent(0, 1, 2), 1, None);
-    assert!(table.at(at(100)).is_empty(), "it is no stranger any more");
+    assert!(table.states_at(at(100)).is_empty(), "it is no stranger any more");
     table.handle_position(at(200), &ORIGIN, 9, &place(200, 0));
-    assert_eq!(table.at(at(200))[0].rank, 2);
+    assert_eq!(table.states_at(at(200))[0].rank, 2);
     table.handle_position(at(5100), &ORIGIN, 9, &place(5100, 5000));
-    let (rostered, stranger) = (table.at(at(5100))[0], table.at(at(5100))[1]);
+    let (rostered, stranger) = (table.states_at(at(5100))[0], table.states_at(at(5100))[1]);
     assert_eq!((rostered.rank, stranger.rank), (2, u16::MAX), "its mission was not heard for 5 s");
     assert!(rostered.position.y < 1.0 && stranger.position.y > 50.0);
 }
@@ -165,12 +165,12 @@ proptest::proptest! {
                 let told = Intent { system_id: id, ..intent(flags, mission, 2) };
                 table.handle_intent(at(now), 1, &told, 1, Some(2));
             }
-            let heard = table.at(at(now));
+            let heard = table.states_at(at(now));
             proptest::prop_assert!(heard.len() <= 4);
-            let own = |id: u8| heard.iter().find(|n| n.id == id).map(|n| (n.rank, n.position.y > 11.0, n.out));
+            let own = |id: u8| heard.iter().find(|n| n.id == id).map(|n| (n.rank, n.position.y > 11.0, n.out_of_plan));
             proptest::prop_assert_eq!((own(3), own(9)), (Some((0, true, false)), Some((2, true, false))));
-            proptest::prop_assert_eq!(table.blocked_before(255), 0);
-            proptest::prop_assert_eq!(table.silence(at(now), at(0)), Duration::from_millis(now));
+            proptest::prop_assert_eq!(table.blocked_count_before(255), 0);
+            proptest::prop_assert_eq!(table.silence_duration(at(now), at(0)), Duration::from_millis(now));
         }
     }
 }
@@ -179,41 +179,41 @@ proptest::proptest! {
 fn silence_is_that_of_those_who_fly() {
     let mut table = table();
     let at = Instant::from_millis;
-    assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(7000), "never heard");
-    table.handle_intent(at(5000), 1, &Intent { heard: 0, ..intent(0, 1, 2) }, 1, None);
-    assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(7000), "it does not hear us");
+    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "never heard");
+    table.handle_intent(at(5000), 1, &Intent { heard_bits: 0, ..intent(0, 1, 2) }, 1, None);
+    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "unheard");
     table.handle_intent(at(5000), 1, &intent(0, 1, 2), 1, None);
-    assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(4000));
+    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(4000));
     assert!(table.linked_within(at(5500), Duration::from_millis(1000)));
     assert!(!table.linked_within(at(6500), Duration::from_millis(1000)));
     table.handle_intent(at(5000), 1, &intent(LANDED, 1, 2), 1, None);
     table.handle_intent(at(5000), 1, &Intent { system_id: 3, ..intent(LANDED, 1, 2) }, 1, None);
-    assert_eq!(table.silence(at(9000), at(2000)), Duration::default(), "all have landed");
+    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::default(), "all have landed");
 }
 
 #[test]
 fn who_is_out_opens_gates_only_after_it_was_looked_at() {
     let at = Instant::from_millis;
     let mut table = table();
-    let out = |table: &mut Neighbours<4>, now: Instant| table.at(now)[0].out;
+    let out = |table: &mut Neighbours<4>, now: Instant| table.states_at(now)[0].out_of_plan;
     table.handle_intent(at(1000), 1, &intent(0, 7, 8), 7, None);
     table.handle_position(at(1000), &ORIGIN, 9, &place(50, 1000));
     table.handle_intent(at(1000), 1, &intent(OUT_OF_PLAN, 7, 8), 7, None);
     assert!(!out(&mut table, at(1100)), "nobody has looked");
-    table.found_clear(at(900));
+    table.mark_path_clear(at(900));
     assert!(!out(&mut table, at(1200)), "it went out while somebody looked");
-    table.found_clear(at(1000));
+    table.mark_path_clear(at(1000));
     assert!(out(&mut table, at(1300)));
     table.forget_plan();
     assert!(!out(&mut table, at(1400)), "another plan, another look");
-    table.found_clear(at(1400));
+    table.mark_path_clear(at(1400));
     table.handle_intent(at(1500), 1, &intent(0, 7, 8), 7, None);
     assert!(!out(&mut table, at(1600)), "it is not out any more");
     // Silent from now on: dead later, but nobody counts on that before the next look.
     let dead = at(1500) + LOST_AFTER;
-    assert!(!out(&mut table, dead) && !table.at(dead)[0].grounded);
-    table.found_clear(dead);
-    assert!(out(&mut table, dead) && table.at(dead)[0].grounded);
+    assert!(!out(&mut table, dead) && !table.states_at(dead)[0].grounded);
+    table.mark_path_clear(dead);
+    assert!(out(&mut table, dead) && table.states_at(dead)[0].grounded);
 }
 
 proptest::proptest! {
@@ -243,7 +243,7 @@ proptest::proptest! {
             let believed_m = place_of(&lying).unwrap();
             proptest::prop_assert!(believed_m <= reported_m);
             if let Some((before_m, at)) = last {
-                let most_m = before_m + 2.0 * (now - at).secs_f32() + 2.0 * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M + 1e-3;
+                let most_m = before_m + 2.0 * (now - at).as_secs_f32() + 2.0 * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M + 1e-3;
                 proptest::prop_assert!(believed_m <= most_m, "{believed_m} m after {before_m} m");
             }
             last = Some((believed_m, now));
@@ -260,12 +260,12 @@ proptest::proptest! {
 #[test]
 fn deaf_is_who_hears_none_of_those_there_are() {
     let at = |seconds: u64| Instant::from_millis(seconds * 1000);
-    assert!(!Neighbours::<4>::new(&[], 1, 2.0).is_deaf(at(100)), "alone there is nobody to hear");
+    assert!(!Neighbours::<4>::new(&[], 1, 2.0).hears_nobody(at(100)), "alone there is nobody to hear");
     let roster = [1, 2, 9].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
     let mut table = Neighbours::<4>::new(&roster, 1, 2.0);
     table.handle_intent(at(10), 0, &intent(0, 1, 2), 1, None);
-    assert!(!table.is_deaf(at(12)), "one is heard");
-    assert!(table.is_deaf(at(14)));
+    assert!(!table.hears_nobody(at(12)), "one is heard");
+    assert!(table.hears_nobody(at(14)));
 }
 
 /// A number from low to high.
@@ -276,7 +276,7 @@ pub(super) fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
 #[test]
 fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
     let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-    let bounds = Bounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
+    let bounds = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
     let (mut beyond, mut reached, mut missed) = (0, 0, 0);
     for seed in 0..20_000 {
         let rng = &mut Pcg32::seed_from_u64(seed);
@@ -289,20 +289,21 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         contact.state.velocity = near(rng, 2.0);
         contact.speed_mps = contact.state.velocity.norm();
         contact.flags = rng.next_u32() as u8;
-        contact.column = rng.next_u32().is_multiple_of(2);
-        contact.floor_m = [f32::NAN, -3.0][rng.next_u32() as usize % 2];
+        contact.may_come_down = rng.next_u32().is_multiple_of(2);
+        contact.ground_m = [f32::NAN, -3.0][rng.next_u32() as usize % 2];
         contact.state.progress_m = [None, Some(1.0)][rng.next_u32() as usize % 2];
-        contact.late.delay_s = uniform(rng, 0.0, 1.0);
+        contact.message_delay.delay_s = uniform(rng, 0.0, 1.0);
         let beside_m = [0.3, 3.0][rng.next_u32() as usize % 2];
         let from = contact.state.position + near(rng, beside_m);
         contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
-        contact.way_m = [0.0, -1.0][rng.next_u32() as usize % 2];
-        contact.beyond = (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
+        contact.unheard_way_m = [0.0, -1.0][rng.next_u32() as usize % 2];
+        contact.first_unheard_point =
+            (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
         let first = contact.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
-        contact.extent_m = contact.near().iter().map(extent_m).fold(0.0, f32::max);
+        contact.extent_m = contact.points_for_now().iter().map(extent_m).fold(0.0, f32::max);
         if contact.is_leased() {
-            contact.join();
+            contact.update_place_on_points();
         }
         let now = Instant::from_millis(200_000);
         let ages_ms = [100, 900, 1500, 5000, 46_000, 80_000];
@@ -312,42 +313,42 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         };
         let placed_at = age(rng);
         contact.position_at = Some(placed_at);
-        contact.belongs_at = Some(age(rng));
-        contact.heard_at = contact.position_at.max(contact.belongs_at);
+        contact.intent_at = Some(age(rng));
+        contact.heard_at = contact.position_at.max(contact.intent_at);
         contact.relayed_at = Some(age(rng)).filter(|_| seed % 3 == 0);
         contact.moved_at = age(rng);
         let lands = seed % 2 == 0;
         let stopped = rng.next_u32().is_multiple_of(3);
-        let reach = Reach {
+        let reach = ReachQuery {
             place: near(rng, 14.0),
             within_m: 2.0 + uniform(rng, 0.0, 4.0),
             bounds: &bounds,
             ahead_s: if stopped { 3.0 } else { 0.0 },
             on_plan: rng.next_u32().is_multiple_of(2),
-            deaf: rng.next_u32().is_multiple_of(4),
+            hears_nobody: rng.next_u32().is_multiple_of(4),
             lands,
         };
-        let mut met = table.met(&table.contacts[1], now);
+        let mut met = table.filter_neighbour(&table.contacts[1], now);
         if met.on_plan && reach.on_plan {
-            met.heard.delay_s = 0.0;
+            met.motion.delay_s = 0.0;
         }
-        if met.lost && !lands && reach.deaf {
-            // As a vehicle that hears nobody sees it.
-            (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
+        if met.lost && !lands && reach.hears_nobody {
+            // As a vehicle that hears no other vehicle sees it.
+            (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
         }
-        let silent = met.lost || met.heard.age_s > MAX_HEIGHT_AGE_S;
+        let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
         if lands && silent {
-            (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
-            met.heard.rests_within_m = 0.0;
+            (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
+            met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;
-        if !(lands || by_gates || met.lost || reach.deaf) {
-            table.contacts[1].follow_unheard(&mut met.heard, &bounds);
+        if !(lands || by_gates || met.lost || reach.hears_nobody) {
+            table.contacts[1].follow_unheard(&mut met.motion, &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
-        let reach_m = reach.within_m + met.heard.reach_m(&bounds, ahead_s);
-        let away = met.heard.position - reach.place;
-        let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
+        let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);
+        let away = met.motion.position - reach.place;
+        let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
         let below = lands && silent && table.may_lie_below(1, &reach.place, -MAX_COLUMN_M, reach.within_m);
         if table.next_within(1, now, &reach).is_none() {
@@ -390,7 +391,7 @@ fn nobody_falls_up() {
             above += 1;
             // Whatever of its way is beside the column is too far below the floor.
             let (mut nearest, mut at) = (f32::INFINITY, from);
-            let mut left_m = table.contacts[1].stretch_m();
+            let mut left_m = table.contacts[1].unheard_distance_m();
             for next in &points {
                 let leg_m = (next - at).norm();
                 let share = (left_m / leg_m).clamp(0.0, 1.0);
@@ -420,7 +421,7 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let mut table = joined(0);
             table.form_fleet(64.0, None, stray_m);
             table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
-            let told = Intent { floor_m: 0.0, ..intent(flags, 1, 2) };
+            let told = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
             table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
             // Whatever shape is told, no place is free that may be too near by the truth.
             let away =
@@ -429,7 +430,7 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let here = table.contacts[1].state.position;
             let near = here + away * (0.99 * truly_m);
             let mut free = true;
-            table.places(Instant::from_millis(100), [apart_m; 2], |off| {
+            table.for_each_place(Instant::from_millis(100), [apart_m; 2], |off| {
                 let down_m = (off.from.z - near.z).clamp(0.0, off.from.z - off.to.z);
                 let nearest = off.from - Point::new(0.0, 0.0, down_m);
                 free &= (near - nearest).norm() >= off.radius_m;
@@ -449,13 +450,13 @@ fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes
             table.form_fleet(64.0, None, 1.0);
         }
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
-        let told = Intent { floor_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
+        let told = Intent { ground_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
         table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
         let here = table.contacts[1].state.position;
         let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
         let silent_s = uniform(&mut rng, 1.0, 1200.0);
         let (mut kept, mut lies) = (false, false);
-        table.obstacle(1, Instant::from_millis((1000.0 * silent_s) as u64), 2.0, |off| {
+        table.for_each_zone_of(1, Instant::from_millis((1000.0 * silent_s) as u64), 2.0, |off| {
             kept |= off.from.z >= below.z && off.to.z <= below.z;
             lies |= off.to.z <= -29.0;
         });
@@ -481,7 +482,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
         let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
-        table.places(now, [apart_m, lying_m], |off| {
+        table.for_each_place(now, [apart_m, lying_m], |off| {
             // Of a silent one the place is not known any better than that.
             let most_m = lying_m + VAGUE_POSITION_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };

@@ -27,7 +27,7 @@ pub(crate) fn sphere(at: Point, radius_m: f32) -> Command {
 }
 
 fn take(obstacles: &mut Obstacles, command: &Command) -> u8 {
-    obstacles.take(command, &ORIGIN, CLEARANCE_M)
+    obstacles.handle_command(command, &ORIGIN, CLEARANCE_M)
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn a_sphere_of_a_command_is_an_obstacle_with_the_clearance_around_it() {
     let at = Point::new(14.0, 12.0, 1.5);
     assert_eq!(take(&mut obstacles, &sphere(at, 0.5)), ACCEPTED);
     assert_eq!(take(&mut obstacles, &sphere(at, 0.5)), ACCEPTED, "sent twice");
-    let known = obstacles.known();
+    let known = obstacles.all();
     assert_eq!(known.len(), 1);
     assert!((known[0].from - at).norm() < 0.05 && known[0].to == known[0].from, "{known:?}");
     assert!((known[0].radius_m - 1.3).abs() < 1e-6, "radius and required clearance: {known:?}");
@@ -83,7 +83,7 @@ proptest::proptest! {
                 proptest::prop_assert!(known || (result == TEMPORARILY_REJECTED && full));
             }
             if plans {
-                obstacles.request();
+                obstacles.mark_requested();
                 obstacles.avoid_requested();
                 model.iter_mut().for_each(|(_, avoided)| *avoided = true);
             }

@@ -10,7 +10,7 @@ use planner_core::frames;
 
 use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 use crate::link::frame::{self, Frame, Header, MAX_FRAME_LEN};
 
 /// Bit of a setpoint's mask: it says nothing of the heading.
@@ -50,7 +50,7 @@ impl Bench {
         self.took_off &= !self.on_ground();
         assert!(enu.iter().all(|c| c.is_finite()));
         let mask = s.type_mask.bits();
-        self.target = (mask | YAW_IGNORED == self.kind.move_mask()).then_some(enu);
+        self.target = (mask | YAW_IGNORED == self.kind.move_type_mask()).then_some(enu);
         self.setpoints.push((self.now, enu, mask));
         self.headings.push((mask & YAW_IGNORED == 0).then_some(FRAC_PI_2 - s.yaw));
     }
@@ -75,13 +75,13 @@ impl Bench {
         match c.command {
             MavCmd::MAV_CMD_DO_SET_MODE => {
                 self.mode = match self.kind {
-                    Kind::Px4 => (c.param2 as u32) << 16 | (c.param3 as u32) << 24,
-                    Kind::ArduPilot => c.param2 as u32,
+                    AutopilotKind::Px4 => (c.param2 as u32) << 16 | (c.param3 as u32) << 24,
+                    AutopilotKind::ArduPilot => c.param2 as u32,
                 };
             }
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0 && !self.never_arms,
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
-                assert!(self.kind == Kind::ArduPilot && self.armed);
+                assert!(self.kind == AutopilotKind::ArduPilot && self.armed);
                 if !self.took_off {
                     self.lifts_at = self.now + self.spool;
                 }

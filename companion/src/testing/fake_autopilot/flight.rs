@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::Bench;
 use crate::Duration;
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 
 impl Bench {
     pub(crate) fn on_ground(&self) -> bool {
@@ -13,7 +13,7 @@ impl Bench {
 
     /// Whether it lifts off, or has.
     fn lifts(&self) -> bool {
-        self.kind == Kind::Px4 || self.took_off && self.now >= self.lifts_at
+        self.kind == AutopilotKind::Px4 || self.took_off && self.now >= self.lifts_at
     }
 
     /// 50 ms of flight; on the ground the motors stop by themselves.
@@ -43,8 +43,8 @@ impl Bench {
     fn disarm_by_itself(&mut self) {
         let streamed = self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));
         let takes_off = match self.kind {
-            Kind::Px4 => streamed && self.mode == self.kind.setpoint_mode(),
-            Kind::ArduPilot => self.took_off,
+            AutopilotKind::Px4 => streamed && self.mode == self.kind.setpoint_mode(),
+            AutopilotKind::ArduPilot => self.took_off,
         };
         let idle = self.armed && self.on_ground() && !takes_off && !self.stays_armed;
         self.idle_since = if idle { self.idle_since.or(Some(self.now)) } else { None };

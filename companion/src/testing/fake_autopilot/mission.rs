@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::flight::{Look, Path, Photographs, Range, Task, Trigger, VehiclePlan};
+use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange};
 use planner_core::frames::Geodetic;
 
 use super::Plan;
@@ -51,8 +51,8 @@ pub(crate) fn field_plan() -> Plan {
     ] {
         path.push(point, 1.2).unwrap();
     }
-    let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
+    let mut photographs = PicturePlan::new(2.0, HeadingMode::Ahead, Trigger::Distance);
     // A single picture: on the way to it the vehicle may look anywhere.
-    photographs.mark(1, 1, Range { first: 0, end: 1 }).unwrap();
+    photographs.add_stretch(1, 1, WaypointRange { first: 0, end: 1 }).unwrap();
     VehiclePlan { task: Task::Photograph(photographs), path, descent_m: 1.5, ..plan() }
 }

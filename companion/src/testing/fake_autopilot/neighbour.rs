@@ -25,15 +25,15 @@ impl Bench {
             mission_crc: 0xC0FFEE,
             plan_crc,
             progress_m,
-            clear_m: self.neighbour_clear_m,
-            heard: u32::MAX,
+            gates_open_up_to_m: self.neighbour_clear_m,
+            heard_bits: u32::MAX,
             ..Intent::default()
         };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);
         let place = frames::enu_to_geodetic(&ORIGIN, &place);
         let place = GLOBAL_POSITION_INT_DATA {
-            time_boot_ms: self.neighbour_clock.unwrap_or(self.now).boot_ms(),
+            time_boot_ms: self.neighbour_clock.unwrap_or(self.now).as_boot_ms(),
             lat: (place.lat_deg * 1e7) as i32,
             lon: (place.lon_deg * 1e7) as i32,
             alt: (place.alt_m * 1e3) as i32,

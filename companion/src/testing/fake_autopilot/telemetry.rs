@@ -7,15 +7,15 @@ use mavlink::dialects::ardupilotmega::*;
 
 use super::Bench;
 use crate::Link;
-use crate::autopilot::Kind;
+use crate::autopilot::AutopilotKind;
 
 impl Bench {
     pub(crate) fn heartbeat(&mut self) -> Vec<u8> {
         let armed = if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
         let mut data = HEARTBEAT_DATA { custom_mode: self.mode, base_mode: armed, ..Default::default() };
         data.autopilot = match self.kind {
-            Kind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
-            Kind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            AutopilotKind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
+            AutopilotKind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
         };
         data.system_status =
             if self.status >= 5 { MavState::MAV_STATE_CRITICAL } else { MavState::MAV_STATE_ACTIVE };
@@ -33,7 +33,7 @@ impl Bench {
 
     /// PX4 sends all unasked, ArduCopter nothing.
     fn sends(&self, id: u16) -> bool {
-        self.kind == Kind::Px4 || self.streams.contains(&id)
+        self.kind == AutopilotKind::Px4 || self.streams.contains(&id)
     }
 
     fn report_ardupilot(&mut self) {
@@ -54,12 +54,12 @@ impl Bench {
         if self.silent {
             return;
         }
-        let count = self.now.micros() / 50_000;
+        let count = self.now.as_micros() / 50_000;
         if count.is_multiple_of(20) {
             let bytes = self.heartbeat();
             self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
             self.drain();
-            if self.kind == Kind::Px4
+            if self.kind == AutopilotKind::Px4
                 && let Some(pos_horiz_accuracy) = self.accuracy_m
             {
                 self.send(&ESTIMATOR_STATUS_DATA { pos_horiz_accuracy, ..Default::default() });
@@ -77,13 +77,13 @@ impl Bench {
             };
             self.send(&EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
         }
-        if count.is_multiple_of(4) && self.kind == Kind::ArduPilot {
+        if count.is_multiple_of(4) && self.kind == AutopilotKind::ArduPilot {
             self.report_ardupilot();
         }
         if !self.no_position && self.sends(32) {
             let ned = self.ned();
             self.send(&LOCAL_POSITION_NED_DATA {
-                time_boot_ms: self.now.boot_ms(),
+                time_boot_ms: self.now.as_boot_ms(),
                 x: ned.x as f32,
                 y: ned.y as f32,
                 z: ned.z as f32,

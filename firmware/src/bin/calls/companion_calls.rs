@@ -4,13 +4,13 @@ use companion::config::USUAL_GROUND_STATIONS;
 use companion::link::commands;
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
-use companion::link::roster::{self, Roster};
+use companion::link::roster::{self, RosterReport};
 use companion::services::parameters::{self, Parameters};
 use companion::storage::mission_file::{
-    self, Block, MissionGoal, MissionHeader, MissionVehicle, MissionView,
+    self, MissionBlock, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };
-use companion::storage::store::{Fault, FlashRequest, MAX_READ, ReadFlash, Store};
-use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
+use companion::storage::store::{FlashFault, FlashRequest, MAX_READ, ReadFlash, Store};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
 use firmware::calls::{Meter, flight};
@@ -46,19 +46,26 @@ const GROUND: (u8, u8) = (255, 190);
 
 /// All of them.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter) {
-    bytes(meter);
-    missions(meter);
-    fleets(meter);
+pub fn measure_companion_calls(meter: &mut impl Meter) {
+    measure_framing(meter);
+    measure_mission_parsing(meter);
+    measure_fleet_agreement(meter);
     values(meter);
     let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
-    let flash = Ram(memory::spare().expect("it is taken once"));
-    Ground { companion, flash, meter, now: Instant::ZERO + Duration::from_secs(11), sequence: 0, packet: 0 }
-        .run();
+    let flash = RamFlash(memory::take_spare_memory().expect("it is taken once"));
+    GroundedCompanion {
+        companion,
+        flash,
+        meter,
+        now: Instant::ZERO + Duration::from_secs(11),
+        sequence: 0,
+        packet: 0,
+    }
+    .run();
 }
 
 /// Bytes that look like the start of a frame again and again, each with a wrong checksum; and noise.
-fn bytes(meter: &mut impl Meter) {
+fn measure_framing(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
     let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
     let mut framer = Framer::new();
@@ -79,15 +86,15 @@ fn bytes(meter: &mut impl Meter) {
             companion.handle_bytes(Link::Swarm, now, &chunk);
         });
     }
-    let points = (0..intent::MAX_POINTS).map(|_| cases::anywhere(&mut rng, 50.0)).collect();
+    let points = (0..intent::MAX_POINTS).map(|_| cases::random_point(&mut rng, 50.0)).collect();
     let intent = Intent {
         system_id: 2,
         flags: intent::FLYING,
         mission_crc: 1,
         plan_crc: 2,
         progress_m: 3.0,
-        clear_m: 9.0,
-        heard: 7,
+        gates_open_up_to_m: 9.0,
+        heard_bits: 7,
         points,
         ..Intent::default()
     };
@@ -103,7 +110,7 @@ fn bytes(meter: &mut impl Meter) {
 }
 
 /// A mission file for as many vehicles as there may be.
-fn missions(meter: &mut impl Meter) {
+fn measure_mission_parsing(meter: &mut impl Meter) {
     let header = MissionHeader {
         roadmap_crc: 0,
         mode: cases::ASSIGNMENT_MODE,
@@ -125,8 +132,8 @@ fn missions(meter: &mut impl Meter) {
     let goals = [MissionGoal { position: Point::new(1.0, 2.0, 3.0), descent_m: 1.0 }; VEHICLES];
     let mut file = [0; mission_file::encoded_len(VEHICLES, VEHICLES)];
     meter
-        .call("mission_file::write, 32", 0, || {
-            mission_file::write(&header, &vehicles, &Block::Goals(&goals), &mut file)
+        .call("mission_file::write_mission, 32", 0, || {
+            mission_file::write_mission(&header, &vehicles, &MissionBlock::Goals(&goals), &mut file)
         })
         .expect("a good mission");
     let view = meter
@@ -135,50 +142,61 @@ fn missions(meter: &mut impl Meter) {
         })
         .expect("a good mission");
     let config = meter
-        .call("mission_file::MissionView::config, 32", 0, || view.config::<VEHICLES>(VEHICLES as u8))
+        .call("mission_file::MissionView::companion_config, 32", 0, || {
+            view.companion_config::<VEHICLES>(VEHICLES as u8)
+        })
         .expect("it is there");
     let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
-    let _ = meter.call("mission_file::MissionView::request, 32", 0, || {
-        view.request(&mut tasks, &mut descents_m, GATES)
+    let _ = meter.call("mission_file::MissionView::plan_request, 32", 0, || {
+        view.plan_request(&mut tasks, &mut descents_m, GATES)
     });
     let _ = meter.call("config::Config::check, 32", 0, || config.check());
     let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
-    meter.call("mission_file::MissionView::fits", 0, || view.fits(Some(&roadmap)));
+    meter.call("mission_file::MissionView::can_be_planned_with", 0, || {
+        view.can_be_planned_with(Some(&roadmap))
+    });
 }
 
 /// The agreement on what lost vehicles leave, among as many as there may be, each of which reports something new.
-fn fleets(meter: &mut impl Meter) {
-    let mut fleet = Fleet::<VEHICLES>::new(0, VEHICLES, Limits::of_flight(Duration::from_secs(60)));
+fn measure_fleet_agreement(meter: &mut impl Meter) {
+    let mut fleet = Fleet::<VEHICLES>::new(0, VEHICLES, FleetTimeouts::of_flight(Duration::from_secs(60)));
     let bytes = size_of_val(&fleet);
     let mut now = Instant::ZERO;
-    fleet.begin(now);
+    fleet.begin_flight(now);
     for round in 0..120_u16 {
         now = now + Duration::from_secs(1);
         // The last ones fall silent one by one, those before them promise and hold.
         let hearing = |rank: usize| {
             let speaks = rank < VEHICLES - usize::from(round / 10);
-            Hearing { direct_at: speaks.then_some(now), hears_us: speaks, by_others: speaks }
+            MemberReception { heard_at: speaks.then_some(now), hears_us: speaks, heard_by_others: speaks }
         };
         let promise_dm = Some(100 + round);
-        let own = Own { done_dm: 10 * round, promise_dm, holds: true, ..Own::default() };
+        let own = OwnReport {
+            progress_dm: 10 * round,
+            commitment_dm: promise_dm,
+            holds: true,
+            ..OwnReport::default()
+        };
         meter.call("fleet::Fleet::step, 32", bytes, || fleet.step(now, &own, hearing));
-        if meter.call("fleet::Fleet::wants_hash", bytes, || fleet.wants_hash()) {
+        if meter.call("fleet::Fleet::needs_division", bytes, || fleet.needs_division()) {
             meter.call("fleet::Fleet::take_plan_crc", bytes, || fleet.take_plan_crc(7));
         }
-        meter.call("fleet::Fleet::fingerprint", bytes, || fleet.fingerprint());
+        meter.call("fleet::Fleet::division_hash", bytes, || fleet.division_hash());
         for first in [0, roster::MAX_ENTRIES] {
-            let mut told = meter.call("fleet::Fleet::message", bytes, || fleet.message(first));
+            let mut told = meter.call("fleet::Fleet::roster_message", bytes, || fleet.roster_message(first));
             let mut payload = [0; roster::MAX_LEN];
-            meter.call("roster::Roster::encode", 0, || told.encode(&mut payload));
+            meter.call("roster::RosterReport::encode", 0, || told.encode(&mut payload));
             let mut padded = [0; 255];
             padded[..roster::MAX_LEN].copy_from_slice(&payload);
-            let read = meter.call("roster::Roster::decode", 0, || Roster::decode(&padded, told.system_id));
+            let read = meter
+                .call("roster::RosterReport::decode", 0, || RosterReport::decode(&padded, told.system_id));
             assert!(read.is_some_and(|read| read == told));
             for entry in &mut told.entries {
-                (entry.done_dm, entry.promise_dm, entry.holds) = (10 * round + 5, promise_dm, true);
+                (entry.progress_dm, entry.commitment_dm, entry.holds) = (10 * round + 5, promise_dm, true);
             }
             let sender = 1 + usize::from(round) % (VEHICLES / 2);
-            meter.call("fleet::Fleet::handle, 32", bytes, || fleet.handle(sender, &told, false));
+            meter
+                .call("fleet::Fleet::handle_roster, 32", bytes, || fleet.handle_roster(sender, &told, false));
         }
     }
 }
@@ -187,7 +205,7 @@ fn values(meter: &mut impl Meter) {
     let mut values = Parameters::default();
     let mut config = flight::config();
     for (index, parameter) in parameters::TABLE.iter().enumerate() {
-        let _ = meter.call("parameters::Parameters::set", 0, || values.set(index, parameter.most));
+        let _ = meter.call("parameters::Parameters::set", 0, || values.set(index, parameter.max));
         meter.call("parameters::Parameters::index_of", 0, || Parameters::index_of(parameter.name.as_bytes()));
     }
     meter.call("parameters::Parameters::apply", 0, || values.apply(&mut config));
@@ -199,53 +217,53 @@ fn values(meter: &mut impl Meter) {
 }
 
 /// A flash in memory that takes no time.
-struct Ram(&'static mut [u8]);
+struct RamFlash(&'static mut [u8]);
 
-impl ReadFlash for Ram {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+impl ReadFlash for RamFlash {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
         let at = at as usize;
-        out.copy_from_slice(self.0.get(at..at + out.len()).ok_or(Fault)?);
+        out.copy_from_slice(self.0.get(at..at + out.len()).ok_or(FlashFault)?);
         Ok(())
     }
 }
 
 /// A companion on the ground, its flash, and a ground station.
-struct Ground<'a, M> {
+struct GroundedCompanion<'a, M> {
     companion: BoardCompanion,
-    flash: Ram,
+    flash: RamFlash,
     meter: &'a mut M,
     now: Instant,
     sequence: u8,
     packet: u16,
 }
 
-impl<M: Meter> Ground<'_, M> {
+impl<M: Meter> GroundedCompanion<'_, M> {
     /// Uploads a roadmap, reads it back, sets all parameters, restarts.
     fn run(mut self) {
         self.mount();
         let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
         let file = &memory::bank2()[..roadmap.byte_len()];
-        self.ask(CREATE, 0, b"roadmap.bin");
+        self.request_ftp(CREATE, 0, b"roadmap.bin");
         for (i, piece) in file.chunks(FTP_DATA).enumerate() {
-            self.ask(WRITE, (i * FTP_DATA) as u32, piece);
+            self.request_ftp(WRITE, (i * FTP_DATA) as u32, piece);
         }
-        self.ask(TERMINATE, 0, &[]);
-        self.ask(CRC32, 0, b"roadmap.bin");
-        self.ask(OPEN_READ, 0, b"roadmap.bin");
-        self.ask(BURST_READ, 0, &[]);
+        self.request_ftp(TERMINATE, 0, &[]);
+        self.request_ftp(CRC32, 0, b"roadmap.bin");
+        self.request_ftp(OPEN_READ, 0, b"roadmap.bin");
+        self.request_ftp(BURST_READ, 0, &[]);
         for parameter in parameters::TABLE {
             let mut set = [0; 23];
-            set[..4].copy_from_slice(&parameter.most.to_le_bytes());
+            set[..4].copy_from_slice(&parameter.max.to_le_bytes());
             (set[4], set[5], set[22]) = (1, companion::COMPANION_COMPONENT, 9);
             set[6..6 + parameter.name.len()].copy_from_slice(parameter.name.as_bytes());
-            self.hear(PARAM_SET, &set);
+            self.feed_frame(PARAM_SET, &set);
         }
-        self.hear(PARAM_REQUEST_LIST, &[1, companion::COMPANION_COMPONENT]);
+        self.feed_frame(PARAM_REQUEST_LIST, &[1, companion::COMPANION_COMPONENT]);
         for command in [commands::START, commands::PAUSE_CONTINUE, commands::REQUEST, commands::LAND] {
             let mut order = [0; 33];
             order[28..30].copy_from_slice(&command.to_le_bytes());
             (order[30], order[31]) = (1, companion::COMPANION_COMPONENT);
-            self.hear(COMMAND_LONG, &order);
+            self.feed_frame(COMMAND_LONG, &order);
         }
         let store = self.mount();
         assert!(store, "what was uploaded is there");
@@ -258,13 +276,13 @@ impl<M: Meter> Ground<'_, M> {
             self.meter.call("store::Store::mount", size_of::<Store>(), || Store::mount(LAYOUT, flash));
         let found = store.roadmap().is_some();
         let companion = &mut self.companion;
-        self.meter.call("Companion::mount", COMPANION, || companion.mount(store));
-        self.pump();
+        self.meter.call("Companion::attach_store", COMPANION, || companion.attach_store(store));
+        self.drain_outputs();
         found
     }
 
     /// An FTP request, until it is answered.
-    fn ask(&mut self, opcode: u8, offset: u32, data: &[u8]) {
+    fn request_ftp(&mut self, opcode: u8, offset: u32, data: &[u8]) {
         self.packet = self.packet.wrapping_add(1);
         let mut payload = [0; 254];
         (payload[1], payload[2]) = (1, companion::COMPANION_COMPONENT);
@@ -273,7 +291,7 @@ impl<M: Meter> Ground<'_, M> {
         payload[11..15].copy_from_slice(&offset.to_le_bytes());
         payload[15..15 + data.len()].copy_from_slice(data);
         for _ in 0..10 {
-            if self.hear(FILE_TRANSFER, &payload) {
+            if self.feed_frame(FILE_TRANSFER, &payload) {
                 return;
             }
         }
@@ -281,7 +299,7 @@ impl<M: Meter> Ground<'_, M> {
     }
 
     /// Gives it a frame; whether an FTP request was granted.
-    fn hear(&mut self, id: u32, payload: &[u8]) -> bool {
+    fn feed_frame(&mut self, id: u32, payload: &[u8]) -> bool {
         self.now = self.now + Duration::from_millis(20);
         self.sequence = self.sequence.wrapping_add(1);
         let header = Header { system: GROUND.0, component: GROUND.1, sequence: self.sequence };
@@ -292,11 +310,11 @@ impl<M: Meter> Ground<'_, M> {
         self.meter.call("Companion::handle_bytes, a frame", COMPANION, || {
             companion.handle_bytes(Link::Autopilot, now, &bytes[..len]);
         });
-        self.pump()
+        self.drain_outputs()
     }
 
     /// Drains the companion's frames and events, and executes its flash operations; whether an FTP request was acknowledged.
-    fn pump(&mut self) -> bool {
+    fn drain_outputs(&mut self) -> bool {
         let Self { companion, flash, meter, now, .. } = self;
         let now = *now;
         let mut granted = false;

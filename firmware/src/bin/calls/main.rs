@@ -52,22 +52,22 @@ impl Meter for Instructions {
 fn main() -> ! {
     clock::start();
     let mut meter = Instructions { rows: Vec::new() };
-    let [calls, flights] = planner_calls::run(&mut meter);
+    let [calls, flights] = planner_calls::measure_planner_calls(&mut meter);
     println!("coverage {calls:08x} {flights:08x}");
-    companion_calls::run(&mut meter);
-    fly(&mut meter);
-    fly_areas(&mut meter);
-    filter(&mut meter);
+    companion_calls::measure_companion_calls(&mut meter);
+    measure_flights(&mut meter);
+    measure_area_flights(&mut meter);
+    measure_filter(&mut meter);
     for (name, bytes, count) in &meter.rows {
         println!("call {count} {bytes} {name}");
     }
-    println!("stack {} {}", stack::used(), stack::size());
+    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }
 
 /// Control steps in flight, so many of each kind.
 #[inline(never)]
-fn fly(meter: &mut Instructions) {
+fn measure_flights(meter: &mut Instructions) {
     let mut steps = [0; 2];
     for seed in 0.. {
         let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
@@ -75,8 +75,8 @@ fn fly(meter: &mut Instructions) {
         let mut companion = meter
             .call("Companion::new", size_of::<BoardCompanion>(), || BoardCompanion::new(config))
             .expect("the settings are good");
-        let kind = usize::from(flight::is_hard(seed));
-        steps[kind] += flight::fly(seed, &plan, &mut companion, meter);
+        let kind = usize::from(flight::has_many_off_plan(seed));
+        steps[kind] += flight::measure_flight(seed, &plan, &mut companion, meter);
         if steps.iter().all(|&steps| steps >= cases::STEP_CASES) {
             println!("steps {steps:?}");
             return;
@@ -86,12 +86,12 @@ fn fly(meter: &mut Instructions) {
 
 /// Control steps of coverage missions in flight.
 #[inline(never)]
-fn fly_areas(meter: &mut Instructions) {
+fn measure_area_flights(meter: &mut Instructions) {
     let mut steps = 0;
     for seed in 0.. {
         let plan = flight::random_area_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(flight::area_config()).expect("the settings are good");
-        steps += flight::fly(seed, &plan, &mut companion, meter);
+        steps += flight::measure_flight(seed, &plan, &mut companion, meter);
         if steps >= cases::STEP_CASES {
             return;
         }
@@ -100,10 +100,10 @@ fn fly_areas(meter: &mut Instructions) {
 
 /// The safety filter alone.
 #[inline(never)]
-fn filter(meter: &mut Instructions) {
+fn measure_filter(meter: &mut Instructions) {
     for seed in 0..FILTER_FLIGHTS {
         let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
-        flight::filter(seed, &plan, &mut companion, meter);
+        flight::measure_filter(seed, &plan, &mut companion, meter);
     }
 }

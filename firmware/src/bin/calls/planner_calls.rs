@@ -3,21 +3,21 @@
 use firmware::boards::chosen::memory;
 use firmware::calls::{Meter, coverage, coverage_flights, flight};
 use firmware::capacity::{GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS};
-use firmware::cases::{self, StepCase, anywhere, below, uniform};
-use firmware::scratch::{Planner, Scratch};
+use firmware::cases::{self, StepCase, random_below, random_between, random_point};
+use firmware::scratch::{Planner, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{Advice, Method};
-use planner_core::detour::{self, DetourRequest, Goal, KeepOff, Nature};
+use planner_core::detour::{self, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::{Flight, Path, Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::plan::{self, Goals, SwarmPlan};
 use planner_core::prm::{self, Config};
 use planner_core::roadmap::{self, HalfEdge, RoadmapHeader, RoadmapView};
-use planner_core::schedule::sipp::{self, Route, SippWorkspace};
+use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleWorkspace};
-use planner_core::search::{self, SearchWorkspace, WithLengths};
+use planner_core::search::{self, RoadmapWithLengths, SearchWorkspace};
 use planner_core::segment;
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{Outside, VoxelGrid};
@@ -38,7 +38,7 @@ const MAX_EDGE_M: f32 = 8.0;
 const SMALL_ROADMAP_NODES: usize = 300;
 
 /// Memory beside the scratch.
-struct Beside {
+struct BenchMemory {
     plan: Plan,
     small: prm::Workspace<SMALL_ROADMAP_NODES, 1024>,
     nodes: [Point; SMALL_ROADMAP_NODES],
@@ -48,8 +48,8 @@ struct Beside {
     lengths: [f32; 2048],
 }
 
-static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
-static BESIDE: ConstStaticCell<Beside> = ConstStaticCell::new(Beside {
+static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
+static BESIDE: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
     plan: Plan::new(),
     small: prm::Workspace::new(),
     nodes: [Point::new(0.0, 0.0, 0.0); SMALL_ROADMAP_NODES],
@@ -61,7 +61,7 @@ static BESIDE: ConstStaticCell<Beside> = ConstStaticCell::new(Beside {
 
 /// All of them; the sums of the answers of a coverage mission: of its calls, of its flights.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter) -> [u32; 2] {
+pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     let scratch = SCRATCH.take();
     let beside = BESIDE.take();
     let view = meter
@@ -69,41 +69,41 @@ pub fn run(meter: &mut impl Meter) -> [u32; 2] {
             RoadmapView::parse(memory::bank2())
         })
         .expect("a roadmap lies in bank 2");
-    places(meter);
-    searches(meter, &view, scratch.planner());
-    assignments(meter, &mut scratch.planner().assignment);
-    plans(meter, &view, scratch.planner(), &mut beside.plan);
-    crowd(meter, &view, scratch.planner(), &mut beside.plan);
-    detours(meter, &view, &mut scratch.planner().search);
-    paths(meter);
-    let (head, words) = memory::map();
-    let grid = cases::map(&head, words);
+    measure_frames_and_grids(meter);
+    measure_searches(meter, &view, scratch.planner());
+    measure_assignments(meter, &mut scratch.planner().assignment);
+    measure_plans(meter, &view, scratch.planner(), &mut beside.plan);
+    measure_largest_swarm(meter, &view, scratch.planner(), &mut beside.plan);
+    measure_detours(meter, &view, &mut scratch.planner().search);
+    measure_paths(meter);
+    let (head, words) = memory::measurement_map();
+    let grid = cases::voxel_map(&head, words);
     let shape = *grid.shape();
     // The shape is sound: it was checked before.
     let _ = meter.call("voxel::VoxelGrid::new", size_of::<VoxelGrid<'_>>(), || {
         VoxelGrid::new(shape, Outside::Blocked, words)
     });
-    segments(meter, &grid);
-    builds(meter, &grid, scratch);
+    measure_segments(meter, &grid);
+    measure_roadmap_builds(meter, &grid, scratch);
     let search = &mut scratch.planner().search;
-    desk(meter, &grid, search, beside);
-    let flights = coverage_flights::run(meter, scratch, &mut beside.plan);
-    [coverage::run(meter, scratch.coverage()), flights]
+    measure_desk_calls(meter, &grid, search, beside);
+    let flights = coverage_flights::measure_coverage_flights(meter, scratch, &mut beside.plan);
+    [coverage::measure_coverage_calls(meter, scratch.coverage()), flights]
 }
 
-fn geodetic(rng: &mut Pcg32) -> Geodetic {
+fn random_geodetic(rng: &mut Pcg32) -> Geodetic {
     Geodetic {
-        lat_deg: f64::from(uniform(rng, -70.0, 70.0)),
-        lon_deg: f64::from(uniform(rng, -179.0, 179.0)),
-        alt_m: f64::from(uniform(rng, 0.0, 4000.0)),
+        lat_deg: f64::from(random_between(rng, -70.0, 70.0)),
+        lon_deg: f64::from(random_between(rng, -179.0, 179.0)),
+        alt_m: f64::from(random_between(rng, 0.0, 4000.0)),
     }
 }
 
-fn places(meter: &mut impl Meter) {
+fn measure_frames_and_grids(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
     for _ in 0..MANY_CASES {
-        let origin = geodetic(&mut rng);
-        let enu = anywhere(&mut rng, 5000.0);
+        let origin = random_geodetic(&mut rng);
+        let enu = random_point(&mut rng, 5000.0);
         let place = meter.call("frames::enu_to_geodetic", 0, || frames::enu_to_geodetic(&origin, &enu));
         meter.call("frames::geodetic_to_enu", 0, || frames::geodetic_to_enu(&origin, &place));
         meter.call("frames::haversine_m", 0, || frames::haversine_m(&origin, &place));
@@ -115,14 +115,14 @@ fn places(meter: &mut impl Meter) {
     }
 }
 
-fn searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
+fn measure_searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
     let mut rng = Pcg32::seed_from_u64(2);
     let nodes = view.node_count();
     let bytes = size_of::<Search>();
-    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+    let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
     let search = &mut ws.search;
     for _ in 0..SOME_CASES {
-        let (from, to) = (below(&mut rng, nodes) as u16, below(&mut rng, nodes) as u16);
+        let (from, to) = (random_below(&mut rng, nodes) as u16, random_below(&mut rng, nodes) as u16);
         let mut way: Vec<u16, WAYPOINTS> = Vec::new();
         // No path, or one too long, is an answer too.
         let _ =
@@ -131,7 +131,7 @@ fn searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
         meter.call("roadmap::RoadmapView::edge_between", 0, || view.edge_between(from, to));
     }
     let mut draw =
-        || -> Vec<u16, VEHICLES> { (0..VEHICLES).map(|_| below(&mut rng, nodes) as u16).collect() };
+        || -> Vec<u16, VEHICLES> { (0..VEHICLES).map(|_| random_below(&mut rng, nodes) as u16).collect() };
     let (starts, goals) = (draw(), draw());
     let mut row = [0.0; VEHICLES];
     let _ =
@@ -145,16 +145,16 @@ fn searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
     });
 }
 
-fn assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHICLES>) {
+fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHICLES>) {
     let mut rng = Pcg32::seed_from_u64(3);
     let bytes = size_of::<AssignmentWorkspace<VEHICLES>>();
     for case in 0..60 {
         // Metres at random; few different ones; every third pair impossible; one worse than the other.
         let mut cost = |i: usize| match case % 4 {
-            0 => uniform(&mut rng, 0.0, 100.0),
-            1 => below(&mut rng, 4) as f32,
-            2 if below(&mut rng, 3) == 0 => f32::INFINITY,
-            2 => uniform(&mut rng, 0.0, 100.0),
+            0 => random_between(&mut rng, 0.0, 100.0),
+            1 => random_below(&mut rng, 4) as f32,
+            2 if random_below(&mut rng, 3) == 0 => f32::INFINITY,
+            2 => random_between(&mut rng, 0.0, 100.0),
             _ => ((i / VEHICLES + 1) * (i % VEHICLES + 1)) as f32,
         };
         let mut costs = [0.0; VEHICLES * VEHICLES];
@@ -163,58 +163,69 @@ fn assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHICLES>) {
         let _ = meter.call("assignment::assign, 32 × 32", bytes, || {
             assignment::assign(&costs, VEHICLES, VEHICLES, ws, &mut out)
         });
-        let _ = meter.call("assignment::bottleneck, 32 × 32", bytes, || {
-            assignment::bottleneck(&costs, VEHICLES, VEHICLES, ws, &mut out)
+        let _ = meter.call("assignment::assign_bottleneck, 32 × 32", bytes, || {
+            assignment::assign_bottleneck(&costs, VEHICLES, VEHICLES, ws, &mut out)
         });
     }
 }
 
 /// The demo's ten vehicles.
-fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
+fn measure_plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
     let bytes = size_of::<Planner>();
-    let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
-    let request = cases::request(&vehicles, &descents_m);
+    let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
+    let request = cases::plan_request(&vehicles, &descents_m);
     let mut goals = Goals::new();
     let good = "the demo has a plan";
-    meter.call("plan::costs, 10 × 10", bytes, || plan::costs(view, &request, ws)).expect(good);
-    meter.call("plan::assign, 10 × 10", bytes, || plan::assign(&request, ws, &mut goals)).expect(good);
-    meter.call("plan::schedule, 10", bytes, || plan::schedule(view, &request, &goals, ws, plan)).expect(good);
+    meter
+        .call("plan::compute_costs, 10 × 10", bytes, || plan::compute_costs(view, &request, ws))
+        .expect(good);
+    meter
+        .call("plan::assign_goals, 10 × 10", bytes, || plan::assign_goals(&request, ws, &mut goals))
+        .expect(good);
+    meter
+        .call("plan::schedule_flights, 10", bytes, || {
+            plan::schedule_flights(view, &request, &goals, ws, plan)
+        })
+        .expect(good);
     meter.call("plan::plan_swarm, 10", bytes, || plan::plan_swarm(view, &request, ws, plan)).expect(good);
     let bytes = size_of::<SippWorkspace<ROADMAP_NODES, TIMED_SEGMENTS>>();
     for (index, flight) in plan.flights.iter().enumerate() {
         let Some(goal) = flight.task.goal() else { continue };
         let (from, to) = (index as u16, view.header().starts + goal);
         let route =
-            Route { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+            RouteQuery { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
+        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
         let others = plan.flights.iter().filter(|other| other.id != flight.id);
         let mut own = flight.clone();
         // That no path exists is an answer too.
-        let _ = meter.call("schedule::sipp::route, past 9", bytes, || {
-            sipp::route(view, &route, passable, others, &mut ws.sipp, &mut own)
+        let _ = meter.call("schedule::sipp::find_route, past 9", bytes, || {
+            sipp::find_route(view, &route, passable, others, &mut ws.sipp, &mut own)
         });
     }
 }
 
 /// The largest swarm, on shortest paths between random nodes.
-fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
+fn measure_largest_swarm(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
     let mut rng = Pcg32::seed_from_u64(4);
     let cfg = &cases::SCHEDULE;
     plan.flights.clear();
     let mut way: Vec<u16, WAYPOINTS> = Vec::new();
     while plan.flights.len() < VEHICLES {
-        let (from, to) =
-            (below(&mut rng, view.node_count()) as u16, below(&mut rng, view.node_count()) as u16);
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+        let (from, to) = (
+            random_below(&mut rng, view.node_count()) as u16,
+            random_below(&mut rng, view.node_count()) as u16,
+        );
+        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
         if search::astar(view, from, to, passable, &mut ws.search, &mut way).is_err() || way.len() < 2 {
             continue;
         }
         let mut path = Path::new();
         way.iter().for_each(|&node| path.push(view.node(node), 1.0).expect("as long as the nodes"));
-        meter.call("flight::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
+        meter.call("flight::Path::label_times", 0, || path.label_times(1.0, cfg.cruise_mps));
         let id = 1 + plan.flights.len() as u8;
         let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::MAX_TIMED_SEGMENT_M);
-        let flight = Flight { id, task: Task::Goto(0), path, climb_m, descent_m, depart_s: 0.0, piece_m };
+        let flight =
+            Flight { id, task: Task::Goto(0), path, climb_m, descent_m, depart_s: 0.0, segment_m: piece_m };
         plan.flights.push(flight).expect("there is room");
     }
     let bytes = size_of::<ScheduleWorkspace>();
@@ -233,19 +244,24 @@ fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
     }
 }
 
-fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) {
+fn measure_detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) {
     let mut rng = Pcg32::seed_from_u64(5);
     let bytes = size_of::<Search>();
-    let natures = [Nature::Solid, Nature::Landing, Nature::Lying];
+    let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
     let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::default();
     for case in 0..2 {
-        let mut draw = || view.node(below(&mut rng, view.node_count()) as u16);
+        let mut draw = || view.node(random_below(&mut rng, view.node_count()) as u16);
         let (here, other) = (draw(), draw());
-        let mut obstacles: Vec<KeepOff, { 4 * VEHICLES }> = (0..4 * VEHICLES)
+        let mut obstacles: Vec<KeepOutZone, { 4 * VEHICLES }> = (0..4 * VEHICLES)
             .map(|i| {
                 let from = draw();
-                KeepOff { from, to: from - Point::new(0.0, 0.0, 20.0), radius_m: 1.0, nature: natures[i % 3] }
+                KeepOutZone {
+                    from,
+                    to: from - Point::new(0.0, 0.0, 20.0),
+                    radius_m: 1.0,
+                    kind: natures[i % 3],
+                }
             })
             .collect();
         let request = DetourRequest {
@@ -259,17 +275,17 @@ fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) 
             fence: None,
         };
         // That no detour exists is an answer too.
-        let _ = meter.call("detour::plan, 128 things", bytes, || {
-            detour::plan(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
+        let _ = meter.call("detour::plan_detour, 128 things", bytes, || {
+            detour::plan_detour(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
         });
-        let _ = meter.call("detour::plan_vehicle, 128 things", bytes, || {
-            detour::plan_vehicle(view, &request, &mut obstacles, search, &mut nodes, &mut own)
+        let _ = meter.call("detour::plan_vehicle_detour, 128 things", bytes, || {
+            detour::plan_vehicle_detour(view, &request, &mut obstacles, search, &mut nodes, &mut own)
         });
-        meter.call("detour::KeepOff::holds", 0, || obstacles[0].holds(&here));
+        meter.call("detour::KeepOutZone::contains", 0, || obstacles[0].contains(&here));
     }
 }
 
-fn paths(meter: &mut impl Meter) {
+fn measure_paths(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(6);
     for case in 0..MANY_CASES {
         let mut path: Path<WAYPOINTS> = Path::new();
@@ -278,8 +294,8 @@ fn paths(meter: &mut impl Meter) {
             meter.call("flight::Path::push", 0, || path.push(next, clearance_m)).expect("there is room");
         }
         let length_m = path.length_m();
-        let along_m = uniform(&mut rng, 0.0, length_m);
-        let near = anywhere(&mut rng, 30.0);
+        let along_m = random_between(&mut rng, 0.0, length_m);
+        let near = random_point(&mut rng, 30.0);
         meter.call("flight::Path::point_at", 0, || path.point_at(along_m));
         meter.call("flight::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
         meter.call("flight::Path::project", 0, || path.project(&near, along_m, length_m));
@@ -288,9 +304,16 @@ fn paths(meter: &mut impl Meter) {
         meter.call("track::advance", size_of::<Tracker>(), || {
             track::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
         });
-        let obstacle = KeepOff { from: near, to: near, radius_m: 1.0, nature: Nature::Solid };
-        meter.call("detour::is_blocked", 0, || {
-            detour::is_blocked(&path, -1.0..f32::INFINITY, 1.0, 1.0, &Point::new(500.0, 0.0, 0.0), &obstacle)
+        let obstacle = KeepOutZone { from: near, to: near, radius_m: 1.0, kind: ZoneKind::Static };
+        meter.call("detour::is_path_blocked", 0, || {
+            detour::is_path_blocked(
+                &path,
+                -1.0..f32::INFINITY,
+                1.0,
+                1.0,
+                &Point::new(500.0, 0.0, 0.0),
+                &obstacle,
+            )
         });
         let step = StepCase::new(&mut rng, VEHICLES, case % 2 == 0);
         meter.call("deconflict::advise, priority", 0, || step.advise(Method::Priority));
@@ -298,12 +321,12 @@ fn paths(meter: &mut impl Meter) {
     }
 }
 
-fn segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
+fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
     let mut rng = Pcg32::seed_from_u64(7);
     let (min, max) = (grid.shape().min, grid.shape().max());
     for _ in 0..MANY_CASES {
-        let a = Point::from_fn(|axis, _| uniform(&mut rng, min[axis], max[axis]));
-        let way = anywhere(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_else(Point::x);
+        let a = Point::from_fn(|axis, _| random_between(&mut rng, min[axis], max[axis]));
+        let way = random_point(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_else(Point::x);
         let b = a + way * MAX_EDGE_M;
         meter.call("voxel::VoxelGrid::is_blocked_at", 0, || grid.is_blocked_at(&a));
         meter.call("segment::segment_is_clear, 0 m", 0, || segment::segment_is_clear(grid, &a, &b, 0.0));
@@ -325,24 +348,33 @@ fn segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
 }
 
 /// P3D's building on board.
-fn builds(meter: &mut impl Meter, grid: &VoxelGrid<'_>, scratch: &mut Scratch) {
+fn measure_roadmap_builds(meter: &mut impl Meter, grid: &VoxelGrid<'_>, scratch: &mut WorkspaceOverlay) {
     let bytes = size_of::<prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>>();
     let good = "the building has room";
     let builder = scratch.builder();
     meter
-        .call("prm::sample_nodes, 2300", 0, || builder.sample(grid, &[], &cases::ROADMAP_CONFIG))
+        .call("prm::sample_nodes, 2300", 0, || builder.sample_nodes(grid, &[], &cases::ROADMAP_CONFIG))
         .expect(good);
-    meter.call("prm::Workspace::index, 2300", bytes, || builder.index(&cases::ROADMAP_CONFIG)).expect(good);
-    meter.call("prm::connect_range, 2300", bytes, || builder.join(grid, &cases::ROADMAP_CONFIG)).expect(good);
+    meter
+        .call("prm::Workspace::build_index, 2300", bytes, || builder.build_index(&cases::ROADMAP_CONFIG))
+        .expect(good);
+    meter
+        .call("prm::connect_range, 2300", bytes, || builder.connect_nodes(grid, &cases::ROADMAP_CONFIG))
+        .expect(good);
     let wide = Config { clearance_m: cases::CLEARANCE_M, ..cases::ROADMAP_CONFIG };
-    meter.call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample(grid, &[], &wide)).expect(good);
-    builder.index(&wide).expect(good);
-    meter.call("prm::connect_range, 2300, 0.8 m", bytes, || builder.join(grid, &wide)).expect(good);
+    meter.call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample_nodes(grid, &[], &wide)).expect(good);
+    builder.build_index(&wide).expect(good);
+    meter.call("prm::connect_range, 2300, 0.8 m", bytes, || builder.connect_nodes(grid, &wide)).expect(good);
 }
 
 /// Calls that a desk makes, on a small roadmap.
-fn desk(meter: &mut impl Meter, grid: &VoxelGrid<'_>, search: &mut Search, beside: &mut Beside) {
-    let Beside { small, nodes, edges, kept, file, lengths, .. } = beside;
+fn measure_desk_calls(
+    meter: &mut impl Meter,
+    grid: &VoxelGrid<'_>,
+    search: &mut Search,
+    beside: &mut BenchMemory,
+) {
+    let BenchMemory { small, nodes, edges, kept, file, lengths, .. } = beside;
     let config = Config { nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
     let good = "the building has room";
     prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
@@ -376,7 +408,7 @@ fn desk(meter: &mut impl Meter, grid: &VoxelGrid<'_>, search: &mut Search, besid
         .expect(good);
     let view = RoadmapView::parse(&file[..len]).expect(good);
     // Cannot fail: as many numbers as half-edges.
-    let _ = meter.call("search::WithLengths::new, 300", 4 * view.half_edge_count(), || {
-        WithLengths::new(view, lengths)
+    let _ = meter.call("search::RoadmapWithLengths::new, 300", 4 * view.half_edge_count(), || {
+        RoadmapWithLengths::new(view, lengths)
     });
 }

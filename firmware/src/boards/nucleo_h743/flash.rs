@@ -19,7 +19,7 @@
 
 use core::arch::asm;
 
-use companion::storage::store::{Fault, Layout, ReadFlash, WORD};
+use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Async, Flash as Device};
@@ -27,9 +27,9 @@ use embassy_stm32::pac;
 
 use super::super::mpu;
 use crate::chips::h743;
-use crate::lent::{Lender, Lent};
+use crate::lent::{FlashLender, LentFlash};
 
-/// Offset of bank 2 from the begin of the flash.
+/// Offset of bank 2 from the start of the flash.
 const BANK2_OFFSET: u32 = 1 << 20;
 /// Address of bank 2.
 const BANK2_ADDRESS: usize = 0x0810_0000;
@@ -43,33 +43,33 @@ const BFHFNMIGN: u32 = 1 << 8;
 const BUS_FAULTS: u32 = 0xFF00;
 
 /// Bank 2.
-pub const LAYOUT: Layout = Layout::H743;
+pub const LAYOUT: FlashLayout = FlashLayout::H743;
 
 /// Bank 2; there is one.
 pub struct Flash {
     device: Device<'static, Async>,
-    lender: Lender,
+    lender: FlashLender,
 }
 
 impl Flash {
     pub(super) fn new(device: Device<'static, Async>) -> Self {
-        Self { device, lender: Lender::new() }
+        Self { device, lender: FlashLender::new() }
     }
 
     /// A roadmap as it lies in the bank, cached, and not to be changed until it is given back;
     /// `None` where it would reach beyond, or another one is lent. The store gives only what it has
     /// read whole, by [`ReadFlash::read`]: no word of it is torn.
-    pub fn lend(&mut self, at: u32, len: usize) -> Option<Lent> {
-        let address = place(at, len)?;
+    pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
+        let address = bank_address(at, len)?;
         // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
         let lent = self.lender.lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
         // SAFETY: nobody writes there.
-        unsafe { mpu::set(super::ROADMAP_REGION, Some(&h743::roadmap(at, len as u32))) };
+        unsafe { mpu::set(super::ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32))) };
         Some(lent)
     }
 
     /// The lent range is not used any more, and nothing of it stays in the cache.
-    pub fn take_back(&mut self, lent: Lent) {
+    pub fn take_back(&mut self, lent: LentFlash) {
         // SAFETY: a region less; and the cache's maintenance, which nobody else does after the
         // start.
         unsafe {
@@ -82,19 +82,19 @@ impl Flash {
 }
 
 /// The address of bytes of the bank; `None` where they would reach beyond.
-fn place(at: u32, len: usize) -> Option<usize> {
+fn bank_address(at: u32, len: usize) -> Option<usize> {
     let end = (at as usize).checked_add(len)?;
     (end <= LAYOUT.len() as usize).then_some(BANK2_ADDRESS + at as usize)
 }
 
 impl ReadFlash for Flash {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        let mut address = place(at, out.len()).ok_or(Fault)?;
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
+        let mut address = bank_address(at, out.len()).ok_or(FlashFault)?;
         let mut rest = out;
         while !rest.is_empty() {
             let (piece, after) = rest.split_at_mut(rest.len().min(WORD - address % WORD));
-            // SAFETY: inside the bank, by `place`; and inside one word.
-            unsafe { probe(address as *const u8, piece) }?;
+            // SAFETY: inside the bank, by `bank_address`; and inside one word.
+            unsafe { read_tolerating_bus_errors(address as *const u8, piece) }?;
             address += piece.len();
             rest = after;
         }
@@ -106,7 +106,7 @@ impl ReadFlash for Flash {
 ///
 /// # Safety
 /// They have to be memory, whole or torn.
-unsafe fn probe(from: *const u8, out: &mut [u8]) -> Result<(), Fault> {
+unsafe fn read_tolerating_bus_errors(from: *const u8, out: &mut [u8]) -> Result<(), FlashFault> {
     // SAFETY: no other code of the firmware uses CCR and CFSR but the fault handler, which does not come back.
     let scb = unsafe { &*SCB::PTR };
     // SAFETY: FAULTMASK and BFHFNMIGN are set for the loads alone, and put back: they were not set before. Nothing in between may
@@ -128,7 +128,7 @@ unsafe fn probe(from: *const u8, out: &mut [u8]) -> Result<(), Fault> {
         dsb();
         isb();
         asm!("cpsie f", options(nostack, preserves_flags));
-        if torn { Err(Fault) } else { Ok(()) }
+        if torn { Err(FlashFault) } else { Ok(()) }
     }
 }
 
@@ -148,7 +148,7 @@ fn clear_errors() {
 }
 
 /// Has bank 2 erased 64 bits at a time, as after a reset.
-fn widen() {
+fn restore_erase_width() {
     let bank = pac::FLASH.bank(1);
     if bank.cr().read().lock() {
         UNLOCK_KEYS.into_iter().for_each(|key| bank.keyr().write_value(key));
@@ -157,20 +157,23 @@ fn widen() {
 }
 
 impl crate::flash::Flash for Flash {
-    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+    async fn erase(&mut self, at: u32) -> Result<(), FlashFault> {
         if !self.lender.allows(at, LAYOUT.sector_len) {
-            return Err(Fault);
+            return Err(FlashFault);
         }
         clear_errors();
-        widen();
-        self.device.erase(BANK2_OFFSET + at, BANK2_OFFSET + at + LAYOUT.sector_len).await.map_err(|_| Fault)
+        restore_erase_width();
+        self.device
+            .erase(BANK2_OFFSET + at, BANK2_OFFSET + at + LAYOUT.sector_len)
+            .await
+            .map_err(|_| FlashFault)
     }
 
-    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), FlashFault> {
         if !self.lender.allows(at, bytes.len() as u32) {
-            return Err(Fault);
+            return Err(FlashFault);
         }
         clear_errors();
-        self.device.write(BANK2_OFFSET + at, bytes).await.map_err(|_| Fault)
+        self.device.write(BANK2_OFFSET + at, bytes).await.map_err(|_| FlashFault)
     }
 }

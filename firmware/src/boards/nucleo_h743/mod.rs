@@ -19,7 +19,7 @@ use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals};
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
-use self::start::{clocks, guards};
+use self::start::{clock_config, configure_mpu_and_caches};
 use super::limits::WATCHDOG_TIMEOUT_US;
 use super::{executors, parts};
 use crate::chips::h743::{self, Revision};
@@ -69,28 +69,28 @@ const LINKS_AT: Priority = Priority::P8;
 #[interrupt]
 unsafe fn UART7() {
     // SAFETY: this is the handler.
-    unsafe { executors::on_links() }
+    unsafe { executors::poll_links_executor() }
 }
 
 /// Interrupt of the executor of plans and flash.
 #[interrupt]
 unsafe fn UART8() {
     // SAFETY: as above.
-    unsafe { executors::on_plans() }
+    unsafe { executors::poll_plans_executor() }
 }
 
 /// The parts of this board, ready.
-pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
-    start::wake_watchdog();
-    let revision = Revision::of(pac::DBGMCU.idc().read().0);
+    start::start_watchdog();
+    let revision = Revision::from_idcode(pac::DBGMCU.idc().read().0);
     let has_hse = start::try_hse();
-    let p = embassy_stm32::init(clocks(revision, has_hse));
+    let p = embassy_stm32::init(clock_config(revision, has_hse));
     let mut watchdog = Watchdog::new(p.IWDG1, Output::new(p.PB0, Level::Low, Speed::Low));
-    watchdog.wake();
-    guards();
+    watchdog.start();
+    configure_mpu_and_caches();
     let mut warnings = Vec::new();
     let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
     let wrong = [(level < 3, BROWN_OUT_OFF), (!has_hse, NO_HSE)].into_iter().filter(|(is, _)| *is);
@@ -140,11 +140,11 @@ impl Watchdog {
         Self { device: IndependentWatchdog::new(device, WATCHDOG_TIMEOUT_US), light }
     }
 
-    fn wake(&mut self) {
+    fn start(&mut self) {
         self.device.unleash();
     }
 
-    /// Puts the reset off.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         self.device.pet();
         self.light.toggle();

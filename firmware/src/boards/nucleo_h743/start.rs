@@ -15,14 +15,14 @@ use crate::chips::h743::{self, Revision};
 /// which the oscillator takes 2 (DS12110).
 const MAX_HSE_POLLS: u32 = 200_000;
 
-/// Why the chip started, once: the flags are cleared. Switches the memories of domain D2 on too,
+/// Reason why the chip started, once: the flags are cleared. Switches the memories of domain D2 on too,
 /// and mends reading from AXI SRAM where the silicon is old.
 pub fn reset_cause() -> ResetCause {
     pac::RCC.ahb2enr().modify(|w| w.0 |= h743::D2_SRAM);
     // By the errata of all peripheral clocks: read the register, then the memory is there.
     pac::RCC.ahb2enr().read();
     cortex_m::asm::dsb();
-    if Revision::of(pac::DBGMCU.idc().read().0) == Revision::Old {
+    if Revision::from_idcode(pac::DBGMCU.idc().read().0) == Revision::Old {
         // SAFETY: a register of the bus matrix, as ST's own start code sets it.
         unsafe { (h743::AXI_TARG7_FN_MOD as *mut u32).write_volatile(h743::READ_ISS_OVERRIDE) };
     }
@@ -39,7 +39,7 @@ pub fn reset() -> ! {
 
 /// Starts the watchdog with its registers' first values, 512 ms: should a clock not come, it bites.
 /// It stands still while a debugger has the processor halted.
-pub(super) fn wake_watchdog() {
+pub(super) fn start_watchdog() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
     pac::IWDG1.kr().write(|w| w.set_key(Key::START));
 }
@@ -52,12 +52,12 @@ pub(super) fn try_hse() -> bool {
 }
 
 /// Clocks as fast as the silicon may run, from the board's oscillator or the chip's own.
-pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
+pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
     let hse = rcc::Hse { freq: Hertz::mhz(h743::HSE_MHZ), mode: HseMode::Bypass };
     config.rcc.hse = has_hse.then_some(hse);
-    let (divider, factor) = revision.pll(has_hse);
+    let (divider, factor) = revision.pll_divider_and_factor(has_hse);
     config.rcc.pll1 = Some(rcc::Pll {
         source: if has_hse { rcc::PllSource::HSE } else { rcc::PllSource::HSI },
         prediv: PllPreDiv::from_bits(divider as u8),
@@ -82,7 +82,7 @@ pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config
 }
 
 /// Sets which memory may be cached and touched, then starts the caches.
-pub(super) fn guards() {
+pub(super) fn configure_mpu_and_caches() {
     // The place of the roadmap, `super::ROADMAP_REGION`, is free until there is one.
     let regions = [
         Some(h743::EXTERNAL),
@@ -90,9 +90,9 @@ pub(super) fn guards() {
         Some(h743::BANK2),
         None,
         Some(h743::NULL),
-        Some(mpu::guard()),
+        Some(mpu::stack_guard_region()),
     ];
-    mpu::enable(&regions);
+    mpu::enable_regions(&regions);
     // SAFETY: the caches are this function's alone, which is called once. Code is never written,
     // and what the DMA reaches is not cached.
     let mut core = unsafe { cortex_m::Peripherals::steal() };

@@ -7,14 +7,14 @@
 //! | GP25 | the light |
 //!
 //! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a
-//! UART may be lost. So both are done only on the ground, disarmed (`Layout::stalls`): uploads are
+//! UART may be lost. So both are done only on the ground, disarmed (`FlashLayout::stalls`): uploads are
 //! refused in flight, and parameters are kept when it is over.
 //!
 //! `SYSRESETREQ` resets the processor and leaves watchdog, UARTs and all else as they are: so this
 //! board restarts by its watchdog, which resets all of it but the oscillators.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
-use companion::storage::store::{Fault, Layout, ReadFlash};
+use companion::storage::store::{FlashFault, FlashLayout, ReadFlash};
 use defmt_rtt as _;
 use embassy_rp::flash::{Blocking, Flash as Device};
 use embassy_rp::gpio::{Level, Output};
@@ -28,7 +28,7 @@ use static_cell::ConstStaticCell;
 use super::limits::WATCHDOG_TIMEOUT_US;
 use super::{executors, parts};
 use crate::chips::{ResetCause, rp2350};
-use crate::lent::{Lender, Lent};
+use crate::lent::{FlashLender, LentFlash};
 
 bind_interrupts!(struct Irqs {
     UART0_IRQ => BufferedInterruptHandler<peripherals::UART0>;
@@ -45,12 +45,12 @@ static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING
 
 /// Bytes of the whole flash.
 const FLASH_LEN: usize = 4 << 20;
-/// Offset of our store from the begin of the flash.
+/// Offset of our store from the start of the flash.
 const STORE_OFFSET: u32 = 1 << 20;
 /// Address of our store.
 const STORE_ADDRESS: usize = 0x1010_0000;
 /// Layout of the store, which lies after the program.
-pub const LAYOUT: Layout = Layout::PICO2;
+pub const LAYOUT: FlashLayout = FlashLayout::PICO2;
 
 /// Receives by interrupt into a ring.
 pub type Receiver = BufferedUartRx;
@@ -65,17 +65,17 @@ const LINKS_AT: Priority = Priority::P1;
 #[interrupt]
 unsafe fn SWI_IRQ_0() {
     // SAFETY: this is the handler.
-    unsafe { executors::on_links() }
+    unsafe { executors::poll_links_executor() }
 }
 
 /// Runs the executor of plans and flash.
 #[interrupt]
 unsafe fn SWI_IRQ_1() {
     // SAFETY: as above.
-    unsafe { executors::on_plans() }
+    unsafe { executors::poll_plans_executor() }
 }
 
-/// Why the chip started.
+/// Reason why the chip started.
 pub fn reset_cause() -> ResetCause {
     let chip = pac::POWMAN.chip_reset().read().0;
     rp2350::reset_cause(chip, pac::WATCHDOG.reason().read().0)
@@ -103,14 +103,14 @@ fn guard_stack() {
 }
 
 /// The parts of this board, ready.
-pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
     guard_stack();
     let p = embassy_rp::init(embassy_rp::config::Config::default());
     let mut watchdog = Watchdog::new(p.WATCHDOG, Output::new(p.PIN_25, Level::Low));
-    watchdog.wake();
+    watchdog.start();
     interrupt::SWI_IRQ_0.set_priority(LINKS_AT);
     interrupt::SWI_IRQ_1.set_priority(Priority::P2);
     let serial = |baudrate| {
@@ -139,7 +139,7 @@ pub fn start() -> Parts {
         plans: executors::start_plans(interrupt::SWI_IRQ_1),
         autopilot,
         swarm: (receives, sends),
-        flash: Flash { device: Device::new_blocking(p.FLASH), lender: Lender::new() },
+        flash: Flash { device: Device::new_blocking(p.FLASH), lender: FlashLender::new() },
         watchdog,
         warnings: Vec::new(),
     }
@@ -148,13 +148,13 @@ pub fn start() -> Parts {
 /// The part of the flash after the program.
 pub struct Flash {
     device: Device<'static, peripherals::FLASH, Blocking, FLASH_LEN>,
-    lender: Lender,
+    lender: FlashLender,
 }
 
 impl Flash {
     /// A roadmap as it lies there, not to be changed until it is given back; `None` where it would
     /// reach beyond, or another one is lent.
-    pub fn lend(&mut self, at: u32, len: usize) -> Option<Lent> {
+    pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
         (at as usize).checked_add(len).filter(|end| *end <= LAYOUT.len() as usize)?;
         let from = (STORE_ADDRESS + at as usize) as *const u8;
         // SAFETY: inside the flash, which nobody erases or programs there as long as it is lent.
@@ -162,32 +162,32 @@ impl Flash {
     }
 
     /// The lent range is not used any more.
-    pub fn take_back(&mut self, lent: Lent) {
+    pub fn take_back(&mut self, lent: LentFlash) {
         self.lender.take_back(lent);
     }
 }
 
 impl ReadFlash for Flash {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        self.device.blocking_read(STORE_OFFSET + at, out).map_err(|_| Fault)
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
+        self.device.blocking_read(STORE_OFFSET + at, out).map_err(|_| FlashFault)
     }
 }
 
 impl crate::flash::Flash for Flash {
-    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+    async fn erase(&mut self, at: u32) -> Result<(), FlashFault> {
         if !self.lender.allows(at, LAYOUT.sector_len) {
-            return Err(Fault);
+            return Err(FlashFault);
         }
         self.device
             .blocking_erase(STORE_OFFSET + at, STORE_OFFSET + at + LAYOUT.sector_len)
-            .map_err(|_| Fault)
+            .map_err(|_| FlashFault)
     }
 
-    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), FlashFault> {
         if !self.lender.allows(at, bytes.len() as u32) {
-            return Err(Fault);
+            return Err(FlashFault);
         }
-        self.device.blocking_write(STORE_OFFSET + at, bytes).map_err(|_| Fault)
+        self.device.blocking_write(STORE_OFFSET + at, bytes).map_err(|_| FlashFault)
     }
 }
 
@@ -203,13 +203,13 @@ impl Watchdog {
     }
 
     /// Wakes it; it stands still while a debugger has a processor halted.
-    fn wake(&mut self) {
+    fn start(&mut self) {
         self.device.pause_on_debug(true);
         self.device.start(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         set_watchdog_resets();
     }
 
-    /// Puts the reset off.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         self.device.feed(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         self.light.toggle();

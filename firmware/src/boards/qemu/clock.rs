@@ -80,12 +80,12 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
 };
 
 /// When a task is due, counts. Wakes those that are due by now.
-pub(super) fn alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
+pub(super) fn next_alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
     CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_PER_US).saturating_mul(COUNTS_PER_US)
 }
 
 /// Makes `counts` pass at once, in lock step.
-pub(super) fn pass(cs: CriticalSection<'_>, counts: u64) {
+pub(super) fn skip_time(cs: CriticalSection<'_>, counts: u64) {
     let skipped = CLOCK.skipped.borrow(cs);
     skipped.set(skipped.get() + counts);
 }
@@ -107,7 +107,7 @@ impl Clock {
             }
             let due = next_us.saturating_mul(COUNTS_PER_US);
             if due > now {
-                // Far alarms are looked at again when the timer has run down.
+                // Far alarms are checked again when the timer has run down.
                 let wait = (due - now).min(u64::from(u32::MAX)) as u32;
                 Register::new(TIMER1, VALUE).write(wait);
                 return;

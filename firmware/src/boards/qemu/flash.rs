@@ -2,11 +2,11 @@
 //! that are programmed once between two erasures, and torn ones that cannot be read.
 #![expect(unsafe_code, reason = "the emulated flash is memory that the linker knows nothing of")]
 
-use companion::storage::store::{Fault, Layout, ReadFlash, WORD};
+use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
 use embassy_time::{Duration, Timer};
 
 use super::memory::Bank2;
-use crate::lent::{Lender, Lent};
+use crate::lent::{FlashLender, LentFlash};
 
 /// Address of the bank.
 const BANK_ADDRESS: usize = 0x6000_0000;
@@ -27,10 +27,10 @@ const ERASE_TIME: Duration = Duration::from_millis(1100);
 const PROGRAM_TIME: Duration = Duration::from_micros(100);
 
 /// The emulated bank is the real one's size.
-pub const LAYOUT: Layout = Layout::H743;
+pub const LAYOUT: FlashLayout = FlashLayout::H743;
 
 /// The bank; there is one.
-pub struct Flash(Lender);
+pub struct Flash(FlashLender);
 
 impl Flash {
     /// To be called once, at the start: the bank is empty if the power was off.
@@ -44,38 +44,38 @@ impl Flash {
                 (BANK_MADE as *mut u32).write_volatile(MAGIC);
             }
         }
-        Self(Lender::new())
+        Self(FlashLender::new())
     }
 
     /// A roadmap as it lies in the bank, not to be changed until it is given back; `None` where it
     /// cannot be read, or another one is lent.
-    pub fn lend(&mut self, at: u32, len: usize) -> Option<Lent> {
-        let place = readable(at, len)?;
+    pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
+        let place = readable_address(at, len)?;
         // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
         self.0.lend(at, unsafe { core::slice::from_raw_parts(place, len) })
     }
 
     /// The lent range is not used any more.
-    pub fn take_back(&mut self, lent: Lent) {
+    pub fn take_back(&mut self, lent: LentFlash) {
         self.0.take_back(lent);
     }
 }
 
 /// Address of these bytes; `None` where they would reach beyond the bank, or a word of them is
 /// torn.
-fn readable(at: u32, len: usize) -> Option<*const u8> {
+fn readable_address(at: u32, len: usize) -> Option<*const u8> {
     let at = at as usize;
     let end = at.checked_add(len).filter(|end| *end <= LEN)?;
-    let torn = (at / WORD..end.div_ceil(WORD)).any(|word| mark(word) == TORN);
+    let torn = (at / WORD..end.div_ceil(WORD)).any(|word| word_mark(word) == TORN);
     (!torn).then_some((BANK_ADDRESS + at) as *const u8)
 }
 
 impl crate::flash::Flash for Flash {
-    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+    async fn erase(&mut self, at: u32) -> Result<(), FlashFault> {
         let (allowed, at, len) =
             (self.0.allows(at, LAYOUT.sector_len), at as usize, LAYOUT.sector_len as usize);
         if !at.is_multiple_of(len) || at + len > LEN || !allowed {
-            return Err(Fault);
+            return Err(FlashFault);
         }
         // A cut while it lasts leaves words that are neither.
         for word in at / WORD..(at + len) / WORD {
@@ -90,16 +90,16 @@ impl crate::flash::Flash for Flash {
         Ok(())
     }
 
-    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), FlashFault> {
         let (allowed, at) = (self.0.allows(at, bytes.len() as u32), at as usize);
         if !allowed || !at.is_multiple_of(WORD) || !bytes.len().is_multiple_of(WORD) || at + bytes.len() > LEN
         {
-            return Err(Fault);
+            return Err(FlashFault);
         }
         for (i, word) in bytes.chunks(WORD).enumerate() {
             let place = at / WORD + i;
-            if mark(place) != ERASED {
-                return Err(Fault);
+            if word_mark(place) != ERASED {
+                return Err(FlashFault);
             }
             set_mark(place, TORN);
             Timer::after(PROGRAM_TIME).await;
@@ -114,15 +114,15 @@ impl crate::flash::Flash for Flash {
 }
 
 impl ReadFlash for Flash {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        let from = readable(at, out.len()).ok_or(Fault)?;
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
+        let from = readable_address(at, out.len()).ok_or(FlashFault)?;
         // SAFETY: inside the bank, and `out` is not.
         unsafe { out.as_mut_ptr().copy_from_nonoverlapping(from, out.len()) };
         Ok(())
     }
 }
 
-fn mark(word: usize) -> u8 {
+fn word_mark(word: usize) -> u8 {
     // SAFETY: the callers keep `word` below the number of words, and each has a mark.
     unsafe { ((WORD_MARKS + word) as *const u8).read_volatile() }
 }

@@ -35,7 +35,7 @@ const INTCLR: usize = 12;
 const ONE_SHOT: u32 = 0b1110_0011;
 
 /// Connection of the board to the desk.
-struct Desk {
+struct SimulationLink {
     input: File,
     output: File,
     /// Bytes of the message, and how many of them were done.
@@ -49,7 +49,7 @@ struct Desk {
     take: fn(u8, &[u8]),
 }
 
-static DESK: Mutex<RefCell<Option<Desk>>> = Mutex::new(RefCell::new(None));
+static DESK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
 
 /// Waits for the first message, if the board was switched on in lock step. Bytes that come to a port are given to `take`.
 pub fn start(take: fn(u8, &[u8])) {
@@ -58,23 +58,23 @@ pub fn start(take: fn(u8, &[u8])) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
         // The log goes to the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
-        let mut desk = Desk { input, output, length: 0, done: 0, sent: 0, due: 0, take };
-        desk.say(FromBoard::Started, &[]);
+        let mut desk = SimulationLink { input, output, length: 0, done: 0, sent: 0, due: 0, take };
+        desk.queue_record(FromBoard::Started, &[]);
         desk.flush();
-        desk.read();
+        desk.read_message();
         Register::new(TIMER, CONTROL).write(ONE_SHOT);
         interrupts::enable(Irq::DualTimer, interrupts::GRANTS);
-        critical_section::with(|cs| DESK.borrow_ref_mut(cs).insert(desk).go_on(cs));
+        critical_section::with(|cs| DESK.borrow_ref_mut(cs).insert(desk).run_due_work(cs));
     }
 }
 
 /// Whether the board is in lock step.
-pub fn are_needed() -> bool {
+pub fn is_lock_step() -> bool {
     critical_section::with(|cs| DESK.borrow_ref(cs).is_some())
 }
 
 /// When something is due, counts of the clock.
-pub fn due(cs: CriticalSection<'_>) -> u64 {
+pub fn next_due(cs: CriticalSection<'_>) -> u64 {
     DESK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
 }
 
@@ -83,7 +83,7 @@ pub fn on_alarm() {
     Register::new(TIMER, INTCLR).write(1);
     critical_section::with(|cs| {
         if let Some(desk) = &mut *DESK.borrow_ref_mut(cs) {
-            desk.go_on(cs);
+            desk.run_due_work(cs);
         }
     });
 }
@@ -94,17 +94,17 @@ pub fn send(port: u8, bytes: &[u8]) -> bool {
         let mut desk = DESK.borrow_ref_mut(cs);
         let Some(desk) = &mut *desk else { return false };
         let at_us = CLOCK_NOW(cs) / COUNTS_PER_US;
-        desk.say(FromBoard::Sent { port, len: bytes.len() as u16, at_us }, bytes);
+        desk.queue_record(FromBoard::Sent { port, len: bytes.len() as u16, at_us }, bytes);
         true
     })
 }
 
-impl Desk {
-    /// Does all that is due, and sets the timer for what is next.
-    fn go_on(&mut self, cs: CriticalSection<'_>) {
+impl SimulationLink {
+    /// Runs all work that is due, and sets the timer for the next.
+    fn run_due_work(&mut self, cs: CriticalSection<'_>) {
         loop {
-            let Some(record) = self.record() else {
-                self.answer(cs);
+            let Some(record) = self.next_record() else {
+                self.finish_message(cs);
                 continue;
             };
             let due_us = match record {
@@ -119,33 +119,33 @@ impl Desk {
                 Register::new(TIMER, LOAD).write((due - now).min(u64::from(u32::MAX)) as u32);
                 return;
             }
-            self.obey(record);
+            self.execute_record(record);
         }
     }
 
     /// The next record of the message.
-    fn record(&self) -> Option<ToBoard> {
-        let head = self.message()[self.done..].first_chunk::<HEAD>()?;
+    fn next_record(&self) -> Option<ToBoard> {
+        let head = self.message_bytes()[self.done..].first_chunk::<HEAD>()?;
         Some(ToBoard::from_bytes(head).expect("the desk sends records"))
     }
 
-    fn message(&self) -> &'static [u8] {
-        // SAFETY: memory of this board that nothing else uses; it changes in `read` alone, which has no slice of it.
+    fn message_bytes(&self) -> &'static [u8] {
+        // SAFETY: memory of this board that nothing else uses; it changes in `read_message` alone, which has no slice of it.
         unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.length) }
     }
 
-    /// Does what a record says.
-    fn obey(&mut self, record: ToBoard) {
+    /// Executes a record.
+    fn execute_record(&mut self, record: ToBoard) {
         let from = self.done + HEAD;
-        self.done = from + record.follows();
-        let bytes = &self.message()[from..self.done];
+        self.done = from + record.payload_len();
+        let bytes = &self.message_bytes()[from..self.done];
         match record {
             ToBoard::Bytes { port, .. } => (self.take)(port, bytes),
             ToBoard::Run { .. } => {}
             ToBoard::Peek { address, len } => {
                 // SAFETY: the desk asks for memory that there is.
                 let memory = unsafe { slice::from_raw_parts(address as usize as *const u8, len.into()) };
-                self.say(FromBoard::Memory { len }, memory);
+                self.queue_record(FromBoard::Memory { len }, memory);
             }
             ToBoard::Poke { address, .. } => {
                 // SAFETY: as a debug probe, the desk knows what it does.
@@ -160,14 +160,14 @@ impl Desk {
     }
 
     /// Ends a message: the next one takes its place.
-    fn answer(&mut self, cs: CriticalSection<'_>) {
-        self.say(FromBoard::Waits { now_us: CLOCK_NOW(cs) / COUNTS_PER_US }, &[]);
+    fn finish_message(&mut self, cs: CriticalSection<'_>) {
+        self.queue_record(FromBoard::Waits { now_us: CLOCK_NOW(cs) / COUNTS_PER_US }, &[]);
         self.flush();
-        self.read();
+        self.read_message();
     }
 
     /// Keeps a record for the grant's end, or sends it now if there is no more room.
-    fn say(&mut self, record: FromBoard, bytes: &[u8]) {
+    fn queue_record(&mut self, record: FromBoard, bytes: &[u8]) {
         if self.sent + HEAD + bytes.len() > LONGEST {
             self.flush();
         }
@@ -179,14 +179,14 @@ impl Desk {
     }
 
     fn flush(&mut self) {
-        // SAFETY: as above; `say` wrote it.
+        // SAFETY: as above; `queue_record` wrote it.
         let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.sent) };
         self.output.write_all(sent).expect("the desk listens");
         self.sent = 0;
     }
 
     /// Waits for the next message.
-    fn read(&mut self) {
+    fn read_message(&mut self) {
         let mut length = [0; 4];
         // The desk is gone: there is nobody to run for.
         if self.input.read_exact(&mut length).is_err() {

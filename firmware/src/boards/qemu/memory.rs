@@ -25,7 +25,7 @@ pub(super) enum Bank2 {
 }
 
 impl Bank2 {
-    /// Whether it is for this: the first to ask decides.
+    /// Claims the bank for this use. Returns false if it was claimed for the other one.
     pub(super) fn claim(self) -> bool {
         static CLAIMED: AtomicU8 = AtomicU8::new(0);
         let before = CLAIMED.compare_exchange(0, self as u8, Ordering::Relaxed, Ordering::Relaxed);
@@ -44,7 +44,7 @@ pub fn bank2() -> &'static [u8] {
 }
 
 /// The map for measurements: its head and its words.
-pub fn map() -> ([u8; MAP_HEADER_LEN], &'static [u64]) {
+pub fn measurement_map() -> ([u8; MAP_HEADER_LEN], &'static [u64]) {
     // SAFETY: readable, aligned memory; nobody writes to it.
     let head = unsafe { *(MAP_ADDRESS as *const [u8; MAP_HEADER_LEN]) };
     let words = u32::from_le_bytes([head[28], head[29], head[30], head[31]]) as usize;
@@ -57,7 +57,7 @@ pub fn map() -> ([u8; MAP_HEADER_LEN], &'static [u64]) {
 
 /// Memory as long as bank 2 and a place for a flash that programs and erases in no time, for
 /// measurements; once.
-pub fn spare() -> Option<&'static mut [u8]> {
+pub fn take_spare_memory() -> Option<&'static mut [u8]> {
     static TAKEN: AtomicBool = AtomicBool::new(false);
     if TAKEN.swap(true, Ordering::Relaxed) {
         return None;

@@ -35,14 +35,14 @@ pub fn reset() -> ! {
 }
 
 /// The parts of this board, ready.
-pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
-    mpu::enable(&[Some(mpu::guard())]);
+    mpu::enable_regions(&[Some(mpu::stack_guard_region())]);
     clock::start();
     let mut watchdog = Watchdog(());
-    watchdog.wake();
+    watchdog.start();
     let parts = Parts {
         links: vectors::start_links(),
         plans: vectors::start_plans(),
@@ -52,6 +52,6 @@ pub fn start() -> Parts {
         watchdog,
         warnings: Vec::new(),
     };
-    grants::start(|port, bytes| uart::of_port(port).take(bytes));
+    grants::start(|port, bytes| uart::of_port(port).receive_in_lock_step(bytes));
     parts
 }

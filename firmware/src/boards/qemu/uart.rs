@@ -77,7 +77,7 @@ impl Uart {
     }
 
     /// Takes bytes that a line in lock step brings: all that there is room for.
-    pub(super) fn take(&self, mut bytes: &[u8]) {
+    pub(super) fn receive_in_lock_step(&self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let Ok(taken) = self.received.try_write(bytes) else {
                 self.counters.dropped.fetch_add(bytes.len() as u32, Ordering::Relaxed);
@@ -109,19 +109,19 @@ impl Uart {
     }
 }
 
-/// Bytes were lost, by the device or behind it.
+/// Error: bytes were lost in the device or in the receive buffer.
 #[derive(Clone, Copy, Debug)]
-pub struct Lost;
+pub struct BytesLost;
 
-impl core::fmt::Display for Lost {
+impl core::fmt::Display for BytesLost {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("bytes were lost")
     }
 }
 
-impl core::error::Error for Lost {}
+impl core::error::Error for BytesLost {}
 
-impl embedded_io_async::Error for Lost {
+impl embedded_io_async::Error for BytesLost {
     fn kind(&self) -> embedded_io_async::ErrorKind {
         embedded_io_async::ErrorKind::Other
     }
@@ -138,7 +138,7 @@ pub struct Receiver {
 pub struct Transmitter(&'static Uart);
 
 impl embedded_io_async::ErrorType for Receiver {
-    type Error = Lost;
+    type Error = BytesLost;
 }
 
 impl embedded_io_async::Read for Receiver {
@@ -146,7 +146,7 @@ impl embedded_io_async::Read for Receiver {
         let lost = [&self.uart.counters.overruns, &self.uart.counters.dropped];
         let lost = lost.iter().fold(0, |sum: u32, count| sum.wrapping_add(count.load(Ordering::Relaxed)));
         if core::mem::replace(&mut self.reported, lost) != lost {
-            return Err(Lost);
+            return Err(BytesLost);
         }
         Ok(self.uart.received.read(buffer).await)
     }

@@ -48,12 +48,12 @@ unsafe extern "C" fn dual_timer() {
 
 unsafe extern "C" fn links() {
     // SAFETY: this is the handler.
-    unsafe { executors::on_links() }
+    unsafe { executors::poll_links_executor() }
 }
 
 unsafe extern "C" fn plans() {
     // SAFETY: as above.
-    unsafe { executors::on_plans() }
+    unsafe { executors::poll_plans_executor() }
 }
 
 /// Starts the executor of links and setpoints. To be called once.

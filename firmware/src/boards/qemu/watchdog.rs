@@ -31,7 +31,7 @@ static LAST_FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
 /// Counts by which time may be skipped: the device counts none of them, so the rest is counted
 /// here.
-pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
+pub fn counts_until_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     let bites = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
     if now >= bites {
         SCB::sys_reset();
@@ -47,15 +47,15 @@ fn note_fed() {
 pub struct Watchdog(pub(super) ());
 
 impl Watchdog {
-    /// Wakes it.
-    pub(super) fn wake(&mut self) {
+    /// Starts the watchdog.
+    pub(super) fn start(&mut self) {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
         Register::new(WATCHDOG, LOAD).write(RELOAD_COUNTS);
         Register::new(WATCHDOG, CTRL).write(ENABLED);
         note_fed();
     }
 
-    /// Puts the reset off.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         Register::new(WATCHDOG, INTCLR).write(1);
         note_fed();

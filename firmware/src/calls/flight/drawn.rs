@@ -3,12 +3,12 @@
 use companion::{Config, RosterEntry};
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::flight::{Gate, Look, Path, Photographs, Range, Task, Trigger, VehiclePlan};
+use planner_core::flight::{Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange};
 use rand_pcg::Pcg32;
 
 use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
-use crate::cases::{anywhere, below, uniform};
+use crate::cases::{random_below, random_between, random_point};
 
 /// Time after which a lost vehicle is on the ground, seconds.
 const LOST_VEHICLE_DOWN_S: f32 = 60.0;
@@ -33,14 +33,14 @@ pub fn config() -> Config<VEHICLES> {
 
 /// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight on or to and fro.
 pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
-    let leg_m = [0.2, 1.0, 5.0][below(rng, 3)];
-    let onward = anywhere(rng, leg_m);
-    let straight = below(rng, 2) == 0;
+    let leg_m = [0.2, 1.0, 5.0][random_below(rng, 3)];
+    let onward = random_point(rng, leg_m);
+    let straight = random_below(rng, 2) == 0;
     let mut path = Path::new();
     let mut at = Point::new(0.0, 0.0, 10.0);
-    for _ in 0..[4, 8, WAYPOINTS][below(rng, 3)] {
-        path.push(at, uniform(rng, 0.4, 2.0)).expect("there is room");
-        at += if straight { onward + anywhere(rng, 0.01 * leg_m) } else { anywhere(rng, leg_m) };
+    for _ in 0..[4, 8, WAYPOINTS][random_below(rng, 3)] {
+        path.push(at, random_between(rng, 0.4, 2.0)).expect("there is room");
+        at += if straight { onward + random_point(rng, 0.01 * leg_m) } else { random_point(rng, leg_m) };
     }
     path
 }
@@ -51,9 +51,9 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let length_m = path.length_m();
     let mut gates: Vec<_, GATES> = (0..GATES)
         .map(|_| Gate {
-            at_m: uniform(rng, 0.0, length_m),
-            id: 2 + below(rng, VEHICLES) as u8,
-            until_m: uniform(rng, 0.0, 60.0),
+            at_m: random_between(rng, 0.0, length_m),
+            id: 2 + random_below(rng, VEHICLES) as u8,
+            until_m: random_between(rng, 0.0, 60.0),
         })
         .collect();
     gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
@@ -76,12 +76,12 @@ pub fn area_config() -> Config<VEHICLES> {
 /// A random plan of a coverage mission: every second leg is a lane.
 pub fn random_area_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let mut plan = random_plan(rng);
-    let mut photographs =
-        Photographs::new(PICTURE_SPACING_M, Look::Ahead, Trigger::Distance).of_area(TOTAL_PICTURES, false);
+    let mut photographs = PicturePlan::new(PICTURE_SPACING_M, HeadingMode::Ahead, Trigger::Distance)
+        .with_area(TOTAL_PICTURES, false);
     for (lane, from) in (1..plan.path.waypoints().len() - 1).step_by(2).enumerate() {
         let first = PICTURES_PER_LANE * lane as u32;
         photographs
-            .mark(from, from + 1, Range { first, end: first + PICTURES_PER_LANE })
+            .add_stretch(from, from + 1, WaypointRange { first, end: first + PICTURES_PER_LANE })
             .expect("there is room");
     }
     plan.task = Task::Photograph(photographs);

@@ -26,7 +26,7 @@ fn the_filter_is_counted_in_flight() {
     for seed in 0..10 {
         let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(config()).expect("the settings are good");
-        filter(seed, &plan, &mut companion, &mut meter);
+        measure_filter(seed, &plan, &mut companion, &mut meter);
     }
     assert_eq!(meter.filtered, 10 * FILTER_ROUNDS);
 }
@@ -38,7 +38,7 @@ fn most_steps_of_a_flight_are_flown() {
     for seed in 0..10 {
         let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(config()).expect("the settings are good");
-        flown += fly(seed, &plan, &mut companion, &mut meter);
+        flown += measure_flight(seed, &plan, &mut companion, &mut meter);
     }
     assert_eq!(meter.steps, flown);
     assert!(flown > 8 * COUNTED_STEPS, "{flown}");
@@ -51,7 +51,7 @@ fn steps_of_coverage_missions_are_flown() {
     for seed in 0..10 {
         let plan = random_area_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(area_config()).expect("the settings are good");
-        flown += fly(seed, &plan, &mut companion, &mut meter);
+        flown += measure_flight(seed, &plan, &mut companion, &mut meter);
         std::println!("{:?}", companion.state());
     }
     assert!(meter.in_areas > flown, "steps before the flight count too");

@@ -6,12 +6,12 @@ use pulp::Simd;
 
 /// A vector of f32 lanes.
 #[derive(Clone, Copy)]
-pub(super) struct Lanes<S: Simd> {
+pub(super) struct SimdLanes<S: Simd> {
     simd: S,
     numbers: S::f32s,
 }
 
-impl<S: Simd> Lanes<S> {
+impl<S: Simd> SimdLanes<S> {
     #[inline(always)]
     fn new(simd: S, numbers: S::f32s) -> Self {
         Self { simd, numbers }
@@ -19,25 +19,25 @@ impl<S: Simd> Lanes<S> {
 
     /// A vector with `x` in every SIMD lane.
     #[inline(always)]
-    pub(super) fn all(simd: S, x: f32) -> Self {
+    pub(super) fn splat(simd: S, x: f32) -> Self {
         Self::new(simd, simd.splat_f32s(x))
     }
 
     /// Three numbers, each in all of its own.
     #[inline(always)]
-    pub(super) fn triple(simd: S, [x, y, z]: [f32; 3]) -> [Self; 3] {
-        [Self::all(simd, x), Self::all(simd, y), Self::all(simd, z)]
+    pub(super) fn splat_triple(simd: S, [x, y, z]: [f32; 3]) -> [Self; 3] {
+        [Self::splat(simd, x), Self::splat(simd, y), Self::splat(simd, z)]
     }
 
     /// A vector of zeros.
     #[inline(always)]
     pub(super) fn zero(self) -> Self {
-        Self::all(self.simd, 0.0)
+        Self::splat(self.simd, 0.0)
     }
 
     /// A part of some numbers on three axes.
     #[inline(always)]
-    pub(super) fn part<const N: usize>(simd: S, [x, y, z]: &[[f32; N]; 3], part: usize) -> [Self; 3] {
+    pub(super) fn load_part<const N: usize>(simd: S, [x, y, z]: &[[f32; N]; 3], part: usize) -> [Self; 3] {
         [
             Self::new(simd, S::as_simd_f32s(x).0[part]),
             Self::new(simd, S::as_simd_f32s(y).0[part]),
@@ -47,7 +47,7 @@ impl<S: Simd> Lanes<S> {
 
     /// Writes them as a part of some numbers.
     #[inline(always)]
-    pub(super) fn put(self, numbers: &mut [f32], part: usize) {
+    pub(super) fn store_part(self, numbers: &mut [f32], part: usize) {
         S::as_mut_simd_f32s(numbers).0[part] = self.numbers;
     }
 
@@ -76,7 +76,7 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-impl<S: Simd> Add for Lanes<S> {
+impl<S: Simd> Add for SimdLanes<S> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -84,7 +84,7 @@ impl<S: Simd> Add for Lanes<S> {
     }
 }
 
-impl<S: Simd> Sub for Lanes<S> {
+impl<S: Simd> Sub for SimdLanes<S> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -92,7 +92,7 @@ impl<S: Simd> Sub for Lanes<S> {
     }
 }
 
-impl<S: Simd> Mul for Lanes<S> {
+impl<S: Simd> Mul for SimdLanes<S> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -100,7 +100,7 @@ impl<S: Simd> Mul for Lanes<S> {
     }
 }
 
-impl<S: Simd> Div for Lanes<S> {
+impl<S: Simd> Div for SimdLanes<S> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {

@@ -2,11 +2,11 @@
 //!
 //! All boxes of a node are treated alike, by vector instructions where the machine has them: branches that depend on distances
 //! cannot be foreseen, and cost more than arithmetic. The results are the same bits with any of them. What calculates with
-//! [`Lanes`] is inlined into [`Search::with_simd`], and closures are not: so there are none.
+//! [`SimdLanes`] is inlined into [`Search::with_simd`], and closures are not: so there are none.
 
 use pulp::{Simd, WithSimd};
 
-use super::lanes::Lanes;
+use super::lanes::SimdLanes;
 
 /// Boxes of a node.
 pub(super) const BOXES_PER_NODE: usize = 8;
@@ -44,7 +44,7 @@ impl Node {
 
 /// A node to be opened, and the least square of a distance to what it holds.
 #[derive(Clone, Copy, Default)]
-struct Waiting {
+struct OpenNode {
     square: f32,
     node: u32,
 }
@@ -65,26 +65,26 @@ impl WithSimd for Search<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f32 {
         let Self { nodes, segment, mut bound, enough } = self;
-        let mut waiting = [Waiting::default(); MAX_WAITING_NODES];
+        let mut waiting = [OpenNode::default(); MAX_WAITING_NODES];
         let mut count = 1;
         while count > 0 && bound > enough {
             count -= 1;
-            let Waiting { square, node: index } = waiting[count];
+            let OpenNode { square, node: index } = waiting[count];
             if square >= bound {
                 continue;
             }
             let node = &nodes[index as usize];
-            let (least, most) = segment.squares(simd, node);
+            let (least, most) = segment.distance_bounds_sq(simd, node);
             if !node.is_leaf() {
                 for (&square, child) in least.iter().zip(&node.child) {
-                    waiting[count] = Waiting { square, node: index + child };
+                    waiting[count] = OpenNode { square, node: index + child };
                     count += usize::from(square < bound);
                 }
                 continue;
             }
             bound = bound.min(least_of(simd, &most));
             if least_of(simd, &least) < bound {
-                bound = bound.min(least_of(simd, &segment.squares_to_boxes(simd, node)));
+                bound = bound.min(least_of(simd, &segment.distances_sq_to_boxes(simd, node)));
             }
         }
         bound
@@ -131,7 +131,7 @@ impl Segment {
     }
 
     /// Distance to the nearest face of the grid, negative outside.
-    pub(super) fn to_outside(&self, dims: [u32; 3]) -> f32 {
+    pub(super) fn distance_to_faces(&self, dims: [u32; 3]) -> f32 {
         (0..3)
             .map(|axis| self.low[axis].min(dims[axis] as f32 - self.high[axis]))
             .fold(f32::INFINITY, f32::min)
@@ -141,14 +141,20 @@ impl Segment {
     /// is. The first is the greater of two: the distance of the box around the segment, and, as squares of distances along a
     /// segment are convex, the tangent where the segment is nearest to the box's centre.
     #[inline(always)]
-    fn squares<S: Simd>(&self, simd: S, node: &Node) -> ([f32; BOXES_PER_NODE], [f32; BOXES_PER_NODE]) {
-        let [a, d] = [Lanes::triple(simd, self.a), Lanes::triple(simd, self.d)];
-        let [first, last] = [Lanes::triple(simd, self.low), Lanes::triple(simd, self.high)];
-        let [zero, half, one] = Lanes::triple(simd, [0.0, 0.5, 1.0]);
-        let [two, rounding, inv_square] = Lanes::triple(simd, [2.0, 2e-6, self.inv_square]);
+    fn distance_bounds_sq<S: Simd>(
+        &self,
+        simd: S,
+        node: &Node,
+    ) -> ([f32; BOXES_PER_NODE], [f32; BOXES_PER_NODE]) {
+        let [a, d] = [SimdLanes::splat_triple(simd, self.a), SimdLanes::splat_triple(simd, self.d)];
+        let [first, last] =
+            [SimdLanes::splat_triple(simd, self.low), SimdLanes::splat_triple(simd, self.high)];
+        let [zero, half, one] = SimdLanes::splat_triple(simd, [0.0, 0.5, 1.0]);
+        let [two, rounding, inv_square] = SimdLanes::splat_triple(simd, [2.0, 2e-6, self.inv_square]);
         let (mut least, mut most) = ([0.0; BOXES_PER_NODE], [0.0; BOXES_PER_NODE]);
         for part in 0..BOXES_PER_NODE / S::F32_LANES {
-            let [low, high] = [Lanes::part(simd, &node.low, part), Lanes::part(simd, &node.high, part)];
+            let [low, high] =
+                [SimdLanes::load_part(simd, &node.low, part), SimdLanes::load_part(simd, &node.high, part)];
             let (mut gap_square, mut along) = (zero, zero);
             for axis in 0..3 {
                 let gap = (low[axis] - last[axis]).max(first[axis] - high[axis]).max(zero);
@@ -166,8 +172,8 @@ impl Segment {
             let fall = (rate * t).max(rate * (t - one));
             // Less what the terms are rounded by.
             let tangent = square - two * fall - rounding * (square + fall);
-            tangent.max(gap_square).put(&mut least, part);
-            square.put(&mut most, part);
+            tangent.max(gap_square).store_part(&mut least, part);
+            square.store_part(&mut most, part);
         }
         (least, most)
     }
@@ -176,13 +182,17 @@ impl Segment {
     /// quadratic, with breaks where the segment crosses a face's plane; its rate is linear between them.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "several arrays of three axes, side by side")]
-    fn squares_to_boxes<S: Simd>(&self, simd: S, node: &Node) -> [f32; BOXES_PER_NODE] {
-        let [a, d, per_d] =
-            [Lanes::triple(simd, self.a), Lanes::triple(simd, self.d), Lanes::triple(simd, self.per_d)];
-        let [zero, a_half, one] = Lanes::triple(simd, [0.0, 0.5, 1.0]);
+    fn distances_sq_to_boxes<S: Simd>(&self, simd: S, node: &Node) -> [f32; BOXES_PER_NODE] {
+        let [a, d, per_d] = [
+            SimdLanes::splat_triple(simd, self.a),
+            SimdLanes::splat_triple(simd, self.d),
+            SimdLanes::splat_triple(simd, self.per_d),
+        ];
+        let [zero, a_half, one] = SimdLanes::splat_triple(simd, [0.0, 0.5, 1.0]);
         let mut squares = [0.0; BOXES_PER_NODE];
         for part in 0..BOXES_PER_NODE / S::F32_LANES {
-            let [low, high] = [Lanes::part(simd, &node.low, part), Lanes::part(simd, &node.high, part)];
+            let [low, high] =
+                [SimdLanes::load_part(simd, &node.low, part), SimdLanes::load_part(simd, &node.high, part)];
             let mut boxes = Boxes { half: [zero; 3], start: [zero; 3], d };
             for axis in 0..3 {
                 boxes.half[axis] = (high[axis] - low[axis]) * a_half;
@@ -204,7 +214,7 @@ impl Segment {
             let between = from + (to - from) * (rate_from / (rate_from - rate_to));
             let t = between.select(rate_from.is_below(zero), from);
             let t = t.select(zero.is_below(rate_to), to);
-            boxes.at(t).0.put(&mut squares, part);
+            boxes.at(t).0.store_part(&mut squares, part);
         }
         squares
     }
@@ -213,16 +223,16 @@ impl Segment {
 /// Boxes as a segment sees them.
 struct Boxes<S: Simd> {
     /// Half their sides.
-    half: [Lanes<S>; 3],
+    half: [SimdLanes<S>; 3],
     /// The segment's begin, from their centres.
-    start: [Lanes<S>; 3],
-    d: [Lanes<S>; 3],
+    start: [SimdLanes<S>; 3],
+    d: [SimdLanes<S>; 3],
 }
 
 impl<S: Simd> Boxes<S> {
     /// Squared distance at a place along the segment, and half its rate.
     #[inline(always)]
-    fn at(&self, t: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+    fn at(&self, t: SimdLanes<S>) -> (SimdLanes<S>, SimdLanes<S>) {
         let zero = t.zero();
         let (mut square, mut rate) = (zero, zero);
         for axis in 0..3 {

@@ -11,15 +11,15 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 use super::checks::{VehicleSpans, check_margins};
 use super::terrain::TerrainFile;
 use super::{
-    Common, DEFAULT_ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, not_yet, unbuilt,
-    vehicles,
+    Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults, read_geodetic,
+    read_unsupported, read_vehicles, unsupported_error,
 };
 use crate::area::overlap::{self, Overlap};
-use crate::area::{self, Format, MAX_VERTICES, Polygons, RingXy};
+use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
 use crate::quote::quoted_path;
-use crate::scenario::coverage::{Area, Heading, Method, ORIGIN_HINT, Trigger};
+use crate::scenario::coverage::{Area, HeadingRule, Method, ORIGIN_HINT, Trigger};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
@@ -43,38 +43,41 @@ enum Coordinates {
 /// The scenario of a coverage mission.
 pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let Common { seed, deconfliction, simulation, estimator_span } =
-        common(text, root, (margins::PAIR_STRAY_OVER_FIELDS_M, DEFAULT_AREA_TIME_LIMIT_S))?;
+        read_common(text, root, (margins::PAIR_STRAY_OVER_FIELDS_M, DEFAULT_AREA_TIME_LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-    let (mut area, terrain) = area(&root.required("area", hint)?.table()?, folder)?;
+    let (mut area, terrain) = read_area(&root.required("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     let mut unsupported = Vec::new();
-    let mut vehicles = vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
+    let mut vehicles =
+        read_vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
     // Errors of goals missions that coverage missions do not have.
     unsupported.retain(|error| !FLOWN_KEYS.iter().any(|key| error.why.ends_with(key)));
-    let formation = unbuilt(root, "formation", &mut unsupported)?;
+    let formation = read_unsupported(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
-    let mission = mission.unwrap_or_else(|| empty(text, "mission"));
+    let mission = mission.unwrap_or_else(|| empty_table(text, "mission"));
     for key in ["goals", "goals_file"] {
         let goals = mission.get(key);
-        unsupported
-            .extend(goals.map(|goals| not_yet(text, &goals.span, &format!("mission.{key} beside [area]"))));
+        unsupported.extend(
+            goals.map(|goals| unsupported_error(text, &goals.span, &format!("mission.{key} beside [area]"))),
+        );
     }
-    let mission = self::mission(&mission, &vehicles)?;
+    let mission = self::read_coverage_mission(&mission, &vehicles)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
-    let roadmap = super::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
-    let faults = faults(root, &vehicles)?;
+    let roadmap = super::read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
+    let faults = read_faults(root, &vehicles)?;
     if let Some(terrain) = &terrain {
-        terrain.lay(text, &mut area, &mut vehicles, &mission, &simulation)?;
+        terrain.apply_terrain(text, &mut area, &mut vehicles, &mission, &simulation)?;
     }
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
-    let apart_m = margins::pads_m(&simulation, deconfliction.safety_distance_m, &vehicles);
+    let apart_m = margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
     check_pads(text, &vehicles, &spans, apart_m)?;
     check_heights(text, &vehicles, &spans, area.heights.mission_m)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    area.usable = margins::usable(&area.spacing, area.height_m, mission.cruise_mps, &simulation, &vehicles);
+    area.usable =
+        margins::usable_footprint(&area.spacing, area.height_m, mission.cruise_mps, &simulation, &vehicles);
     Ok(Scenario {
         path: text.file.to_owned(),
         text: text.text.to_owned(),
@@ -132,9 +135,9 @@ fn check_heights(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], h
 }
 
 /// `[mission]` of a coverage mission: it has no goals.
-fn mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mission> {
-    table.word("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
-    table.expect(&["objective", "goals", "goals_file"]);
+fn read_coverage_mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mission> {
+    table.one_of("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
+    table.declare_keys(&["objective", "goals", "goals_file"]);
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
     let mission = Mission {
         mode: Mode::Coverage,
@@ -150,23 +153,23 @@ fn mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mi
 }
 
 /// The area, and the file of the ground below it.
-fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)> {
-    let (polygons, coordinates, source) = polygons(table, folder)?;
-    let given = table.get("origin").map(|v| geodetic(&v)).transpose()?;
+fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)> {
+    let (polygons, coordinates, source) = read_polygons(table, folder)?;
+    let given = table.get("origin").map(|v| read_geodetic(&v)).transpose()?;
     let first = polygons.outers[0][0];
     let mut origin = given.unwrap_or(match coordinates {
         Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
         Coordinates::Metres => DEFAULT_ORIGIN,
     });
-    let terrain = TerrainFile::of(table, folder, coordinates == Coordinates::Metres)?;
+    let terrain = TerrainFile::from_table(table, folder, coordinates == Coordinates::Metres)?;
     if let (Some(terrain), None) = (&terrain, given) {
         origin.alt_m = terrain.altitude_m(table.text, &origin)?;
     }
-    let (vertices, rings) = flat(table, &source, &polygons, coordinates, &origin)?;
-    let camera = table.get("camera").map(|v| camera(&v)).transpose()?;
-    let (height_m, spacing) = spacing(table, camera.as_ref())?;
+    let (vertices, rings) = rings_in_mission_frame(table, &source, &polygons, coordinates, &origin)?;
+    let camera = table.get("camera").map(|v| read_camera(&v)).transpose()?;
+    let (height_m, spacing) = read_spacing(table, camera.as_ref())?;
     let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
-    let method = table.get("method").map(|v| v.word(&Method::NAMES)).transpose()?;
+    let method = table.get("method").map(|v| v.one_of(&Method::NAMES)).transpose()?;
     let area = Area {
         place: table.text.line(&source),
         vertices,
@@ -182,12 +185,12 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)>
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
         batteries: table.boolean("batteries")?,
         method: method.unwrap_or(Method::PowellBinpat),
-        heading: table.word(
+        heading: table.one_of(
             "heading",
-            Heading::Sweep,
-            &[("sweep", Heading::Sweep), ("lane", Heading::Lane)],
+            HeadingRule::Sweep,
+            &[("sweep", HeadingRule::Sweep), ("lane", HeadingRule::Lane)],
         )?,
-        trigger: table.word(
+        trigger: table.one_of(
             "trigger",
             Trigger::Distance,
             &[("distance", Trigger::Distance), ("waypoint", Trigger::Waypoint), ("none", Trigger::None)],
@@ -198,11 +201,11 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)>
 }
 
 /// The polygons of the table, what their numbers are, and where they stand.
-fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, Span)> {
+fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, Span)> {
     let (file, polygon) = (table.get("file"), table.get("polygon"));
     let words =
         [("wgs84", Coordinates::Wgs84), ("metres", Coordinates::Metres), ("meters", Coordinates::Metres)];
-    let said = table.get("coordinates").map(|v| v.word(&words)).transpose()?;
+    let said = table.get("coordinates").map(|v| v.one_of(&words)).transpose()?;
     let (mut polygons, usual, span) = match (&file, &polygon) {
         (Some(_), Some(polygon)) => {
             return Err(polygon.error("cannot stand beside area.file: give one of them"));
@@ -215,12 +218,12 @@ fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, 
             let path = folder.join(file.str()?);
             let polygons = area::read(&path)
                 .map_err(|error| file.error(&format!("is no area: {}: {error}", quoted_path(&path))))?;
-            let metres = Format::of(&path) == Some(Format::Wkt);
+            let metres = AreaFormat::from_path(&path) == Some(AreaFormat::Wkt);
             let usual = if metres { Coordinates::Metres } else { Coordinates::Wgs84 };
             (polygons, usual, file.span.clone())
         }
         (None, Some(polygon)) => {
-            let (ring, coordinates) = ring(polygon)?;
+            let (ring, coordinates) = read_ring(polygon)?;
             let polygons = Polygons { outers: vec![ring], ..Polygons::default() };
             (polygons, coordinates, polygon.span.clone())
         }
@@ -229,7 +232,7 @@ fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, 
     for (key, rings) in [("holes", &mut polygons.holes), ("no_fly", &mut polygons.no_fly)] {
         let Some(value) = table.get(key) else { continue };
         for item in value.items()? {
-            let (ring, own) = ring(&item)?;
+            let (ring, own) = read_ring(&item)?;
             if own == Coordinates::Wgs84 && coordinates == Coordinates::Metres {
                 let hint = "give [x, y] in metres";
                 let why = format!("{} is in degrees and the area in metres", item.name);
@@ -247,7 +250,7 @@ fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, 
 }
 
 /// One ring: `[[x, y], …]` is metres unless `coordinates` says else, `[{ lat_deg, lon_deg }, …]` is degrees.
-fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
+fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
     let items = value.items()?;
     let degrees = items.first().is_some_and(Value::is_table);
     let mut ring = RingXy::with_capacity(items.len());
@@ -258,7 +261,7 @@ fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
                 let hint = "a place is { lat_deg = …, lon_deg = … }";
                 let lat = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
                 let lon = table.required("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
-                table.expect(&["alt_m"]);
+                table.declare_keys(&["alt_m"]);
                 table.finish()?;
                 [lon, lat]
             }
@@ -270,7 +273,7 @@ fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
             }
         });
     }
-    area::open(&mut ring);
+    area::open_ring(&mut ring);
     if ring.len() < 3 {
         return Err(value.error("must have at least three places that differ"));
     }
@@ -278,7 +281,7 @@ fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
 }
 
 /// The rings in the mission frame, checked.
-fn flat(
+fn rings_in_mission_frame(
     table: &Table<'_>,
     source: &Span,
     polygons: &Polygons,
@@ -331,24 +334,24 @@ fn flat(
         let why = format!("area is {:.6} by {:.6} m", wide(0), wide(1));
         return bad(why, "degrees need `coordinates = \"wgs84\"`");
     }
-    match core_area::Area::new(&vertices, &rings).map(|area| overlapping(&area)) {
+    match core_area::Area::new(&vertices, &rings).map(|area| overlap_error(&area)) {
         Ok(None) => Ok((vertices, rings)),
         Ok(Some((why, hint))) => bad(format!("area: {why}"), hint),
         Err(error) => {
             let far = matches!(error, core_area::AreaError::TooFar { .. });
             let near = "metres are about area.origin, and origin must be near the area";
-            bad(format!("area: {}", reason(error, &rings)), if far { near } else { "" })
+            bad(format!("area: {}", describe_area_error(error, &rings)), if far { near } else { "" })
         }
     }
 }
 
-/// Why rings that do not cross are no area all the same, and what would help.
-fn overlapping(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
+/// Reason why rings that do not cross still form no area, and a remedy.
+fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
     let of = |kind: RingKind| {
         let indices = 0..area.rings().len();
         indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
     };
-    Some(match overlap::find(&of(RingKind::Outer), &of(RingKind::Hole))? {
+    Some(match overlap::find_overlap(&of(RingKind::Outer), &of(RingKind::Hole))? {
         Overlap::Outers(i, j) => (format!("polygon {i} and polygon {j} overlap"), "draw them as one"),
         Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
         Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
@@ -357,7 +360,7 @@ fn overlapping(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
 }
 
 /// Description of an area's fault, for a person.
-fn reason(error: core_area::AreaError, rings: &[Ring]) -> String {
+fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -> String {
     use core_area::AreaError as E;
     let ring = |index: u16| {
         let kind = rings[usize::from(index)].kind;
@@ -392,17 +395,17 @@ fn reason(error: core_area::AreaError, rings: &[Ring]) -> String {
     }
 }
 
-fn camera(value: &Value<'_>) -> Result<Camera> {
+fn read_camera(value: &Value<'_>) -> Result<Camera> {
     let table = value.table()?;
     let sensor = table.get("sensor_mm");
     let camera = match &sensor {
         Some(sensor) => {
             let side = 0.1..=1000.0;
-            let sides_mm = pair(sensor, |v| v.f64(&side).map(|n| n as f32))?;
+            let sides_mm = read_pair(sensor, |v| v.f64(&side).map(|n| n as f32))?;
             let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
             let focal_mm = table.required("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
             let pixels = match table.get("pixels") {
-                Some(pixels) => pair(&pixels, |v| v.whole(1..=1_000_000).map(|n| n as u32))?,
+                Some(pixels) => read_pair(&pixels, |v| v.integer_in_range(1..=1_000_000).map(|n| n as u32))?,
                 None => return Err(value.error("needs pixels beside sensor_mm")),
             };
             Camera::Sensor { sides_mm, focal_mm, pixels }
@@ -417,14 +420,14 @@ fn camera(value: &Value<'_>) -> Result<Camera> {
     Ok(camera)
 }
 
-fn pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>) -> Result<[T; 2]> {
+fn read_pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>) -> Result<[T; 2]> {
     let items = value.items()?;
     let [a, b] = items.as_slice() else { return Err(value.error("must be two numbers")) };
     Ok([item(a)?, item(b)?])
 }
 
 /// Height of the pictures; footprint and spacings.
-fn spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)> {
+fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)> {
     let height = table.get("height_m");
     let gsd = table.get("gsd_m");
     let height_m = match (&height, &gsd) {
@@ -450,7 +453,7 @@ fn spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)>
     let side = table.f32("overlap_side", 0.6, 0.0..=0.95)?;
     let front = table.f32("overlap_front", 0.7, 0.0..=0.95)?;
     let footprint = match camera {
-        Some(camera) => camera.footprint(height_m).map_err(|error| wrong(table, &error))?,
+        Some(camera) => camera.footprint(height_m).map_err(|error| spacing_error(table, &error))?,
         // Without a camera the spacings are what one picture shows.
         None => match (&lane, &waypoint) {
             (Some((lane_m, _)), Some((waypoint_m, _))) => {
@@ -481,10 +484,10 @@ fn spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)>
                 None => Err(table.text.error(&table.span, format!("area {why}"))),
             }
         }
-        Err(error) => Err(wrong(table, &error)),
+        Err(error) => Err(spacing_error(table, &error)),
     }
 }
 
-fn wrong(table: &Table<'_>, error: &CoverageError) -> ScenarioError {
+fn spacing_error(table: &Table<'_>, error: &CoverageError) -> ScenarioError {
     table.text.error(&table.span, format!("area: {error:?}"))
 }

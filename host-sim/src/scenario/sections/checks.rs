@@ -26,7 +26,7 @@ pub(super) fn check_margins(
     if simulation.estimator != Estimator::Recorded {
         return Ok(());
     }
-    let need = margins::needed(simulation, deconfliction.safety_distance_m, vehicles);
+    let need = margins::required_distances(simulation, deconfliction.safety_distance_m, vehicles);
     let margin = roadmap.map(|r| ("roadmap.safety_margin_m", r.safety_margin_m, need.margin_m));
     let separation = ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m);
     let missing = margin.into_iter().chain([separation]);
@@ -97,7 +97,7 @@ pub(super) fn check_inside(
     mission: &Mission,
 ) -> Result<()> {
     let Some(fence) = &mission.geofence else { return Ok(()) };
-    let outside = |place: &Point| !fence.holds(place);
+    let outside = |place: &Point| !fence.contains(place);
     if let Some((vehicle, spans)) = vehicles.iter().find(|(vehicle, _)| outside(&vehicle.start)) {
         let why = format!("vehicle {} starts outside mission.geofence", vehicle.id);
         return Err(table.text.error(&spans.start, why));

@@ -4,14 +4,14 @@ use companion::config::SAFETY_DISTANCE_M;
 use planner_core::deconflict::Method;
 use sim_autopilot::Estimator;
 
-use super::values::{MAX_ID, point};
+use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
-/// The table of a mission in which vehicles stray from their paths by `stray_m` together, unless it says otherwise.
-pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
+/// The table of a mission in which vehicles deviate from their paths by `stray_m` together, unless it says otherwise.
+pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
-    let method = table.word("method", Method::Priority, &methods)?;
+    let method = table.one_of("method", Method::Priority, &methods)?;
     // Companions refuse a distance of 0.
     let safety_distance_m = table.f32("safety_distance_m", SAFETY_DISTANCE_M, 0.01..=1000.0)?;
     let separation_m =
@@ -22,17 +22,17 @@ pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconflic
 }
 
 /// The table of a mission that is given up after `limit_s`, unless it says otherwise.
-pub(super) fn simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
+pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
     let simulation = Simulation {
         wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
         gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
         position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
-        estimator: table.word(
+        estimator: table.one_of(
             "estimator",
             Estimator::Rtk,
             &[("rtk", Estimator::Rtk), ("recorded", Estimator::Recorded)],
         )?,
-        serial_baud: table.whole("serial_baud", 921_600, 1200..=100_000_000)? as u32,
+        serial_baud: table.integer_in_range("serial_baud", 921_600, 1200..=100_000_000)? as u32,
         serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
         radio_loss: table.f32("radio_loss", 0.0, 0.0..=1.0)?,
         radio_delay_s: table.f32("radio_delay_s", 0.05, 0.0..=60.0)?,
@@ -43,27 +43,27 @@ pub(super) fn simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> 
     Ok(simulation)
 }
 
-pub(super) fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
+pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
         FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
-    let kind = table.required("kind", "what happens, for example \"kill\"")?.word(&words)?;
+    let kind = table.required("kind", "what happens, for example \"kill\"")?.one_of(&words)?;
     let at_s = table.required("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
     let vehicle = table.get("vehicle");
     if let Some(value) = &vehicle
-        && !ids.contains(&(value.whole(1..=MAX_ID)? as u8))
+        && !ids.contains(&(value.integer_in_range(1..=MAX_ID)? as u8))
     {
         return Err(value.error("is no vehicle's id"));
     }
-    let vehicle = vehicle.map(|v| v.whole(1..=MAX_ID).map(|id| id as u8)).transpose()?;
-    let direction = table.get("direction").map(|v| v.word(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
+    let vehicle = vehicle.map(|v| v.integer_in_range(1..=MAX_ID).map(|id| id as u8)).transpose()?;
+    let direction = table.get("direction").map(|v| v.one_of(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
     let fault = Fault {
         at_s,
         duration_s: table.optional_f32("duration_s", 0.0..=1e6)?,
         vehicle,
         kind,
         direction: direction.transpose()?.map(str::to_owned),
-        offset_m: table.get("offset_m").map(|v| point(&v)).transpose()?,
-        position: table.get("position").map(|v| point(&v)).transpose()?,
+        offset_m: table.get("offset_m").map(|v| read_point(&v)).transpose()?,
+        position: table.get("position").map(|v| read_point(&v)).transpose()?,
         radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
     };
     table.finish()?;

@@ -31,7 +31,7 @@ pub(super) struct TerrainFile {
 
 impl TerrainFile {
     /// The terrain by `[area]`; `metres` where its coordinates are.
-    pub(super) fn of(table: &Table<'_>, folder: &Path, metres: bool) -> Result<Option<Self>> {
+    pub(super) fn from_table(table: &Table<'_>, folder: &Path, metres: bool) -> Result<Option<Self>> {
         let tolerance = table.get("terrain_tolerance_m");
         let Some(file) = table.get("terrain") else {
             return match tolerance {
@@ -45,10 +45,10 @@ impl TerrainFile {
 
     fn read(&self, text: Text<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
         let frame = Frame { origin, metres: self.metres, window: Some(window) };
-        terrain::read(&self.path, &frame).map_err(|error| self.refused(text, &error))
+        terrain::read(&self.path, &frame).map_err(|error| self.terrain_error(text, &error))
     }
 
-    fn refused(&self, text: Text<'_>, error: &TerrainError) -> ScenarioError {
+    fn terrain_error(&self, text: Text<'_>, error: &TerrainError) -> ScenarioError {
         let path = quoted_path(&self.path);
         match error {
             TerrainError::System { what, hint } => text.with_hint(
@@ -74,7 +74,7 @@ impl TerrainFile {
     }
 
     /// Lays the area above the ground, and the vehicles on it.
-    pub(super) fn lay(
+    pub(super) fn apply_terrain(
         &self,
         text: Text<'_>,
         area: &mut Area,
@@ -96,10 +96,10 @@ impl TerrainFile {
             climb_mps.min(descend_mps) / mission.cruise_mps.min(vehicle.speed_max_mps)
         });
         let slope = slope.fold(f32::INFINITY, f32::min);
-        let reach_m = margins::needed(simulation, 0.0, &own).margin_m;
+        let reach_m = margins::required_distances(simulation, 0.0, &own).margin_m;
         let config = FieldConfig { area: [low - beyond, high + beyond], reach_m, slope };
-        let grid = self.read(text, &area.origin, config.window())?.above(area.origin.alt_m);
-        let field = terrain::field(&grid, &config).map_err(|error| {
+        let grid = self.read(text, &area.origin, config.window())?.relative_to(area.origin.alt_m);
+        let field = terrain::encode_field(&grid, &config).map_err(|error| {
             let why = format!("area.terrain: {}: {error}", quoted_path(&self.path));
             let hint = match error {
                 FieldError::High(_) => "area.origin needs an alt_m near the ground",

@@ -8,6 +8,6 @@ use crate::scenario::reader::{Result, Value};
 pub(super) const MAX_ID: u64 = 250;
 
 /// Three numbers.
-pub(super) fn point(value: &Value<'_>) -> Result<Point> {
+pub(super) fn read_point(value: &Value<'_>) -> Result<Point> {
     value.triple().map(|[x, y, z]| Point::new(x as f32, y as f32, z as f32))
 }

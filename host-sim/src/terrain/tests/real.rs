@@ -36,7 +36,7 @@ fn bilbao_is_where_its_system_says() {
         assert!(place.norm() < 0.05, "{place}");
         let window = Some([Flat::repeat(-400.0), Flat::repeat(900.0)]);
         let grid = super::read(&path, &Frame { origin: &origin, metres: false, window }).unwrap();
-        let highest = grid.highest(&Flat::repeat(-300.0), &Flat::repeat(800.0));
+        let highest = grid.heights_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
         assert!(!highest.holes, "{name}");
         // Beside the file's own cells in that box, which lies along its rows here.
         let cells = |from: f64, to: f64, corner: f64, side: f64| {
@@ -125,7 +125,7 @@ fn autzen_is_in_feet_and_where_its_system_says() {
             });
             held.map(|(_, z)| *z).fold(f32::MIN, f32::max)
         };
-        let found = grid.highest(&low, &high);
+        let found = grid.heights_in_box(&low, &high);
         let (least, most) = (inside(Flat::zeros()), inside(beside * 4.0));
         if least == f32::MIN {
             continue;

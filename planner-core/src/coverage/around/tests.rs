@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::coverage::area::{Area, Ring, RingKind};
-use crate::detour::Nature;
+use crate::detour::ZoneKind;
 
 const OVER: Point = Point::new(5.0, 5.0, 12.0);
 const LAYER_M: f32 = 40.0;
@@ -24,9 +24,9 @@ fn request(here: Point, aside: bool) -> DetourRequest {
     }
 }
 
-fn column(place: Flat, low_m: f32, high_m: f32, radius_m: f32) -> KeepOff {
+fn column(place: Flat, low_m: f32, high_m: f32, radius_m: f32) -> KeepOutZone {
     let at = |height_m| Point::new(place.x, place.y, height_m);
-    KeepOff { from: at(high_m), to: at(low_m), radius_m, nature: Nature::Solid }
+    KeepOutZone { from: at(high_m), to: at(low_m), radius_m, kind: ZoneKind::Static }
 }
 
 /// A field of 400 m, and zones in it: each in a cell of its own, so that none crosses another.
@@ -54,27 +54,27 @@ type Way = Result<StdVec<Point>, DetourError>;
 fn planned(
     zones: &[Option<(f32, f32, f32, u8)>],
     request: &DetourRequest,
-    obstacles: &[KeepOff],
+    obstacles: &[KeepOutZone],
 ) -> Option<(Way, f32)> {
     let (vertices, rings) = field(zones);
     let area = Area::new(&vertices, &rings).ok()?;
     let mut transit = Box::new(Transit::<128>::empty());
-    transit.learn(area).unwrap();
-    if area.forbids(&request.here.xy()) {
+    transit.set_area(area).unwrap();
+    if area.is_in_no_fly_zone(&request.here.xy()) {
         return None;
     }
     let mut known = obstacles.to_vec();
     let mut out = Path::<64>::new();
-    let found = plan(&transit, None, request, &mut known, &mut out);
+    let found = plan_detour(&transit, None, request, &mut known, &mut out);
     let way = found.map(|()| out.waypoints().iter().map(|w| w.position).collect::<StdVec<_>>());
     if let Ok(points) = &way {
         assert_eq!(points[0], request.here);
         for leg in points.windows(2) {
-            assert!(transit.is_clear(&leg[0].xy(), &leg[1].xy()), "{leg:?} meets a zone");
+            assert!(transit.is_line_clear(&leg[0].xy(), &leg[1].xy()), "{leg:?} meets a zone");
             // Nearer than at the beginning it comes to nothing that it was too near already.
             for obstacle in &known {
                 assert!(
-                    !obstacle.solid(&request.here).touches(&leg[0], &leg[1]),
+                    !obstacle.impassable_part(&request.here).intersects(&leg[0], &leg[1]),
                     "{leg:?} meets {obstacle:?}"
                 );
             }
@@ -86,7 +86,7 @@ fn planned(
         let end = points.last().unwrap();
         if request.aside {
             assert!((end - request.here).norm() <= MAX_SIDESTEP_RINGS as f32 + 0.01 && points.len() == 2);
-            assert!(!known.iter().any(|o| o.holds(end)), "{end:?} is no place to rest");
+            assert!(!known.iter().any(|o| o.contains(end)), "{end:?} is no place to rest");
         } else {
             assert!((end - OVER).norm() <= SAME_CORNER_M, "{end:?}");
             // Up, along one height, down: never in the height of another's layer.
@@ -157,8 +157,8 @@ proptest! {
     ) {
         let here = Point::new(here.0, here.1, here.2);
         let request = request(here, aside);
-        let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| KeepOff {
-            nature: if lands { Nature::Landing } else { Nature::Solid },
+        let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| KeepOutZone {
+            kind: if lands { ZoneKind::Descending } else { ZoneKind::Static },
             ..column(Flat::new(x, y), low_m, low_m + high_m, radius_m)
         };
         let things: StdVec<_> = things.iter().map(thing).collect();

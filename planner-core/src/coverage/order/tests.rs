@@ -24,10 +24,10 @@ fn back_and_forth_begins_at_the_end_that_joins_lanes_by_less() {
         };
         let laid: Vec<Lane> = (0..count).map(&mut lane).collect();
         let mut sorted = laid.clone();
-        sort(&mut sorted, &Transit::<1>::empty(), 0);
+        order_lanes(&mut sorted, &Transit::<1>::empty(), 0);
         let ways = [0, 1].map(|first| {
             let mut lanes = laid.clone();
-            lanes.iter_mut().skip(first).step_by(2).for_each(Lane::turn);
+            lanes.iter_mut().skip(first).step_by(2).for_each(Lane::reverse);
             way_m(&lanes)
         });
         assert!(way_m(&sorted) <= ways[0].min(ways[1]) + 2.0 * MIN_GAIN_M, "{} of {ways:?}", way_m(&sorted));

@@ -23,7 +23,7 @@ pub(crate) fn fly<const W: usize>(
             out
         })
         .collect();
-    let end = |f: &Flight<W>| if f.task.flies() { f.path.length_m() + f.descent_m } else { -f.climb_m };
+    let end = |f: &Flight<W>| if f.task.leaves_pad() { f.path.length_m() + f.descent_m } else { -f.climb_m };
     let place = |f: &Flight<W>, m: f32| {
         let below = fmaxf(-m, fmaxf(m - f.path.length_m(), 0.0));
         f.path.point_at(m).unwrap() - Point::new(0.0, 0.0, below)
@@ -38,7 +38,7 @@ pub(crate) fn fly<const W: usize>(
             };
             let free = gates[i].iter().filter(shut).map(|g| g.at_m).fold(f32::INFINITY, fminf);
             // `until_m` lies a hair beyond the end of the last piece.
-            let goal = end(&flights[i]) + if flights[i].task.flies() { 0.02 } else { 0.0 };
+            let goal = end(&flights[i]) + if flights[i].task.leaves_pad() { 0.02 } else { 0.0 };
             along[i] = fmaxf(along[i], fminf(fminf(along[i] + speeds[i] * 0.05, free), goal));
         }
         let moves = |i: usize| along[i] > -flights[i].climb_m && along[i] < end(&flights[i]);

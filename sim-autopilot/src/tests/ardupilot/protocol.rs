@@ -74,7 +74,7 @@ fn refusals_are_as_seen() {
     assert_eq!(bench.ask(246, 1.0, 0.0), [4], "reboot in the air");
     assert_eq!(bench.ask(400, 0.0, 21_196.0), [0]);
     bench.run(2.0);
-    assert!(!bench.autopilot.truth().armed && bench.at().z < 0.31, "forced, it fell");
+    assert!(!bench.autopilot.true_state().armed && bench.at().z < 0.31, "forced, it fell");
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn an_installer_sets_integers_of_either_firmware() {
     for (config, name) in [(config(), "RTL_ALT"), (Config::default(), "COM_OBL_RC_ACT")] {
         let mut bench = Bench::with(&config);
         bench.autopilot.set_parameter(name, 5).unwrap();
-        assert_eq!(bench.autopilot.firmware.params().int(name), 5);
+        assert_eq!(bench.autopilot.firmware.params().i32_value(name), 5);
         assert!(bench.autopilot.set_parameter("NO_SUCH", 5).is_err());
         assert!(bench.autopilot.set_parameter("GUID_TIMEOUT", 5).is_err(), "no integer");
     }

@@ -20,11 +20,11 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
+use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, TrackUnit, Vehicle, Work, binpat};
 use planner_core::coverage::powell;
-use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
-use planner_core::flight::Range;
+use planner_core::flight::WaypointRange;
 
 use crate::row::Row;
 
@@ -155,10 +155,10 @@ impl Desk {
     fn plan(&mut self) {
         let area = Area::new(black_box(&self.vertices), &self.rings).expect("an area");
         let mut transit = Transit::<8>::empty();
-        transit.learn(area).expect("no zones");
+        transit.set_area(area).expect("no zones");
         let footprint = Footprint { along_m: 10.0, across_m: 10.0 };
         let spacing = Spacing { footprint, lane_m: 10.0, waypoint_m: 10.0 };
-        let pattern = Pattern { spacing, angle_deg: None, margin_m: 0.0, looks: 10_000 };
+        let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: 10_000 };
         tracks::build(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks).expect("lanes");
         let work = work(&self.tracks, &transit, &self.vehicles);
         binpat(&work, &mut self.pack, &mut self.plan).expect("routes");
@@ -198,7 +198,7 @@ fn work<'a>(
     vehicles: &'a [Vehicle],
 ) -> Work<'a, LANES, 8> {
     let heights = Heights { mission_m: 35.0, layer_m: 5.0 };
-    Work { tracks, transit, vehicles, heights, unit: Unit::Waypoint }
+    Work { tracks, transit, vehicles, heights, unit: TrackUnit::Waypoint }
 }
 
 fn ours_us(vehicles: usize) -> [f64; 2] {
@@ -208,14 +208,15 @@ fn ours_us(vehicles: usize) -> [f64; 2] {
     // Each of them has flown ten waypoints and stands at the tenth.
     let mut done = Vec::new();
     for route in &desk.plan.routes {
-        let flown = Range { first: route.first, end: (route.first + 10).min(route.end) };
+        let flown = WaypointRange { first: route.first, end: (route.first + 10).min(route.end) };
         desk.vehicles[usize::from(route.vehicle)].place =
             desk.tracks.waypoint(flown.end - 1).expect("a waypoint");
         done.push(flown);
     }
     let mut left: Box<Tracks<LANES>> = Box::default();
     let update_us = median_us(|| {
-        divide::left(&desk.tracks, black_box(&done), &transit, &mut left).expect("something is left");
+        divide::remaining_lanes(&desk.tracks, black_box(&done), &transit, &mut left)
+            .expect("something is left");
         let rest = &desk.vehicles[1..];
         let work = work(&left, &transit, rest);
         binpat(&work, &mut desk.pack, &mut desk.plan).expect("routes");
@@ -223,7 +224,7 @@ fn ours_us(vehicles: usize) -> [f64; 2] {
         black_box(&desk.points);
     });
     let last = left.waypoint_count() - 1;
-    assert_eq!(divide::original(&done, last), desk.tracks.waypoint_count() - 1);
+    assert_eq!(divide::original_waypoint_number(&done, last), desk.tracks.waypoint_count() - 1);
     [plan_us, update_us]
 }
 
@@ -234,7 +235,7 @@ fn powell_us() -> f64 {
     let mut ws: Box<powell::Workspace<VEHICLES>> = Box::default();
     let work = work(&desk.tracks, &transit, &desk.vehicles);
     median_us(|| {
-        powell::powell(&work, &powell::Config::USUAL, &mut ws, &mut desk.plan).expect("routes");
+        powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut desk.plan).expect("routes");
     })
 }
 

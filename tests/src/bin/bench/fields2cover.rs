@@ -22,7 +22,7 @@ use host_sim::scenario;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 
 use crate::row::Row;
@@ -132,7 +132,7 @@ fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
 fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    let pattern = Pattern { spacing, angle_deg: None, margin_m: 0.0, looks };
+    let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: looks };
     let mut found: Box<Tracks<MAX_LANES>> = Box::default();
     let mut workspace: Box<tracks::Workspace<VERTICES>> = Box::default();
     let mut transit = Box::new(Transit::<MAX_CORNERS>::empty());
@@ -140,7 +140,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     for _ in 0..RUNS {
         let began = Instant::now();
         let area = Area::new(&field.vertices, &field.rings).map_err(|error| anyhow::anyhow!("{error:?}"))?;
-        transit.learn(area).map_err(|error| anyhow::anyhow!("{error:?}"))?;
+        transit.set_area(area).map_err(|error| anyhow::anyhow!("{error:?}"))?;
         tracks::build(&area, &pattern, &transit, &mut workspace, &mut found)
             .map_err(|error| anyhow::anyhow!("{error:?}"))?;
         times.push(began.elapsed().as_secs_f64() * 1e6);
@@ -150,7 +150,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let mut crossings = 0;
     for (from, to) in legs {
         let mut corners = heapless::Vec::<Flat, MAX_CORNERS>::new();
-        transit.way(&from, &to, &mut corners).map_err(|error| anyhow::anyhow!("{error:?}"))?;
+        transit.shortest_path(&from, &to, &mut corners).map_err(|error| anyhow::anyhow!("{error:?}"))?;
         let way = [&[from], corners.as_slice(), &[to]].concat();
         crossings += way.windows(2).filter(|leg| crosses(field, &leg[0], &leg[1])).count();
     }
@@ -161,7 +161,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
         time_us: times[RUNS / 2],
         crossings,
     };
-    Ok((way, f64::from(found.along().y).atan2(f64::from(found.along().x))))
+    Ok((way, f64::from(found.lane_direction().y).atan2(f64::from(found.lane_direction().x))))
 }
 
 /// Whether a leg comes into an obstacle: looked at every centimetre, by no code of the planner.

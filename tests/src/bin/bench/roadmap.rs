@@ -27,7 +27,7 @@ use planner_core::Point;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{self, Config, Edge, Sampling, Workspace, squared_length};
 use planner_core::roadmap::{self, LANDMARKS, RoadmapHeader, RoadmapView};
-use planner_core::search::{SearchWorkspace, WithLengths, astar, cost_matrix};
+use planner_core::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
 use planner_core::voxel::VoxelGrid;
 use serde::Deserialize;
 
@@ -60,7 +60,7 @@ struct Theirs {
 
 /// A row for the roadmap on one core and on two, for ten A* and for the 10 × 10 cost matrix, milliseconds.
 pub fn rows(peer: &Path) -> Result<Vec<Row>> {
-    let map = building::building(building::DEFAULT_SEED, RESOLUTION_M)?;
+    let map = building::building_map(building::DEFAULT_SEED, RESOLUTION_M)?;
     let dir = tempfile::tempdir()?;
     let files = ["building.bt", "starts.txt", "goals.txt"].map(|name| dir.path().join(name));
     bt::write(&map.to_octree("builtin:building")?, &files[0])?;
@@ -258,7 +258,7 @@ impl<'a> Ours<'a> {
                 .map_err(named)?;
             self.edges = edges.into_iter().map(edge).collect();
         } else {
-            self.workspace.index(&self.nodes, &config).map_err(named)?;
+            self.workspace.build_index(&self.nodes, &config).map_err(named)?;
             prm::connect_range(self.grid, &self.workspace, &config, 0..self.nodes.len(), |e| {
                 self.edges.push(edge(e));
                 Ok(())
@@ -294,7 +294,7 @@ impl<'a> Ours<'a> {
         let view = RoadmapView::parse(&self.bytes).map_err(named)?;
         let start = Instant::now();
         let mut lengths = vec![0.0; view.half_edge_count()];
-        let graph = WithLengths::new(view, &mut lengths).map_err(named)?;
+        let graph = RoadmapWithLengths::new(view, &mut lengths).map_err(named)?;
         let measured = start.elapsed();
         let mut path = heapless::Vec::<u16, 256>::new();
         (self.solved, self.labelled_m) = (0, 0.0);

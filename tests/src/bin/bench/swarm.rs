@@ -95,7 +95,7 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
 fn ground() -> Result<OccupancyMap> {
     let cells = |metres: f32| (metres / RESOLUTION_M) as u32;
     let shape = GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
-    let mut map = OccupancyMap::unknown(shape, "ground")?;
+    let mut map = OccupancyMap::all_unknown(shape, "ground")?;
     // One metre wide, in every second gap between two lanes, 20 m apart.
     let pillar =
         |x: f32, y: f32| (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0);

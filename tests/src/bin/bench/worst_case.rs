@@ -16,7 +16,7 @@ const LIMITS: [(&str, &str, f64); 6] = [
     ("board control step, all speak", "Companion::handle_timeout, 32 speak", 75.0),
     ("board control step, most gone", "Companion::handle_timeout, most gone", 75.0),
     ("board control step, all near", "a control step, 32 near", 75.0),
-    ("board safety filter", "Companion::ask_filter, 32 near", 12.0),
+    ("board safety filter", "Companion::query_filter, 32 near", 12.0),
     ("board control step, else", "Companion::handle_timeout, else", 75.0),
 ];
 

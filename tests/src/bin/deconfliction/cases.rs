@@ -250,7 +250,7 @@ fn carve(
 ) -> Result<PathBuf> {
     let dims = [0, 1, 2].map(|a| (size[a] / resolution_m).round() as u32);
     let shape = GridShape { dims, min: Point::zeros(), resolution_m };
-    let mut map = OccupancyMap::unknown(shape, name)?;
+    let mut map = OccupancyMap::all_unknown(shape, name)?;
     for (i, j, k) in
         (0..dims[0]).flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
     {

@@ -1,4 +1,4 @@
-//! Why a vehicle that nothing struck landed short of its goal: by the truth, on the map, by a search of its own.
+//! Reason why a vehicle that nothing struck landed short of its goal: by the truth, on the map, by a search of its own.
 //!
 //! Places of a lattice are joined where the map leaves the vehicle its clearance and everything that
 //! lies on the ground is further away than the safety distance. Neither the roadmap nor the companion is asked.

@@ -53,8 +53,8 @@ fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<W
         }
         let mut path = Path::new();
         corners.iter().for_each(|&corner| path.push(corner, required_m).expect("three points fit"));
-        path.label(flight.climb_m / mission.schedule().vertical_mps, mission.schedule().cruise_mps);
-        all.push(Flight { path, depart_s: 0.0, piece_m: MAX_TIMED_SEGMENT_M, ..flight.clone() });
+        path.label_times(flight.climb_m / mission.schedule().vertical_mps, mission.schedule().cruise_mps);
+        all.push(Flight { path, depart_s: 0.0, segment_m: MAX_TIMED_SEGMENT_M, ..flight.clone() });
     }
     Some(all)
 }

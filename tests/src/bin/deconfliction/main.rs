@@ -250,10 +250,10 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
         }
     };
     let apart = *mission.schedule();
-    mission.separate(ALONE_M, ALONE_M)?;
+    mission.set_separation(ALONE_M, ALONE_M)?;
     let shortest = mission.plan()?;
     let alone = fly(&mission, &shortest)?.result;
-    mission.separate(apart.separation_m, apart.parked_separation_m)?;
+    mission.set_separation(apart.separation_m, apart.parked_separation_m)?;
     let landings = if meeting.has_ideal { ideal::landings(&mission, &plan, &shortest) } else { None };
     if let (Some(landings), Some(row)) = (landings, rows.first_mut()) {
         let extra = |last_s: f32| Some(f64::from(last_s / landings.alone_s) - 1.0);
@@ -269,7 +269,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
         let is_struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
         row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !is_struck(v)).count();
         if simulation.contains("[[faults]]") && method == METHODS[0] {
-            // Whom nobody hears is where it was struck, or further along its path.
+            // Whom no other vehicle hears is where it was struck, or further along its path.
             let silent = simulation.contains("radio-cut") && !simulation.contains("\"rx\"");
             let struck = Struck { index: usize::from(struck) - 1, at_s: at_s.parse()?, silent };
             explain(row, &mission, &plan, &flight, struck);

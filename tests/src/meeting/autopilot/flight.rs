@@ -1,7 +1,7 @@
 //! How the vehicle flies: what the controllers ask for, and what comes of it.
 
 use companion::Instant;
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use companion::autopilot::{ardupilot, px4};
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -18,12 +18,12 @@ impl Autopilot {
     fn wanted(&self, now: Instant, floor_z: f32) -> Vector3<f32> {
         let kind = self.kind;
         let (position_gain, velocity_gain) = match kind {
-            Kind::Px4 => (Point::new(0.95, 0.95, 1.0), Point::new(1.8, 1.8, 4.0)),
-            Kind::ArduPilot => (Point::new(1.0, 1.0, 1.0), Point::new(2.5, 2.5, 4.0)),
+            AutopilotKind::Px4 => (Point::new(0.95, 0.95, 1.0), Point::new(1.8, 1.8, 4.0)),
+            AutopilotKind::ArduPilot => (Point::new(1.0, 1.0, 1.0), Point::new(2.5, 2.5, 4.0)),
         };
         let mut feed_forward = Point::zeros();
         let mut velocity = Point::zeros();
-        let stale_s = if kind == Kind::Px4 { f32::INFINITY } else { self.guid_timeout_s };
+        let stale_s = if kind == AutopilotKind::Px4 { f32::INFINITY } else { self.guid_timeout_s };
         if self.mode == kind.setpoint_mode() {
             if let Some(z) = self.takeoff_z {
                 velocity.z = (z - self.position.z).clamp(-0.5, 1.2);
@@ -34,15 +34,15 @@ impl Autopilot {
                     feed_forward = target.acceleration;
                 }
             }
-            if kind == Kind::Px4 {
+            if kind == AutopilotKind::Px4 {
                 // The ramp of a take-off.
-                let lifted_s = self.lifted_at.map_or(0.0, |at| (now - at).secs_f32());
+                let lifted_s = self.lifted_at.map_or(0.0, |at| (now - at).as_secs_f32());
                 velocity.z = velocity.z.min(0.4 + 0.4 * lifted_s);
             }
         } else if self.mode == kind.land_mode() {
             velocity.z = -self.landing_mps(floor_z);
-        } else if self.mode == px4::RTL && kind == Kind::Px4
-            || self.mode == ardupilot::RTL && kind == Kind::ArduPilot
+        } else if self.mode == px4::RTL && kind == AutopilotKind::Px4
+            || self.mode == ardupilot::RTL && kind == AutopilotKind::ArduPilot
         {
             let away = self.home - self.position;
             let across = away.xy();
@@ -54,8 +54,8 @@ impl Autopilot {
                 let speed = across.norm().min(3.0) / across.norm();
                 velocity = Point::new(across.x * speed, across.y * speed, 0.0);
             }
-        } else if self.mode == PX4_POSITION && kind == Kind::Px4
-            || self.mode == ARDUPILOT_LOITER && kind == Kind::ArduPilot
+        } else if self.mode == PX4_POSITION && kind == AutopilotKind::Px4
+            || self.mode == ARDUPILOT_LOITER && kind == AutopilotKind::ArduPilot
         {
             velocity = self.pilot;
             if self.position.z < floor_z + 0.6 {
@@ -66,8 +66,8 @@ impl Autopilot {
         velocity.z = velocity.z.clamp(-1.5, 2.5);
         let mut wanted = (velocity - self.velocity).component_mul(&velocity_gain) + feed_forward;
         let (across_most, up_most, down_most) = match kind {
-            Kind::Px4 => (5.0, 4.0, 3.0),
-            Kind::ArduPilot => (2.5, 1.1, 1.1),
+            AutopilotKind::Px4 => (5.0, 4.0, 3.0),
+            AutopilotKind::ArduPilot => (2.5, 1.1, 1.1),
         };
         bound_across(&mut wanted, across_most);
         wanted.z = wanted.z.clamp(-down_most, up_most);
@@ -89,7 +89,7 @@ impl Autopilot {
     /// Whether the land detector looks for the ground: PX4's does while the setpoint's velocity sinks, above 1.1 times
     /// `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
     fn detects_ground(&self) -> bool {
-        self.kind != Kind::Px4
+        self.kind != AutopilotKind::Px4
             || self.mode != self.kind.setpoint_mode()
             || self.lifted_at.is_none()
             || self.target.is_none_or(|target| target.velocity.z < -MIN_SINK_MPS)
@@ -98,11 +98,11 @@ impl Autopilot {
     fn landing_mps(&self, floor_z: f32) -> f32 {
         let height = self.position.z - floor_z;
         match self.kind {
-            Kind::Px4 if height > 7.0 => 1.5,
-            Kind::Px4 if height > 3.0 => 1.05,
-            Kind::Px4 => 0.8,
-            Kind::ArduPilot if height > 10.0 => 0.9,
-            Kind::ArduPilot => 0.5,
+            AutopilotKind::Px4 if height > 7.0 => 1.5,
+            AutopilotKind::Px4 if height > 3.0 => 1.05,
+            AutopilotKind::Px4 => 0.8,
+            AutopilotKind::ArduPilot if height > 10.0 => 0.9,
+            AutopilotKind::ArduPilot => 0.5,
         }
     }
 
@@ -129,17 +129,17 @@ impl Autopilot {
         }
         let rests = (-0.3..0.03).contains(&height) && self.velocity.z < 0.05 && self.detects_ground();
         self.grounded_since = if rests { self.grounded_since.or(Some(now)) } else { None };
-        let rested_s = self.grounded_since.map_or(0.0, |at| (now - at).secs_f32());
+        let rested_s = self.grounded_since.map_or(0.0, |at| (now - at).as_secs_f32());
         if rested_s > 0.6 {
             self.airborne = false;
         }
         let flew = self.lifted_at.is_some();
         let after_s = match self.kind {
-            Kind::Px4 if flew => 2.8,
-            Kind::ArduPilot if flew && self.mode != ardupilot::GUIDED => 1.4,
+            AutopilotKind::Px4 if flew => 2.8,
+            AutopilotKind::ArduPilot if flew && self.mode != ardupilot::GUIDED => 1.4,
             _ => 10.0,
         };
-        if rested_s > after_s && (now - self.armed_at).secs_f32() > after_s {
+        if rested_s > after_s && (now - self.armed_at).as_secs_f32() > after_s {
             self.armed = false;
         }
     }

@@ -1,7 +1,7 @@
 //! What the companion sends: setpoints, commands and parameters.
 
 use companion::Instant;
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use companion::autopilot::px4;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
@@ -30,7 +30,7 @@ impl Autopilot {
     fn handle_parameter(&mut self, id: &mavlink::types::CharArray<16>, set: Option<f32>, out: &mut Vec<u8>) {
         let Ok(name) = id.to_str() else { return };
         let known: &[(&str, f32)] = match self.kind {
-            Kind::Px4 => &[
+            AutopilotKind::Px4 => &[
                 ("MPC_XY_VEL_MAX", 12.0),
                 ("MPC_ACC_HOR", 3.0),
                 ("MPC_ACC_UP_MAX", 4.0),
@@ -41,7 +41,7 @@ impl Autopilot {
                 ("MPC_JERK_MAX", 8.0),
                 ("COM_OF_LOSS_T", PX4_LOSS_S),
             ],
-            Kind::ArduPilot => &[
+            AutopilotKind::ArduPilot => &[
                 ("WPNAV_ACCEL", 250.0),
                 ("WPNAV_ACCEL_Z", 100.0),
                 ("WPNAV_SPEED", 1000.0),
@@ -70,7 +70,7 @@ impl Autopilot {
         if self.mode != self.kind.setpoint_mode() {
             self.check.restart();
         }
-        self.check.take(now.micros() as f64 * 1e-6, data);
+        self.check.take(now.as_micros() as f64 * 1e-6, data);
         let enu = |x: f32, y: f32, z: f32| frames::swap_enu_ned(&Vector3::new(x, y, z));
         let mask = data.type_mask.bits();
         let ned = Vector3::new(f64::from(data.x), f64::from(data.y), f64::from(data.z));
@@ -87,7 +87,7 @@ impl Autopilot {
         // A setpoint ends a take-off, before the lift-off too.
         self.takeoff_z = None;
         self.target = Some(Target { at: now, position, velocity, acceleration });
-        if self.lost && self.kind == Kind::Px4 {
+        if self.lost && self.kind == AutopilotKind::Px4 {
             self.enter(px4::OFFBOARD);
         }
     }
@@ -98,8 +98,8 @@ impl Autopilot {
         }
         if !arm && self.airborne {
             return match self.kind {
-                Kind::Px4 => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
-                Kind::ArduPilot => MavResult::MAV_RESULT_FAILED,
+                AutopilotKind::Px4 => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+                AutopilotKind::ArduPilot => MavResult::MAV_RESULT_FAILED,
             };
         }
         self.armed = arm;
@@ -114,14 +114,18 @@ impl Autopilot {
         match data.command {
             MavCmd::MAV_CMD_DO_SET_MODE => {
                 let mode = match self.kind {
-                    Kind::Px4 => (data.param2 as u32) << 16 | (data.param3 as u32) << 24,
-                    Kind::ArduPilot => data.param2 as u32,
+                    AutopilotKind::Px4 => (data.param2 as u32) << 16 | (data.param3 as u32) << 24,
+                    AutopilotKind::ArduPilot => data.param2 as u32,
                 };
-                if self.kind == Kind::Px4 {
+                if self.kind == AutopilotKind::Px4 {
                     // The first answer is always yes.
                     self.ack(data.command, MAV_RESULT_ACCEPTED, out);
                 }
-                if mode == px4::OFFBOARD && self.kind == Kind::Px4 && self.airborne && self.age_s(now) > 0.5 {
+                if mode == px4::OFFBOARD
+                    && self.kind == AutopilotKind::Px4
+                    && self.airborne
+                    && self.age_s(now) > 0.5
+                {
                     result = MAV_RESULT_TEMPORARILY_REJECTED;
                 } else {
                     self.enter(mode);

@@ -1,6 +1,6 @@
 //! What the companion hears: answers, and streams as PX4 and ArduCopter send them.
 
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::{AUTOPILOT_COMPONENT, Instant};
 use mavlink::MessageData;
@@ -36,7 +36,7 @@ impl Autopilot {
 
     /// The streams that are due.
     pub(super) fn report(&mut self, now: Instant, out: &mut Vec<u8>) {
-        let count = now.micros() / 25_000 + self.phase;
+        let count = now.as_micros() / 25_000 + self.phase;
         if count.is_multiple_of(40) {
             self.report_each_second(out);
         }
@@ -46,7 +46,7 @@ impl Autopilot {
         if count.is_multiple_of(2) && self.sends(32) {
             let (ned, v) = (self.ned(&self.position), frames::swap_enu_ned(&self.velocity));
             let data = LOCAL_POSITION_NED_DATA {
-                time_boot_ms: now.boot_ms(),
+                time_boot_ms: now.as_boot_ms(),
                 x: ned.x as f32,
                 y: ned.y as f32,
                 z: ned.z as f32,
@@ -65,12 +65,12 @@ impl Autopilot {
 
     /// PX4 sends all unasked, ArduCopter nothing.
     fn sends(&self, id: u16) -> bool {
-        self.kind == Kind::Px4 || self.streams.contains(&id)
+        self.kind == AutopilotKind::Px4 || self.streams.contains(&id)
     }
 
     fn report_each_second(&mut self, out: &mut Vec<u8>) {
         let armed = if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
-        if self.kind == Kind::Px4 {
+        if self.kind == AutopilotKind::Px4 {
             let (pos_horiz_accuracy, pos_vert_accuracy) = (0.02, 0.03);
             self.send(
                 &ESTIMATOR_STATUS_DATA { pos_horiz_accuracy, pos_vert_accuracy, ..Default::default() },
@@ -81,8 +81,8 @@ impl Autopilot {
             custom_mode: self.mode,
             base_mode: armed | MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
             autopilot: match self.kind {
-                Kind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
-                Kind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+                AutopilotKind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
+                AutopilotKind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
             },
             system_status: match (self.critical, self.armed) {
                 (true, _) => MavState::MAV_STATE_CRITICAL,
@@ -96,7 +96,7 @@ impl Autopilot {
         if self.sends(1) {
             self.send(&SYS_STATUS_DATA { battery_remaining: 90, ..Default::default() }, out);
         }
-        if self.kind == Kind::Px4 {
+        if self.kind == AutopilotKind::Px4 {
             let status = ESTIMATOR_STATUS_DATA {
                 pos_horiz_accuracy: 0.03,
                 pos_vert_accuracy: 0.04,
@@ -116,7 +116,7 @@ impl Autopilot {
             };
             self.send(&EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() }, out);
         }
-        if self.kind != Kind::ArduPilot {
+        if self.kind != AutopilotKind::ArduPilot {
             return;
         }
         if self.sends(193) {

@@ -50,7 +50,7 @@ pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening
                     push(at_s + 0.5 * lasts_s, What::PilotTakes(Point::zeros()));
                     push(until, What::PilotReturns);
                     (1..5).for_each(|i| push(until + 1.5 * i as f32, What::Resume));
-                    // A vehicle that cannot go on is landed.
+                    // A vehicle that cannot continue is landed.
                     push(until + 40.0, What::Land);
                 } else {
                     push(until, What::PilotLands);

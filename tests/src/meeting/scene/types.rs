@@ -1,6 +1,6 @@
 //! What a scene is made of.
 
-use companion::autopilot::Kind;
+use companion::autopilot::AutopilotKind;
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::schedule::ScheduleConfig;
@@ -39,7 +39,7 @@ pub struct Vehicle {
     /// System id.
     pub id: u8,
     /// Its autopilot.
-    pub kind: Kind,
+    pub kind: AutopilotKind,
     /// Where it stands.
     pub pad: Point,
     /// What its planner answers.

@@ -139,7 +139,7 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
     }
     let first = way.points.first()?;
     let climb_m = first.z - way.pad.z;
-    path.label(climb_m / SCHEDULE.vertical_mps, SCHEDULE.cruise_mps);
+    path.label_times(climb_m / SCHEDULE.vertical_mps, SCHEDULE.cruise_mps);
     let descent_m = way.points.last()?.z - way.ground_z;
     let length_s = path.length_m() / SCHEDULE.cruise_mps + climb_m + descent_m;
     (path.length_m() > 2.0 && climb_m > 0.5 && descent_m > 0.5 && length_s < LONGEST_S).then_some(Flight {
@@ -149,7 +149,7 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
         climb_m,
         descent_m,
         depart_s: 0.0,
-        piece_m: schedule::MAX_TIMED_SEGMENT_M,
+        segment_m: schedule::MAX_TIMED_SEGMENT_M,
     })
 }
 

@@ -45,7 +45,7 @@ impl Watch {
         let sent = b.setpoints.len() > before;
         let state = b.state();
         let ours = b.mode == b.kind.setpoint_mode();
-        let lifts = b.kind == Kind::ArduPilot && state == State::TakeOff;
+        let lifts = b.kind == AutopilotKind::ArduPilot && state == State::TakeOff;
         let nobody =
             b.armed && !b.on_ground() && ours && !b.silent && !sent && !lifts && state != State::Failsafe;
         self.unattended = if nobody { self.unattended + 1 } else { 0 };
@@ -64,7 +64,7 @@ impl Watch {
         }
         self.commands = b.commands.len();
         // What the companion can know: the armed bit, or the ack.
-        let acked = b.companion.requests.handshake().is_armed_unseen(b.now + Duration::from_secs(9));
+        let acked = b.companion.requests.handshake().is_armed_bit_overdue(b.now + Duration::from_secs(9));
         self.armed_once |= b.companion.telemetry.armed || (acked && state == State::Arming);
         let flies_on = matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);
         assert!(!self.landing || !flies_on, "an accepted landing is forgotten in {state:?}: {:#?}", self.log);
@@ -79,7 +79,7 @@ impl Watch {
     fn happen(&mut self, b: &mut Bench, what: Happens) {
         use Happens::*;
         let state = b.state();
-        self.log.push(format!("{:.2} s {state:?} {:?}: {what:?}", b.now.micros() as f64 * 1e-6, b.enu));
+        self.log.push(format!("{:.2} s {state:?} {:?}: {what:?}", b.now.as_micros() as f64 * 1e-6, b.enu));
         match what {
             Pause => _ = pause(b),
             Resume => {
@@ -94,7 +94,9 @@ impl Watch {
             }
             Pilot => (b.mode, b.status) = (pilot_mode(b.kind), 3),
             Back if b.status < 5 => b.mode = b.kind.setpoint_mode(),
-            Failsafe => (b.mode, b.status) = (if b.kind == Kind::Px4 { px4::RTL } else { ardupilot::RTL }, 5),
+            Failsafe => {
+                (b.mode, b.status) = (if b.kind == AutopilotKind::Px4 { px4::RTL } else { ardupilot::RTL }, 5)
+            }
             NoPosition => b.no_position = true,
             Position => b.no_position = false,
             Jump => b.enu.y += 3.0,
@@ -120,7 +122,7 @@ proptest::proptest! {
         begin in 0u32..400,
         script in proptest::collection::vec((0usize..ALL.len(), 1u32..80), 1..16),
     ) {
-        let mut b = bench(if px4 { Kind::Px4 } else { Kind::ArduPilot });
+        let mut b = bench(if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot });
         b.start();
         let mut watch =
             Watch { unattended: 0, commands: 0, landing: false, piloted: 0, armed_once: false, log: Vec::new() };

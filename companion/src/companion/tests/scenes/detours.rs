@@ -65,7 +65,7 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
-    // Without a goal the way around leads home.
+    // Without a goal the detour leads home.
     let mut bench = Bench::new(two_vehicles());
     (bench.answer_plan, bench.neighbour) = (Some(Ok(field_plan())), on_pad(ON_PLAN));
     bench.until(Ready, 6.0);

@@ -88,7 +88,7 @@ pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
     scenes.play(bench, waits, Aborted, 1.0);
 }
 
-/// Another vehicle flies where it is to fly: on its way home it lets one on its plan go first.
+/// Another vehicle flies where it is to fly: on its path home it lets one on its plan go first.
 pub(super) fn is_in_the_way_of_another(scenes: &mut Scenes) {
     let stays_in_front = |b: &mut Bench| {
         b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::ON_DETOUR);
@@ -128,7 +128,7 @@ pub(super) fn finds_no_way(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), late, Aborted, 1.0);
 }
 
-/// Whatever stops it on its way home, it goes on there.
+/// Whatever stops it on its path home, it continues there.
 #[test]
 fn an_interrupted_way_home_is_flown_to_its_end() {
     for at_s in [0.2, 1.5, 3.0] {

@@ -1,4 +1,4 @@
-//! Why the vehicle lands, and where there is room for it.
+//! Reason why the vehicle lands, and where there is room for it.
 
 use super::State::*;
 use super::*;

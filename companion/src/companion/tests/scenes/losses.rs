@@ -4,7 +4,7 @@ use super::State::*;
 use super::*;
 use crate::Link;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
-use crate::link::roster::{self, Entry, Roster, Standing};
+use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
@@ -29,10 +29,10 @@ pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
 }
 
 /// The other vehicle reports what it knows of this one and of itself.
-fn tells(b: &mut Bench, own: Standing, other: Standing) {
-    let entry = |standing| Entry { standing, ..Entry::default() };
+fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
+    let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
-    let roster = Roster { system_id: 77, mission_crc: 0xC0FFEE, entries, ..Roster::default() };
+    let roster = RosterReport { system_id: 77, mission_crc: 0xC0FFEE, entries, ..RosterReport::default() };
     let mut payload = [0; roster::MAX_LEN];
     let len = roster.encode(&mut payload);
     tunnels(b, &payload[..len]);
@@ -48,7 +48,7 @@ pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
 
 /// The other one leaves.
 pub(super) fn leaves(b: &mut Bench) {
-    tells(b, Standing::Alive, Standing::Left);
+    tells(b, MemberStatus::Alive, MemberStatus::Left);
     b.until(Dividing, 30.0);
 }
 
@@ -58,7 +58,7 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
     let had_finished = |b: &mut Bench| {
         b.answer_division = false;
         leaves(b);
-        tells(b, Standing::Alive, Standing::Finished);
+        tells(b, MemberStatus::Alive, MemberStatus::Finished);
         b.run(5.0);
         assert_eq!(b.state(), Dividing);
         b.answer_division = true;
@@ -88,7 +88,7 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
 }
 
 pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
-    let given_up = |b: &mut Bench| tells(b, Standing::Lost, Standing::Alive);
+    let given_up = |b: &mut Bench| tells(b, MemberStatus::Lost, MemberStatus::Alive);
     for state in [Climb, Follow, Scheduled, Streaming] {
         scenes.play(over_a_field(state), given_up, Aborted, 60.0);
     }
@@ -98,7 +98,7 @@ pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
 #[test]
 fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
     let mut bench = over_a_field(Ready);
-    tells(&mut bench, Standing::Lost, Standing::Alive);
+    tells(&mut bench, MemberStatus::Lost, MemberStatus::Alive);
     bench.run(1.0);
     bench.start();
     bench.until(Follow, 30.0);

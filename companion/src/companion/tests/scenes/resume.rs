@@ -1,6 +1,6 @@
 //! A coverage mission is started where some of the area is photographed already.
 
-use planner_core::flight::Range;
+use planner_core::flight::WaypointRange;
 
 use super::State::*;
 use super::losses::{over_a_field, tunnels};
@@ -13,7 +13,7 @@ fn knows(b: &mut Bench, first: u32, round: u8, flies: bool) {
 }
 
 fn report(first: u32) -> DoneReport {
-    let ranges = [Range { first, end: first + 10 }].into_iter().collect();
+    let ranges = [WaypointRange { first, end: first + 10 }].into_iter().collect();
     DoneReport { system_id: 77, mission_crc: 0xC0FFEE, ranges, ..DoneReport::default() }
 }
 
@@ -28,7 +28,7 @@ pub(super) fn others_know_of_more(scenes: &mut Scenes) {
         let told = |b: &mut Bench| {
             knows(b, 20, 0, false);
             b.run(1.0);
-            assert_eq!(b.companion.done(), [Range { first: 20, end: 30 }]);
+            assert_eq!(b.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
         };
         let end = if state == Ready { Ready } else { Follow };
         scenes.play(over_a_field(state), told, end, 20.0);
@@ -52,12 +52,12 @@ fn who_comes_late_takes_the_set_of_those_that_fly() {
     let mut bench = over_a_field(Ready);
     knows(&mut bench, 40, 0, false);
     bench.run(1.0);
-    reports(&mut bench, &DoneReport { flies: true, plan: true, ..report(20) });
+    reports(&mut bench, &DoneReport { flies: true, is_left_out_by_plan: true, ..report(20) });
     bench.run(1.0);
-    assert_eq!(bench.companion.done(), [Range { first: 20, end: 30 }]);
+    assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
     knows(&mut bench, 60, 0, false);
     bench.run(1.0);
-    assert_eq!(bench.companion.done(), [Range { first: 20, end: 30 }]);
+    assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
 }
 
 /// What a vehicle in flight photographs changes no plan on the ground, nor does a round before; a later round takes all back.
@@ -66,17 +66,17 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
     let mut bench = over_a_field(Ready);
     knows(&mut bench, 20, 0, true);
     bench.run(2.0);
-    assert_eq!((bench.companion.state(), bench.companion.done()), (Ready, &[][..]));
+    assert_eq!((bench.companion.state(), bench.companion.excluded_waypoints()), (Ready, &[][..]));
     knows(&mut bench, 40, 3, false);
     bench.run(2.0);
-    assert_eq!(bench.companion.done(), [Range { first: 40, end: 50 }]);
+    assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
     knows(&mut bench, 60, 2, false);
     bench.run(2.0);
-    assert_eq!(bench.companion.done(), [Range { first: 40, end: 50 }]);
+    assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
     // In flight nothing changes the plan.
     bench.start();
     bench.until(Follow, 30.0);
     knows(&mut bench, 80, 4, false);
     bench.run(2.0);
-    assert_eq!(bench.companion.done(), [Range { first: 40, end: 50 }]);
+    assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
 }

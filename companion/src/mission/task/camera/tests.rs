@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
 use planner_core::Point;
-use planner_core::flight::Range;
+use planner_core::flight::WaypointRange;
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -30,11 +30,11 @@ fn path() -> Path<16> {
     path
 }
 
-fn photographs(trigger: Trigger) -> Photographs {
-    let mut photographs = Photographs::new(8.0, Look::Ahead, trigger);
-    photographs.mark(1, 2, Range { first: 0, end: 9 }).unwrap();
-    photographs.mark(3, 4, Range { first: 0, end: 9 }).unwrap();
-    photographs.mark(5, 5, Range { first: 0, end: 1 }).unwrap();
+fn photographs(trigger: Trigger) -> PicturePlan {
+    let mut photographs = PicturePlan::new(8.0, HeadingMode::Ahead, trigger);
+    photographs.add_stretch(1, 2, WaypointRange { first: 0, end: 9 }).unwrap();
+    photographs.add_stretch(3, 4, WaypointRange { first: 0, end: 9 }).unwrap();
+    photographs.add_stretch(5, 5, WaypointRange { first: 0, end: 1 }).unwrap();
     photographs
 }
 
@@ -73,11 +73,11 @@ impl Fake {
 }
 
 /// Flies the path. Returns where pictures were taken, and whether a trigger was left on.
-fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
+fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
     let path = path();
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut chance = |share: f64| f64::from(rng.next_u32()) < share * f64::from(u32::MAX);
-    let (mut camera, mut links, mut fake) = (Camera::default(), Links::default(), Fake::default());
+    let (mut camera, mut links, mut fake) = (CameraControl::default(), Links::default(), Fake::default());
     let (mut framer, mut now, mut at_m, mut held) = (Framer::default(), Instant::ZERO, 0.0, 0);
     // Of a command's tries one is heard: one that is not is given up and reported.
     let (mut settle, mut lost) = (0, 0);
@@ -92,14 +92,14 @@ fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32
             at_m += MPS * STEP_S;
         }
         settle += i32::from(at_m > path.length_m());
-        let along = Along {
+        let along = PathProgress {
             progress_m: at_m.min(path.length_m()),
-            place: if held == 0 { Place::OnPath } else { Place::Elsewhere },
+            place: if held == 0 { PathRelation::OnPath } else { PathRelation::Elsewhere },
         };
         camera.step(photographs, &path, along, now, &mut links);
         fake.fly(at_m);
         let mut out = [0; 512];
-        let length = links.transmit(Link::Autopilot, 1, &mut out);
+        let length = links.write_queued(Link::Autopilot, 1, &mut out);
         let mut bytes = &out[..length];
         while let Some(frame) = framer.next(now, &mut bytes) {
             let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
@@ -119,7 +119,7 @@ fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32
 }
 
 /// Each stretch is photographed from end to end; the gap that is too wide, if one is.
-fn widest(photographs: &Photographs, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
+fn widest(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
     for shots in photographs.stretches(&path()) {
         let mut before_m = shots.from_m - shots.step_m;
         let inside = pictures_m.iter().filter(|m| **m >= shots.from_m - 0.1 && **m <= shots.to_m + late_m);
@@ -168,9 +168,9 @@ fn a_vehicle_looks_along_the_next_lane_or_one_way() {
     let at = |m: f32| heading(&ahead, &path, m).unwrap().to_degrees();
     assert_eq!((at(0.0), at(30.0)), (0.0, 0.0), "before and on the first lane");
     assert_eq!((at(75.0), at(100.0), at(160.0)), (180.0, 180.0, 180.0), "it turns on the way to the second");
-    let fixed = Photographs::new(8.0, Look::Fixed(1.0), Trigger::Distance);
+    let fixed = PicturePlan::new(8.0, HeadingMode::Fixed(1.0), Trigger::Distance);
     assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
-    let mut point = Photographs::new(8.0, Look::Ahead, Trigger::Distance);
-    point.mark(5, 5, Range { first: 0, end: 1 }).unwrap();
+    let mut point = PicturePlan::new(8.0, HeadingMode::Ahead, Trigger::Distance);
+    point.add_stretch(5, 5, WaypointRange { first: 0, end: 1 }).unwrap();
     assert_eq!(heading(&point, &path, 3.0), None, "one picture leads no way");
 }

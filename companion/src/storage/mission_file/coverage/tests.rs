@@ -15,7 +15,9 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::planner::coverage::{self, Workspace};
-use crate::storage::mission_file::{self, Block, Kind, MissionHeader, MissionVehicle, MissionView};
+use crate::storage::mission_file::{
+    self, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
+};
 
 /// Bytes before the block of two vehicles.
 const BEFORE: usize = mission_file::HEADER_LEN + 2 * mission_file::VEHICLE_LEN;
@@ -41,11 +43,11 @@ fn mission() -> MissionHeader {
 
 fn header() -> CoverageHeader {
     CoverageHeader {
-        unit: Unit::Waypoint,
-        parts: Parts::Anyone,
-        heading: Heading::Sweep,
+        unit: TrackUnit::Waypoint,
+        parts: PartEligibility::Anyone,
+        heading: HeadingRule::Sweep,
         trigger: Trigger::Distance,
-        looks: 2000,
+        search_steps: 2000,
         heights: Heights { mission_m: 25.0, layer_m: 5.0 },
         spacing: Spacing {
             footprint: Footprint { along_m: 20.0, across_m: 30.0 },
@@ -65,8 +67,8 @@ fn vertices() -> [Flat; 7] {
         .map(|(x, y)| Flat::new(x, y))
 }
 
-fn shares() -> [Share; 2] {
-    [0.75, 1.0].map(|weight| Share { weight, climb_mps: 3.0, descend_mps: 1.0 })
+fn shares() -> [VehicleShare; 2] {
+    [0.75, 1.0].map(|weight| VehicleShare { weight, climb_mps: 3.0, descend_mps: 1.0 })
 }
 
 fn file() -> List<u8> {
@@ -78,9 +80,12 @@ fn file() -> List<u8> {
     };
     let (shares, vertices) = (shares(), vertices());
     let parts = CoverageParts { header: header(), shares: &shares, rings: &RINGS, vertices: &vertices };
-    let block = Block::Coverage(parts);
+    let block = MissionBlock::Coverage(parts);
     let mut out = vec![0xAA; block.file_len(2)];
-    assert_eq!(mission_file::write(&mission(), &[vehicle(1), vehicle(2)], &block, &mut out), Ok(out.len()));
+    assert_eq!(
+        mission_file::write_mission(&mission(), &[vehicle(1), vehicle(2)], &block, &mut out),
+        Ok(out.len())
+    );
     out
 }
 
@@ -108,29 +113,30 @@ type Memory = (Workspace<64, 128, 8>, ScheduleWorkspace, SwarmPlan<4, 64>);
 
 fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Error>> {
     let view = MissionView::parse(file).ok()?;
-    let Kind::Coverage(area) = view.kind() else { return None };
+    let MissionKind::Coverage(area) = view.kind() else { return None };
     let (ws, schedule, plan) = memory;
-    let request = coverage::Request { mission: &view, view: area, gates_most: 128, field: None, done: &[] };
-    Some(coverage::plan::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan))
+    let request =
+        coverage::Request { mission: &view, view: area, max_gates: 128, field: None, photographed: &[] };
+    Some(coverage::plan_flights::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan))
 }
 
 #[test]
 fn comes_back_as_written_and_is_planned() {
     let file = file();
     let view = MissionView::parse(&file).unwrap();
-    assert!(view.fits(None), "it is planned without a roadmap");
-    let Kind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
+    assert!(view.can_be_planned_with(None), "it is planned without a roadmap");
+    let MissionKind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
     assert_eq!(area.header(), &header());
     assert_eq!(area.shares().collect::<List<_>>(), shares());
     assert_eq!(area.rings().collect::<List<_>>(), RINGS);
     assert_eq!(area.vertices().collect::<List<_>>(), vertices());
     assert_eq!(view.byte_len(), file.len());
-    let config = view.config::<2>(2).unwrap();
+    let config = view.companion_config::<2>(2).unwrap();
     assert_eq!((config.check(), config.climb_mps, config.descend_mps), (Ok(()), 3.0, 1.0));
     let mut memory = Box::<Memory>::default();
     assert_eq!(planned(&file, &mut memory), Some(Ok(())));
     let (ws, _, plan) = &*memory;
-    assert!(plan.flights.iter().all(|flight| flight.task.flies()));
+    assert!(plan.flights.iter().all(|flight| flight.task.leaves_pad()));
     // Every waypoint of the lanes is photographed once.
     let pictures = plan.flights.iter().map(|flight| match &flight.task {
         planner_core::flight::Task::Photograph(photographs) => photographs.count(&flight.path),
@@ -152,12 +158,13 @@ fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
         file[16..20].copy_from_slice(&crc.to_le_bytes());
         let file = sealed(file.clone());
         let view = MissionView::parse(&file).unwrap();
-        let Kind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
-        assert_eq!(view.config::<2>(2).unwrap().ground, area.header().ground);
+        let MissionKind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
+        assert_eq!(view.companion_config::<2>(2).unwrap().ground, area.header().ground);
         let mut memory = Box::<Memory>::default();
         let (ws, schedule, plan) = &mut *memory;
-        let request = coverage::Request { mission: &view, view: area, field, gates_most: 128, done: &[] };
-        coverage::plan::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan)?;
+        let request =
+            coverage::Request { mission: &view, view: area, field, max_gates: 128, photographed: &[] };
+        coverage::plan_flights::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan)?;
         let points = plan.flights.iter().flat_map(|flight| flight.path.waypoints()).map(|w| w.position);
         // Over their pads they are lower.
         Ok(points.filter(|p| p.z > 4.0).map(|p| p.z - field.map_or(0.0, |f| f.height_at(&p.xy()))).collect())

@@ -28,7 +28,8 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
             })
             .collect();
         let beyond = (rng.next_u32() % count) as u8;
-        let told = Intent { points: points.clone(), beyond, floor_m: 0.0, ..intent(0, 1, 2) };
+        let told =
+            Intent { points: points.clone(), first_unheard_point: beyond, ground_m: 0.0, ..intent(0, 1, 2) };
         table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
         let leg = rng.next_u32() as usize % points.len();
         let before = if leg == 0 { from } else { points[leg - 1] };
@@ -42,10 +43,10 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         for up_m in [-10.0, 10.0] {
             let (mut ends, mut columns) = (false, false);
             let place = here + Point::new(0.0, 0.0, up_m);
-            table.lands_on(now, [apart_m, place.z], |off| ends |= off.holds(&place));
+            table.for_each_landing_zone(now, [apart_m, place.z], |off| ends |= off.contains(&place));
             let low = place - Point::new(0.0, 0.0, 20.0);
-            table.landing_column(1, now, apart_m, |off| columns |= off.holds(&low));
-            table.obstacle(1, now, apart_m, |off| columns |= off.holds(&low));
+            table.landing_column(1, now, apart_m, |off| columns |= off.contains(&low));
+            table.for_each_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
             assert!(
                 ends && (columns || silent_s < 40.0),
                 "{silent_s} s, {points:?}, {here:?}: {ends} {columns}"

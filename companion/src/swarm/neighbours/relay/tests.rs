@@ -27,7 +27,7 @@ fn padded(relay: &Relay) -> [u8; 255] {
 #[test]
 fn comes_back_as_sent_and_refuses_the_unsound() {
     for count in 0..=MAX_RELAYED as u8 {
-        let item = |rank: u8| Item {
+        let item = |rank: u8| RelayedProgress {
             rank,
             age: 9 * rank,
             progress_m: 0.5 * f32::from(rank) - 3.0,
@@ -44,7 +44,7 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
             assert_eq!(Relay::decode(&bad, 5), None, "byte {at}");
         }
     }
-    let nan = Item { rank: 0, age: 0, progress_m: f32::NAN, clear: 0, clear_in_s: 0 };
+    let nan = RelayedProgress { rank: 0, age: 0, progress_m: f32::NAN, clear: 0, clear_in_s: 0 };
     let relay = Relay { mission_crc: 1, plan_crc: 2, items: [nan].into_iter().collect() };
     assert_eq!(Relay::decode(&padded(&relay), 5), None);
 }
@@ -64,7 +64,7 @@ impl Swarm {
     }
 
     fn progress_m(&self, rank: usize) -> f32 {
-        self.now.micros() as f32 * 1e-6 + rank as f32
+        self.now.as_micros() as f32 * 1e-6 + rank as f32
     }
 
     fn step(&mut self, on_plan: &[bool], lost: &[bool], relays: bool) {
@@ -76,10 +76,10 @@ impl Swarm {
                 mission_crc: MISSION,
                 plan_crc: PLAN,
                 progress_m: self.progress_m(from),
-                heard: self.tables[from].heard_bits(self.now),
+                heard_bits: self.tables[from].heard_bits(self.now),
                 ..Intent::default()
             };
-            let relay = self.tables[from].relay(self.now, MISSION, PLAN);
+            let relay = self.tables[from].next_relay(self.now, MISSION, PLAN);
             for to in [from.wrapping_sub(1), from + 1] {
                 let Some(table) = self.tables.get_mut(to).filter(|_| !lost[from]) else { continue };
                 table.handle_intent(self.now, to as u16, &intent, MISSION, Some(PLAN));
@@ -93,7 +93,7 @@ impl Swarm {
     /// What vehicle `of` believes of `other`.
     fn believed_m(&mut self, of: usize, other: usize) -> Option<f32> {
         let (now, id) = (self.now, other as u8 + 1);
-        self.tables[of].at(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)
+        self.tables[of].states_at(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)
     }
 }
 
