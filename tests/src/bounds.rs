@@ -104,7 +104,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("a coverage plan, 3", "`build` and `powell`"),
     ("left and binpat, 3", "`divide::remaining_lanes`, lanes · v, and one `binpat`"),
     ("left and binpat, 32", "the same"),
-    ("planner::coverage::plan_flights, 3", "`learn`, `build`, one `binpat`, `flights::plan_flights`"),
+    ("planner::coverage::plan_flights, 3", "`set_area`, `build`, one `binpat`, `flights::plan_flights`"),
     ("planner::coverage::plan_flights, 3, zones", "the same"),
     ("planner::coverage::plan_flights, 3 after two losses", "the same, and `losses::redivide_work` for each"),
     ("planner::coverage::plan_flights, 3 after two losses, zones", "the same"),
