@@ -353,9 +353,8 @@ fn call_packing(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, 
                 pack(to, &Work { unit, vehicles, ..good }, ws, plan);
             }
             for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
-                let work = Work { unit, ..good };
-                let cut =
-                    to.call("pack::binpat_by_shares", || pack::binpat_by_shares(&work, shares, ws, plan));
+                let by_shares = || pack::binpat_by_shares(&Work { unit, ..good }, shares, ws, plan);
+                let cut = to.call("pack::binpat_by_shares", by_shares);
                 assert!(shares.len() == VEHICLES || cut.is_err());
                 to.add_bool(cut.is_ok());
                 let mut ends = [0; VEHICLES];
