@@ -13,7 +13,7 @@
 //! use planner_core::frames::Geodetic;
 //!
 //! let origin = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-//! let config = PowellConfig::new(1, Point::new(0.0, 0.0, 2.0), origin);
+//! let config = Config::new(1, Point::new(0.0, 0.0, 2.0), origin);
 //! let mut companion: Companion<8, 64, 64> = Companion::new(config)?; // vehicles, waypoints, gates
 //! let now = Instant::from_millis(200);
 //! let mut sent = 0;

@@ -10,7 +10,7 @@
 //! ```
 //! use sim_autopilot::{Autopilot, Config};
 //!
-//! let mut autopilot = Autopilot::new(&PowellConfig::default()).unwrap();
+//! let mut autopilot = Autopilot::new(&Config::default()).unwrap();
 //! let mut buffer = [0; 512];
 //! let mut bytes = 0;
 //! for _ in 0..250 {

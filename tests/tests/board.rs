@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use firmware::calls::limits::{self, CallListener, ResultChecksum};
+use firmware::calls::limits::{self, Listener, Results};
 use firmware::calls::limits_routes::{self, RouteWorkspaces};
 use firmware::cases::{self, Workspace};
 use flockmate_tests::{board, workspace};
@@ -64,7 +64,7 @@ fn the_board_computes_what_the_desk_computes() {
 /// Counts calls.
 struct Calls(usize);
 
-impl CallListener for Calls {
+impl Listener for Calls {
     fn next(&mut self, _name: &'static str) {
         self.0 += 1;
     }
@@ -74,7 +74,7 @@ impl CallListener for Calls {
 fn at_its_limits_the_board_answers_as_the_desk_does() {
     let Some(program) = board::program("limits") else { return };
     let mut calls = Calls(0);
-    let mut answers = ResultChecksum::new(&mut calls);
+    let mut answers = Results::new(&mut calls);
     limits::call_without_roadmap(&mut answers);
     let places = answers.sum();
     let routes = limits_routes::call_all(&mut answers, &mut Box::new(RouteWorkspaces::new()));

@@ -26,8 +26,8 @@ const FILTER: u64 = 19_500;
 /// vehicles, with and without zones, and among 32 on 512 lanes.
 const COVERAGE: [(&str, u64); 5] = [
     ("a coverage plan, 3", 20_000_000),
-    ("planner::coverage::plan, 3", 20_000_000),
-    ("planner::coverage::plan, 3, zones", 20_000_000),
+    ("planner::coverage::plan_flights, 3", 20_000_000),
+    ("planner::coverage::plan_flights, 3, zones", 20_000_000),
     // They should take 1 M and 10 M: the page says what is missing.
     ("losses::redivide_work, 3", 1_200_000),
     ("losses::redivide_work, 32", 130_000_000),

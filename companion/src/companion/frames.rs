@@ -131,13 +131,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if intent.mission_crc != self.config.mission_crc {
                 if self.config.roster.iter().any(|entry| entry.system_id == id) {
                     let text = "Vehicle # has another mission file";
-                    self.links.send_sender_text(
-                        self.now,
-                        SenderKind::Other,
-                        true,
-                        text,
-                        [u32::from(id), 0, 0],
-                    );
+                    let numbers = [u32::from(id), 0, 0];
+                    self.links.send_sender_text(self.now, SenderKind::Other, true, text, numbers);
                 }
                 return;
             }

@@ -278,7 +278,7 @@ pub fn plan_flights<
         PartEligibility::Anyone => {
             let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
             // The weights are parts of the work here, not the vehicles' own.
-            pack::binpat_with_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
+            pack::binpat_by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
         }
     }
     let along = tracks.lane_direction();

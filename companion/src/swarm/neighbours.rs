@@ -112,7 +112,7 @@ impl<const V: usize> Neighbours<V> {
     /// radio has failed.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
-            c.at_range_edge || c.position_at.is_none() || c.has_flag(LANDED | OUT_OF_PLAN)
+            c.at_range_edge || c.position_at.is_none() || c.reports(LANDED | OUT_OF_PLAN)
         };
         self.range_edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
     }
@@ -292,13 +292,13 @@ impl<const V: usize> Neighbours<V> {
         contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (contact.heard_at, contact.intent_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
-        if contact.has_flag(GROUNDED)
-            && !contact.has_flag(LANDED | OUT_OF_PLAN)
+        if contact.reports(GROUNDED)
+            && !contact.reports(LANDED | OUT_OF_PLAN)
             && contact.position_at.is_some()
         {
             contact.pad = Some(contact.state.position);
         }
-        let out = contact.has_flag(OUT_OF_PLAN) && contact.position_at.is_some();
+        let out = contact.reports(OUT_OF_PLAN) && contact.position_at.is_some();
         contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
         // Ranks beyond the bitmap are not reported.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
@@ -341,7 +341,7 @@ impl<const V: usize> Neighbours<V> {
                 progress_m,
                 grounded: contact.state.grounded || dead,
                 out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: contact.has_flag(ON_DETOUR),
+                detours: contact.reports(ON_DETOUR),
                 ..contact.state
             };
             // Cannot overflow: there are as many slots as contacts.
@@ -371,7 +371,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster]
             .iter()
-            .all(|c| c.has_flag(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
+            .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster counts as dead, but not yet as one that lies.
@@ -379,19 +379,19 @@ impl<const V: usize> Neighbours<V> {
         let roster = &self.contacts[..self.roster];
         roster
             .iter()
-            .any(|c| !c.has_flag(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down))
+            .any(|c| !c.reports(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster has landed, or is out of the plan.
     pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id)
-            .is_some_and(|at| self.contacts[at].has_flag(LANDED) || self.contacts[at].is_out_of_plan(now))
+            .is_some_and(|at| self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now))
     }
 
     /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
         let waits = |c: &NeighbourEntry| {
-            c.heard_at.is_none() || (c.has_flag(GROUNDED) && !c.has_flag(LANDED | OUT_OF_PLAN))
+            c.heard_at.is_none() || (c.reports(GROUNDED) && !c.reports(LANDED | OUT_OF_PLAN))
         };
         self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
     }
@@ -442,7 +442,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Number of blocked vehicles that have a lower system id than `id`.
     pub fn blocked_count_before(&self, id: u8) -> u64 {
-        self.contacts.iter().filter(|c| c.id < id && c.has_flag(BLOCKED)).count() as u64
+        self.contacts.iter().filter(|c| c.id < id && c.reports(BLOCKED)).count() as u64
     }
 
     /// Whether a vehicle of this id is heard to follow the shared plan, or is none that is known.
@@ -480,7 +480,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether every other vehicle of the roster reported that it has landed or is out; true where there is none.
     pub fn are_all_at_rest(&self) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.has_flag(LANDED | OUT_OF_PLAN))
+        self.contacts[..self.roster].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
     }
 
     /// Time since any neighbour of the roster was heard, or since one reported that it hears us, whichever is longer; zero when

@@ -7,7 +7,7 @@ use core::cell::Cell;
 
 use critical_section::Mutex;
 use firmware::boards::stack;
-use firmware::calls::limits::{self, CallListener, ResultChecksum};
+use firmware::calls::limits::{self, Listener, Results};
 use firmware::calls::limits_routes::{self, RouteWorkspaces};
 use semihosting::println;
 use static_cell::ConstStaticCell;
@@ -25,7 +25,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 /// Counts calls, and keeps the name of the last.
 struct CallCounter(usize);
 
-impl CallListener for CallCounter {
+impl Listener for CallCounter {
     fn next(&mut self, name: &'static str) {
         self.0 += 1;
         critical_section::with(|cs| CALL.borrow(cs).set(name));
@@ -35,7 +35,7 @@ impl CallListener for CallCounter {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut calls = CallCounter(0);
-    let mut answers = ResultChecksum::new(&mut calls);
+    let mut answers = Results::new(&mut calls);
     limits::call_without_roadmap(&mut answers);
     let places = answers.sum();
     let routes = limits_routes::call_all(&mut answers, LENT.take());

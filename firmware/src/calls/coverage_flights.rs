@@ -164,8 +164,11 @@ fn measure_mission_plans(
     let MissionKind::Coverage(area) = view.kind() else { return };
     let request = Request { mission: &view, view: area, field: None, max_gates: GATES, photographed: &[] };
     let names = match zones.is_empty() {
-        true => ["planner::coverage::plan, 3", "planner::coverage::plan, 3 after two losses"],
-        false => ["planner::coverage::plan, 3, zones", "planner::coverage::plan, 3 after two losses, zones"],
+        true => ["planner::coverage::plan_flights, 3", "planner::coverage::plan_flights, 3 after two losses"],
+        false => [
+            "planner::coverage::plan_flights, 3, zones",
+            "planner::coverage::plan_flights, 3 after two losses, zones",
+        ],
     };
     let lent_bytes = size_of::<scratch::AreaWorkspace>();
     let mut losses: Vec<[DivisionInput; LIMITED_VEHICLES], 2> = Vec::new();

@@ -33,18 +33,18 @@ pub(super) const HARD_NUMBERS: [f32; 14] = [
 ];
 
 /// Receives the name of each call before it is made.
-pub trait CallListener {
+pub trait Listener {
     /// `name` is its file, its type if it has one, and its own name.
     fn next(&mut self, name: &'static str);
 }
 
 /// Reported answers, and their sum.
-pub struct ResultChecksum<'a, L> {
+pub struct Results<'a, L> {
     listener: &'a mut L,
     sum: u32,
 }
 
-impl<'a, L: CallListener> ResultChecksum<'a, L> {
+impl<'a, L: Listener> Results<'a, L> {
     /// No answers yet.
     pub fn new(listener: &'a mut L) -> Self {
         Self { listener, sum: 0 }
@@ -87,7 +87,7 @@ pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
 }
 
 /// Makes all calls that need no roadmap.
-pub fn call_without_roadmap(to: &mut ResultChecksum<'_, impl CallListener>) {
+pub fn call_without_roadmap(to: &mut Results<'_, impl Listener>) {
     call_frames(to);
     call_grids(to);
     call_segments(to);
@@ -97,7 +97,7 @@ pub fn call_without_roadmap(to: &mut ResultChecksum<'_, impl CallListener>) {
     call_reachable_sets(to);
 }
 
-fn call_frames(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_frames(to: &mut Results<'_, impl Listener>) {
     for p in extreme_points() {
         let hard = Geodetic { lat_deg: p.x.into(), lon_deg: p.y.into(), alt_m: p.z.into() };
         let good = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
@@ -124,7 +124,7 @@ fn call_frames(to: &mut ResultChecksum<'_, impl CallListener>) {
 const SHAPE: GridShape = GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
 const WORDS: [u64; 4] = [1 << 17, 0, 0, 0];
 
-fn call_grids(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_grids(to: &mut Results<'_, impl Listener>) {
     let dims = [0, 1, 4, MAX_DIM, MAX_DIM + 1, u32::MAX];
     for i in 0..dims.len() * dims.len() {
         let shape = GridShape { dims: [dims[i % 6], dims[i / 6], dims[(i * 5 + 1) % 6]], ..SHAPE };
@@ -171,7 +171,7 @@ fn call_grids(to: &mut ResultChecksum<'_, impl CallListener>) {
     }
 }
 
-fn call_segments(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_segments(to: &mut Results<'_, impl Listener>) {
     for outside in [Outside::Free, Outside::Blocked] {
         let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
         let inside = Point::new(2.2, 2.7, 1.2);
@@ -212,7 +212,7 @@ fn call_segments(to: &mut ResultChecksum<'_, impl CallListener>) {
     }
 }
 
-fn call_sampling(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_sampling(to: &mut Results<'_, impl Listener>) {
     let grid = VoxelGrid::new(SHAPE, Outside::Blocked, &WORDS).expect("a good grid");
     let solid =
         VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX]).expect("it is");
@@ -286,7 +286,7 @@ fn call_sampling(to: &mut ResultChecksum<'_, impl CallListener>) {
     }
 }
 
-fn call_paths(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_paths(to: &mut Results<'_, impl Listener>) {
     let mut path: Path<4> = to.call("flight::Path::new", Path::new);
     let track = TrackConfig::default();
     let advice =
@@ -344,7 +344,7 @@ fn call_paths(to: &mut ResultChecksum<'_, impl CallListener>) {
 }
 
 /// Pictures along a path, whatever their spacing.
-fn call_tasks(to: &mut ResultChecksum<'_, impl CallListener>, path: &Path<4>) {
+fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
     let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
     let waypoints =
         WaypointRange { first: PicturePlan::MAX_AREA_WAYPOINTS - 1, end: PicturePlan::MAX_AREA_WAYPOINTS };
@@ -400,7 +400,7 @@ fn push_until_full<const W: usize>(path: &Path<W>) -> usize {
     path.waypoints().len()
 }
 
-fn call_deconfliction(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_deconfliction(to: &mut Results<'_, impl Listener>) {
     let mut path: Path<4> = Path::new();
     let empty: Path<4> = Path::new();
     [0.0, 4.0].iter().for_each(|&x| path.push(Point::new(x, 0.0, 1.0), 1.0).expect("two points"));
@@ -434,7 +434,7 @@ fn call_deconfliction(to: &mut ResultChecksum<'_, impl CallListener>) {
     }
 }
 
-fn call_reachable_sets(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
     for (i, p) in extreme_points().enumerate() {
         let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
         let braking = Braking { accel_mps2: hard, jerk_mps3: p.x };

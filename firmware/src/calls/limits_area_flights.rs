@@ -13,7 +13,7 @@ use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 
 use super::coverage_flights;
-use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum, extreme_points};
+use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
 use super::limits_coverage::{
     self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, ZoneTransit,
 };
@@ -26,7 +26,7 @@ type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Memory lent to the calls.
 pub(super) struct FlightWorkspaces {
-    area: coverage::CoverageWorkspaces,
+    area: coverage::CoverageMemory,
     losses: losses::Workspace<LANES, VEHICLES>,
     out: Flights,
     own: VehiclePlan<WAYPOINTS, GATES>,
@@ -36,7 +36,7 @@ impl FlightWorkspaces {
     /// Creates it empty: all zeros.
     pub(super) const fn new() -> Self {
         Self {
-            area: coverage::CoverageWorkspaces::new(),
+            area: coverage::CoverageMemory::new(),
             losses: losses::Workspace::new(),
             out: SwarmPlan::new(),
             own: VehiclePlan::new(),
@@ -66,7 +66,7 @@ const SWARM: FlightInputs<'_> = FlightInputs {
 
 /// Makes all calls on coverage.
 pub(super) fn call_area_flights(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     schedule: &mut ScheduleWorkspace,
     lent: &mut FlightWorkspaces,
 ) {
@@ -96,18 +96,17 @@ fn is_finite(out: &Flights) -> bool {
 }
 
 fn call_flight_plans(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
     ws: &mut ScheduleWorkspace,
     out: &mut Flights,
 ) {
     let mut plan = |work: &Work<'_, LANES, CORNERS>, routes: &Plan<VEHICLES>, swarm: &FlightInputs<'_>| {
-        let planned =
-            to.call("flights::plan_flights", || flights::plan_flights(work, routes, swarm, ws, out));
-        to.add_bool(planned.is_ok());
-        assert!(planned.is_err() || is_finite(out), "{swarm:?}");
-        planned
+        let result = to.call("flights::plan_flights", || flights::plan_flights(work, routes, swarm, ws, out));
+        to.add_bool(result.is_ok());
+        assert!(result.is_err() || is_finite(out), "{swarm:?}");
+        result
     };
     assert_eq!(plan(good, routes, &SWARM), Ok(()));
     for hard in HARD_NUMBERS {
@@ -153,16 +152,13 @@ fn call_flight_plans(
     assert_eq!(plan(good, routes, &FlightInputs { pads: &pads, ..SWARM }), Err(PlanError::SameId(1)));
     assert_eq!(plan(good, routes, &FlightInputs { pads: &PADS[1..], ..SWARM }), Err(PlanError::Terminals));
     let ranges = [WaypointRange { first: 4, end: 9 }, WaypointRange { first: 8, end: u32::MAX }];
-    assert_eq!(
-        plan(good, routes, &FlightInputs { photographed: &ranges, ..SWARM }),
-        Err(PlanError::Terminals)
-    );
+    let planned = plan(good, routes, &FlightInputs { photographed: &ranges, ..SWARM });
+    assert_eq!(planned, Err(PlanError::Terminals));
     for done in [&ranges[..1], &ranges[1..]] {
         let _ = plan(good, routes, &FlightInputs { photographed: done, ..SWARM });
     }
-    for (gates_most, layers_held) in [(0, 0), (usize::MAX, u64::MAX)] {
-        let _ =
-            plan(good, routes, &FlightInputs { max_gates: gates_most, held_layers: layers_held, ..SWARM });
+    for (max_gates, held_layers) in [(0, 0), (usize::MAX, u64::MAX)] {
+        let _ = plan(good, routes, &FlightInputs { max_gates, held_layers, ..SWARM });
     }
     wrong_routes(&mut plan, good, routes);
     call_field_plans(&mut plan, good, routes);
@@ -232,7 +228,7 @@ struct BorrowedWorkspaces<'m> {
 }
 
 fn call_divisions(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
     memory: &mut BorrowedWorkspaces<'_>,
@@ -275,7 +271,7 @@ fn call_divisions(
 }
 
 fn call_redivide(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     loss: &Loss<'_, LANES, CORNERS>,
     memory: &mut BorrowedWorkspaces<'_>,
     routes: &mut Plan<VEHICLES>,
@@ -289,7 +285,7 @@ fn call_redivide(
 }
 
 fn call_ways_home(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     transit: &ZoneTransit<'_>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {

@@ -12,7 +12,7 @@ use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
 use planner_core::flight::{WaypointRange, WaypointSet};
 
-use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum};
+use super::limits::{HARD_NUMBERS, Listener, Results};
 
 /// Capacities: lanes, vertices, corners of no-fly zones, vehicles.
 pub(super) const LANES: usize = 8;
@@ -57,7 +57,7 @@ pub(super) type Lanes = Tracks<LANES>;
 pub(super) type ZoneTransit<'a> = Transit<'a, CORNERS>;
 
 /// Memory lent to the calls.
-pub(super) struct CoverageWorkspaces {
+pub(super) struct CoverageMemory {
     pub(super) tracks: Lanes,
     left: Lanes,
     build: tracks::Workspace<VERTICES>,
@@ -65,7 +65,7 @@ pub(super) struct CoverageWorkspaces {
     pub(super) plan: Plan<VEHICLES>,
 }
 
-impl CoverageWorkspaces {
+impl CoverageMemory {
     /// Creates it empty: all zeros.
     pub(super) const fn new() -> Self {
         Self {
@@ -83,7 +83,7 @@ fn is_good(number: f32) -> bool {
 }
 
 /// Makes all of them. Lent are afterwards the lanes and the routes of [`test_area`].
-pub(super) fn call_coverage(to: &mut ResultChecksum<'_, impl CallListener>, lent: &mut CoverageWorkspaces) {
+pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut CoverageMemory) {
     call_waypoint_sets(to);
     call_cameras(to);
     call_areas(to);
@@ -101,7 +101,7 @@ pub(super) fn test_area() -> Area<'static> {
     Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
 }
 
-fn call_cameras(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_cameras(to: &mut Results<'_, impl Listener>) {
     let pixels = [6000, 4000];
     for hard in HARD_NUMBERS {
         for camera in [
@@ -136,14 +136,11 @@ fn call_cameras(to: &mut ResultChecksum<'_, impl CallListener>) {
     }
 }
 
-fn check_spacing(
-    to: &mut ResultChecksum<'_, impl CallListener>,
-    spacing: &Spacing,
-) -> Result<(), CoverageError> {
+fn check_spacing(to: &mut Results<'_, impl Listener>, spacing: &Spacing) -> Result<(), CoverageError> {
     to.call("footprint::Spacing::check", || spacing.check())
 }
 
-fn call_areas(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_areas(to: &mut Results<'_, impl Listener>) {
     for x in HARD_NUMBERS {
         for y in HARD_NUMBERS {
             let mut vertices = CORNERS_OF_ALL;
@@ -185,7 +182,7 @@ fn call_areas(to: &mut ResultChecksum<'_, impl CallListener>) {
     assert!(sweep::least_width(&area, &mut none).is_err(), "no room for the hull");
 }
 
-fn call_transits(to: &mut ResultChecksum<'_, impl CallListener>, transit: &mut ZoneTransit<'static>) {
+fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<'static>) {
     let mut small = Transit::<3>::empty();
     let full = to.call("transit::Transit::set_area", || small.set_area(test_area()));
     assert_eq!(full, Err(CoverageError::NoFlyFull));
@@ -220,12 +217,12 @@ fn call_transits(to: &mut ResultChecksum<'_, impl CallListener>, transit: &mut Z
 }
 
 fn call_lanes(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     area: &Area<'_>,
     transit: &ZoneTransit<'_>,
-    lent: &mut CoverageWorkspaces,
+    lent: &mut CoverageMemory,
 ) {
-    let CoverageWorkspaces { tracks, build, .. } = lent;
+    let CoverageMemory { tracks, build, .. } = lent;
     *build = to.call("strips::Workspace::new", tracks::Workspace::new);
     *tracks = to.call("lanes::Tracks::new", Tracks::new);
     call_waypoint_numbers(to, tracks);
@@ -265,7 +262,7 @@ fn call_lanes(
 }
 
 /// Waypoints that there are and that there are not.
-fn call_waypoint_numbers(to: &mut ResultChecksum<'_, impl CallListener>, tracks: &Lanes) {
+fn call_waypoint_numbers(to: &mut Results<'_, impl Listener>, tracks: &Lanes) {
     let count = to.call("lanes::Tracks::waypoint_count", || tracks.waypoint_count());
     let lanes = to.call("lanes::Tracks::lanes", || tracks.lanes().len());
     let along = to.call("lanes::Tracks::lane_direction", || tracks.lane_direction());
@@ -282,12 +279,8 @@ fn call_waypoint_numbers(to: &mut ResultChecksum<'_, impl CallListener>, tracks:
     }
 }
 
-fn call_divisions(
-    to: &mut ResultChecksum<'_, impl CallListener>,
-    transit: &ZoneTransit<'_>,
-    lent: &mut CoverageWorkspaces,
-) {
-    let CoverageWorkspaces { tracks, left, .. } = lent;
+fn call_divisions(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, lent: &mut CoverageMemory) {
+    let CoverageMemory { tracks, left, .. } = lent;
     for first in NUMBERS {
         for end in NUMBERS {
             let done = [WaypointRange { first: 0, end: 2 }, WaypointRange { first, end }];
@@ -325,38 +318,32 @@ fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     ]
 }
 
-fn call_packing(
-    to: &mut ResultChecksum<'_, impl CallListener>,
-    transit: &ZoneTransit<'_>,
-    lent: &mut CoverageWorkspaces,
-) {
-    let CoverageWorkspaces { tracks, powell, plan, .. } = lent;
+fn call_packing(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, lent: &mut CoverageMemory) {
+    let CoverageMemory { tracks, powell, plan, .. } = lent;
     *plan = to.call("pack::Plan::new", Plan::new);
     let ws = &mut powell.pack;
     *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
     let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
-    let pack =
-        |to: &mut ResultChecksum<'_, _>, work: &Work<'_, LANES, CORNERS>, ws: &mut _, plan: &mut Plan<_>| {
-            let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
-            let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
-            assert!(checked.is_ok() || packed == checked);
-            to.add_bool(packed.is_ok());
-            let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
-            shares.iter().for_each(|share| to.add(*share));
-            for vehicle in work.vehicles {
-                let delay_s =
-                    to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
-                to.add(delay_s);
-            }
-            let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
-            to.add(max_s);
-            for route in &plan.routes {
-                let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
-                let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
-                assert_eq!(waypoints.next(), Some(ends.0));
-                to.add_count((ends.0 ^ ends.1) as usize);
-            }
-        };
+    let pack = |to: &mut Results<'_, _>, work: &Work<'_, LANES, CORNERS>, ws: &mut _, plan: &mut Plan<_>| {
+        let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
+        let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
+        assert!(checked.is_ok() || packed == checked);
+        to.add_bool(packed.is_ok());
+        let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
+        shares.iter().for_each(|share| to.add(*share));
+        for vehicle in work.vehicles {
+            let delay_s = to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
+            to.add(delay_s);
+        }
+        let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
+        to.add(max_s);
+        for route in &plan.routes {
+            let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
+            let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
+            assert_eq!(waypoints.next(), Some(ends.0));
+            to.add_count((ends.0 ^ ends.1) as usize);
+        }
+    };
     for hard in HARD_NUMBERS {
         for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
             for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
@@ -366,11 +353,10 @@ fn call_packing(
                 pack(to, &Work { unit, vehicles, ..good }, ws, plan);
             }
             for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
-                let work = Work { unit, ..good };
-                let packed =
-                    to.call("pack::binpat_with_shares", || pack::binpat_with_shares(&work, shares, ws, plan));
-                assert!(shares.len() == VEHICLES || packed.is_err());
-                to.add_bool(packed.is_ok());
+                let by_shares = || pack::binpat_by_shares(&Work { unit, ..good }, shares, ws, plan);
+                let cut = to.call("pack::binpat_by_shares", by_shares);
+                assert!(shares.len() == VEHICLES || cut.is_err());
+                to.add_bool(cut.is_ok());
                 let mut ends = [0; VEHICLES];
                 to.call("pack::cbinpack", || pack::cbinpack(tracks, unit, shares, &mut ends));
                 assert!(ends.iter().all(|end| *end <= tracks.waypoint_count()), "{shares:?}");
@@ -396,11 +382,11 @@ fn call_packing(
 }
 
 fn call_share_searches(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     transit: &ZoneTransit<'_>,
-    lent: &mut CoverageWorkspaces,
+    lent: &mut CoverageMemory,
 ) {
-    let CoverageWorkspaces { tracks, powell: ws, plan, .. } = lent;
+    let CoverageMemory { tracks, powell: ws, plan, .. } = lent;
     *ws = to.call("powell::Workspace::new", powell::Workspace::new);
     let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
     let mut ways_m = [0.0; 512];
@@ -446,7 +432,7 @@ fn call_share_searches(
 }
 
 /// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
-fn call_waypoint_sets(to: &mut ResultChecksum<'_, impl CallListener>) {
+fn call_waypoint_sets(to: &mut Results<'_, impl Listener>) {
     let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
     let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);
     for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {

@@ -5,7 +5,7 @@ use planner_core::coverage::Flat;
 use planner_core::field::follow::TerrainFollowing;
 use planner_core::field::{self, FieldShape, FieldView, MAX_NODES};
 
-use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum};
+use super::limits::{HARD_NUMBERS, Listener, Results};
 
 const COLUMNS: u16 = 3;
 const ROWS: u16 = 2;
@@ -17,7 +17,7 @@ const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
 /// with one slope.
 const FAR_COORDINATES: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
-pub(super) fn call_fields(to: &mut ResultChecksum<'_, impl CallListener>) {
+pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
     let good = FieldShape { low: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
     let mut file = [0; BYTES];
     for hard in HARD_NUMBERS {
@@ -59,7 +59,7 @@ pub(super) fn call_fields(to: &mut ResultChecksum<'_, impl CallListener>) {
     call_field_paths(to, field);
 }
 
-fn call_field_paths(to: &mut ResultChecksum<'_, impl CallListener>, field: FieldView<'_>) {
+fn call_field_paths(to: &mut Results<'_, impl Listener>, field: FieldView<'_>) {
     for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
         for end in ENDS.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
             let following = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };

@@ -7,7 +7,7 @@ use planner_core::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
 use planner_core::search::{self, RoadmapWithLengths, SearchError, SearchWorkspace};
 
-use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum, extreme_points};
+use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
 
 /// Most nodes that a workspace holds.
 pub(super) const MAX_NODES: usize = 8;
@@ -46,7 +46,7 @@ pub(super) fn any_edge_passable(_: u16, _: &HalfEdge) -> bool {
 
 /// Leaves a good file; returns its length.
 pub(super) fn call_roadmap_files(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     ws: &mut SearchWorkspace<MAX_NODES>,
     file: &mut [u8; 512],
 ) -> usize {
@@ -117,7 +117,7 @@ pub(super) fn call_roadmap_files(
 /// Indices of nodes: valid ones, and ones of which there is no node.
 pub(super) const NODE_INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
-pub(super) fn call_roadmap_views(to: &mut ResultChecksum<'_, impl CallListener>, view: &RoadmapView<'_>) {
+pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &RoadmapView<'_>) {
     let nodes = to.call("roadmap::RoadmapView::node_count", || view.node_count());
     let half_edges = to.call("roadmap::RoadmapView::half_edge_count", || view.half_edge_count());
     assert_eq!((nodes, half_edges), (6, 18));
@@ -156,7 +156,7 @@ pub(super) fn call_roadmap_views(to: &mut ResultChecksum<'_, impl CallListener>,
 }
 
 pub(super) fn call_searches(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     view: &RoadmapView<'_>,
     ws: &mut SearchWorkspace<MAX_NODES>,
 ) {
@@ -206,7 +206,7 @@ pub(super) fn call_searches(
     assert_eq!(search::cost_matrix(view, &[], &[1], any_edge_passable, ws, &mut []), Ok(()));
 }
 
-pub(super) fn call_assignments(to: &mut ResultChecksum<'_, impl CallListener>) {
+pub(super) fn call_assignments(to: &mut Results<'_, impl Listener>) {
     let mut ws = to.call("assignment::AssignmentWorkspace::new", AssignmentWorkspace::<3>::new);
     let mut out = [None; 3];
     let mut both = |costs: &[f32], rows: usize, cols: usize, out: &mut [Option<u16>]| {

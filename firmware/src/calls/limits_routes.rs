@@ -12,7 +12,7 @@ use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use planner_core::search::SearchWorkspace;
 
-use super::limits::{CallListener, HARD_NUMBERS, ResultChecksum, extreme_points};
+use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
 use super::limits_area_flights as area_flights;
 use super::limits_field as field;
 use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any_edge_passable};
@@ -56,7 +56,7 @@ impl Default for RouteWorkspaces {
 
 /// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches, assignments, plans, schedules,
 /// detours, coverage.
-pub fn call_all(to: &mut ResultChecksum<'_, impl CallListener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
+pub fn call_all(to: &mut Results<'_, impl Listener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
     field::call_fields(to);
     let len = graph::call_roadmap_files(to, &mut lent.ws.search, &mut lent.file);
     let mut sums = [to.sum(); 8];
@@ -90,7 +90,7 @@ fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanReques
 }
 
 fn call_plans(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     view: &RoadmapView<'_>,
     ws: &mut Workspace,
     out: &mut Plan,
@@ -175,7 +175,7 @@ fn call_plans(
 }
 
 fn call_schedules(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     view: &RoadmapView<'_>,
     ws: &mut Workspace,
     plan: &mut Plan,
@@ -255,7 +255,7 @@ fn call_schedules(
 }
 
 fn call_detours(
-    to: &mut ResultChecksum<'_, impl CallListener>,
+    to: &mut Results<'_, impl Listener>,
     view: &RoadmapView<'_>,
     ws: &mut SearchWorkspace<MAX_NODES>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,

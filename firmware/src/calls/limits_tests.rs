@@ -5,14 +5,14 @@ use std::fs;
 use std::path::Path;
 use std::string::{String, ToString};
 
-use super::limits::{CallListener, ResultChecksum, call_without_roadmap};
+use super::limits::{Listener, Results, call_without_roadmap};
 use super::limits_routes::{RouteWorkspaces, call_all};
 use super::public_functions::public_functions;
 
 #[derive(Default)]
 struct Called(BTreeSet<&'static str>);
 
-impl CallListener for Called {
+impl Listener for Called {
     fn next(&mut self, name: &'static str) {
         self.0.insert(name);
     }
@@ -42,7 +42,7 @@ fn public(folder: &Path, names: &mut BTreeSet<String>) {
 #[test]
 fn every_public_call_of_planner_core_holds_at_its_limits() {
     let mut called = Called::default();
-    let mut answers = ResultChecksum::new(&mut called);
+    let mut answers = Results::new(&mut called);
     call_without_roadmap(&mut answers);
     call_all(&mut answers, &mut Box::new(RouteWorkspaces::new()));
     let mut all = BTreeSet::new();

@@ -23,7 +23,7 @@ use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::pack::{
-    PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work, binpat, binpat_with_shares,
+    PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work, binpat, binpat_by_shares,
 };
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
@@ -63,7 +63,7 @@ impl<'a> CoveragePlan<'a> {
         Self::plan_with_search(scenario, method, companion::planner::coverage::MAX_ORDER_CHANGES)
     }
 
-    fn plan_with_search(scenario: &'a Scenario, method: Method, looks: u32) -> anyhow::Result<Self> {
+    fn plan_with_search(scenario: &'a Scenario, method: Method, search_steps: u32) -> anyhow::Result<Self> {
         let Some(wanted) = &scenario.area else {
             bail!(
                 "area is missing: {}\nhint: add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`",
@@ -80,12 +80,8 @@ impl<'a> CoveragePlan<'a> {
         transit.set_area(area).map_err(failed)?;
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
-        let pattern = LanePattern {
-            spacing: wanted.usable,
-            angle_deg: wanted.angle_deg,
-            margin_m: wanted.margin_m,
-            search_steps: looks,
-        };
+        let (angle_deg, margin_m) = (wanted.angle_deg, wanted.margin_m);
+        let pattern = LanePattern { spacing: wanted.usable, angle_deg, margin_m, search_steps };
         let mut tracks = Box::new(Tracks::new());
         let mut workspace = Box::new(tracks::Workspace::<MAX_VERTICES>::new());
         tracks::build(&area, &pattern, &transit, &mut workspace, &mut tracks).map_err(failed)?;
@@ -370,7 +366,7 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
         packed_m = end_m;
     }
     let mut plan = Plan::new();
-    binpat_with_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
+    binpat_by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
     let alike =
         plan.routes.iter().map(|r| (r.first, r.end)).eq(exact.routes.iter().map(|r| (r.first, r.end)));
     if !alike || plan.max_cost_s() > exact.max_cost_s() {

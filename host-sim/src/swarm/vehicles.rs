@@ -65,12 +65,8 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
                 // The receiver set it, with the error that its heights have.
                 config.ekf_origin.alt_m += f64::from(config.height_error_m());
             }
-            let mut member = SimulatedVehicle::new(
-                &config,
-                companion_config(mission, vehicle.id)?,
-                serial,
-                scenario.seed,
-            )?;
+            let companion = companion_config(mission, vehicle.id)?;
+            let mut member = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
             match &vehicle.companion {
                 Companion::InProcess { flash: None } => {}

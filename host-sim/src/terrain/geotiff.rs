@@ -27,14 +27,14 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     decode(BufReader::new(File::open(path)?))
 }
 
-fn malformed_file(why: &impl ToString) -> TerrainError {
+fn bad_file(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
 fn malformed(error: TiffError) -> TerrainError {
     match error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => error.into(),
-        other => malformed_file(&other),
+        other => bad_file(&other),
     }
 }
 
@@ -50,11 +50,11 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         return Err(TerrainError::TooManyCells(columns as u128 * rows as u128));
     }
     if columns == 0 || rows == 0 {
-        return Err(malformed_file(&"it has no cells"));
+        return Err(bad_file(&"it has no cells"));
     }
     match decoder.colortype().map_err(malformed)? {
         ColorType::Gray(_) => {}
-        other => return Err(malformed_file(&format!("it has colours ({other:?}), not one height a cell"))),
+        other => return Err(bad_file(&format!("it has colours ({other:?}), not one height a cell"))),
     }
     let keys = decoder.find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag).map_err(malformed)?;
     let keys = GeoKeys::new(&keys.unwrap_or_default());
@@ -74,8 +74,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let missing = missing.and_then(|value| value.into_string().ok());
     let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
     let (corner, cell) = georeference(&mut decoder, keys.is_pixel_point())?;
-    let value_m = |value: f64| match missing.is_some_and(|missing| is_missing_value(value, missing))
-        || !value.is_finite()
+    let value_m = |value: f64| match missing.is_some_and(|m| is_missing_value(value, m)) || !value.is_finite()
     {
         true => f32::NAN,
         false => (value * unit_m) as f32,
@@ -92,9 +91,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         let mut values = values_as_f64(values)?;
         for row in top..(top + own_tall).min(rows) {
             for column in left..left + own_wide {
-                let Some(value) = values.next() else {
-                    return Err(malformed_file(&"a part of it ends early"));
-                };
+                let value = values.next().ok_or_else(|| bad_file(&"a part of it ends early"))?;
                 if column < columns {
                     heights_m[row * columns + column] = value_m(value);
                 }
@@ -137,7 +134,7 @@ fn georeference<R: Read + Seek>(
         },
     };
     if !cell.iter().all(|side| *side > 0.0 && side.is_finite()) || !corner.iter().all(|at| at.is_finite()) {
-        return Err(malformed_file(&"its cells have no size or place"));
+        return Err(bad_file(&"its cells have no size or place"));
     }
     if points {
         corner = [corner[0] - cell[0] / 2.0, corner[1] + cell[1] / 2.0];
@@ -155,6 +152,6 @@ fn values_as_f64(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>
         DecodingResult::I32(v) => Box::new(v.into_iter().map(f64::from)),
         DecodingResult::F32(v) => Box::new(v.into_iter().map(f64::from)),
         DecodingResult::F64(v) => Box::new(v.into_iter()),
-        _ => return Err(malformed_file(&"its heights are no numbers of 8, 16, 32 or 64 bits")),
+        _ => return Err(bad_file(&"its heights are no numbers of 8, 16, 32 or 64 bits")),
     })
 }

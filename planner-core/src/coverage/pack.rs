@@ -259,7 +259,7 @@ pub fn binpat<const L: usize, const N: usize, const K: usize>(
 ///
 /// # Errors
 /// See [`Work::check`]; [`CoverageError::Setting`] for shares that are not one a vehicle, finite, at least 0 and not all 0.
-pub fn binpat_with_shares<const L: usize, const N: usize, const K: usize>(
+pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     shares: &[f32],
     ws: &mut PackWorkspace<K>,

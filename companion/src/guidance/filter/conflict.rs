@@ -101,7 +101,7 @@ impl Guidance {
         let mut next = 0;
         while let Some((i, contact)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
-            let mut met = neighbours.filter_neighbour(contact, now);
+            let mut met = neighbours.for_filter(contact, now);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
                 // The neighbour is not within radio range, and is where the plan has it.

@@ -182,7 +182,7 @@ impl Store {
         match (job, outcome) {
             (FlashJob::None | FlashJob::Ignored, _) => {}
             (FlashJob::Read { .. }, Ok(bytes)) => return Some(ReadOutcome::Bytes(bytes)),
-            (FlashJob::Read { .. } | FlashJob::Sum { .. }, Err(FlashFault)) => {
+            (FlashJob::Read { .. } | FlashJob::Sum { .. }, Err(_)) => {
                 return Some(ReadOutcome::Failed);
             }
             (FlashJob::Sum { at, end, sum }, Ok(bytes)) => {
@@ -195,7 +195,7 @@ impl Store {
                 }
                 self.job = FlashJob::Sum { at, end, sum };
             }
-            (FlashJob::Erase { .. } | FlashJob::MarkClean(_), Err(FlashFault)) => self.erasure_failed = true,
+            (FlashJob::Erase { .. } | FlashJob::MarkClean(_), Err(_)) => self.erasure_failed = true,
             (FlashJob::Erase { area, at }, Ok(_)) => {
                 let at = at + self.layout.sector_len;
                 let more = at < area.end(&self.layout);
@@ -221,16 +221,13 @@ impl Store {
                 }
             }
             (FlashJob::Record(record), Ok(bytes)) => self.continue_record(record, bytes),
-            (FlashJob::Record(_), Err(FlashFault)) => self.fail_record(),
-            (
-                FlashJob::MarkUsed(area) | FlashJob::Seal(area, _) | FlashJob::SealCheck(area, _),
-                Err(FlashFault),
-            ) => {
+            (FlashJob::Record(_), Err(_)) => self.fail_record(),
+            (FlashJob::MarkUsed(area) | FlashJob::Seal(area, _) | FlashJob::SealCheck(area, _), Err(_)) => {
                 self.handle_area_failure(area);
             }
             (
                 FlashJob::Flush(slot) | FlashJob::FlushRest { slot, .. } | FlashJob::Check { slot, .. },
-                Err(FlashFault),
+                Err(_),
             ) => {
                 self.handle_area_failure(slot);
             }

@@ -30,10 +30,8 @@ impl Store {
                     let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
                     let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
                     self.journal.compacting = Some(Compaction { half, at, step: 3, mission });
-                    FlashJob::Seal(
-                        FlashArea::Half(half),
-                        Seal { sequence: newest + 1, len: 0, crc: 0, field: false },
-                    )
+                    let seal = Seal { sequence: newest + 1, len: 0, crc: 0, field: false };
+                    FlashJob::Seal(FlashArea::Half(half), seal)
                 }
             });
         }
@@ -65,11 +63,8 @@ impl Store {
             RecordKind::Parameters => self.parameters_record(at),
             RecordKind::Photographed => self.photographed_record(at),
             RecordKind::Mission => {
-                let crc = if len == 0 {
-                    crc32(&[])
-                } else {
-                    crc32(self.reassembly.last_part().unwrap_or_default())
-                };
+                let rest = if len == 0 { &[] } else { self.reassembly.last_part().unwrap_or_default() };
+                let crc = crc32(rest);
                 let (step, source) = (RecordStep::Head, RecordSource::Window);
                 JournalRecord { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
             }

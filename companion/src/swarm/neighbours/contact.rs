@@ -122,13 +122,13 @@ impl NeighbourEntry {
     }
 
     /// Whether it is heard, but has had no valid position for long.
-    pub(super) fn is_position_imprecise(&self) -> bool {
+    pub(super) fn is_imprecise(&self) -> bool {
         self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
     }
 
     /// Whether it follows the shared plan, as last heard.
     pub(super) fn on_plan(&self) -> bool {
-        self.state.progress_m.is_some() && !self.has_flag(ON_DETOUR | OUT_OF_PLAN)
+        self.state.progress_m.is_some() && !self.reports(ON_DETOUR | OUT_OF_PLAN)
     }
 
     /// Time that an unheard vehicle may take for what its gates left it, seconds.
@@ -159,7 +159,7 @@ impl NeighbourEntry {
         let after_s = RECKONED_AFTER_S + f32::from(self.gates_open_in_s);
         let silent_s = (now - known_at).as_secs_f32() - after_s;
         let beyond = self.at_range_edge || self.position_at.is_none();
-        if silent_s <= 0.0 || !beyond || self.has_flag(ON_DETOUR | OUT_OF_PLAN) {
+        if silent_s <= 0.0 || !beyond || self.reports(ON_DETOUR | OUT_OF_PLAN) {
             return Some(known_m);
         }
         let reckoned_m = known_m + self.assumed_speed_mps * silent_s;
@@ -168,19 +168,19 @@ impl NeighbourEntry {
 
     /// Seconds until it has come past `until_m` for sure; none where that is open.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
-        let known_m = self.progress_m(now).filter(|_| !self.has_flag(ON_DETOUR | OUT_OF_PLAN))?;
+        let known_m = self.progress_m(now).filter(|_| !self.reports(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.intent_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.assumed_speed_mps;
         let after_s = RECKONED_AFTER_S + f32::from(self.gates_open_in_s) - (now - known_at).as_secs_f32();
         (until_m <= self.gates_open_up_to_m - PROGRESS_ERROR_M).then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 
-    pub(super) fn has_flag(&self, flag: u8) -> bool {
+    pub(super) fn reports(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
 
     pub(super) fn is_out_of_plan(&self, now: Instant) -> bool {
-        self.has_flag(OUT_OF_PLAN) || self.is_dead(now)
+        self.reports(OUT_OF_PLAN) || self.is_dead(now)
     }
 
     /// The part of a reported progress that is believed, metres: no more than the vehicle can have
@@ -197,21 +197,21 @@ impl NeighbourEntry {
 
     /// Whether it is on the ground: as it reports, or after so long a silence.
     pub(super) fn is_on_ground(&self, now: Instant, down: Duration) -> bool {
-        self.has_flag(GROUNDED)
-            || (!self.has_flag(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
+        self.reports(GROUNDED)
+            || (!self.reports(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
     /// Whether it is out of the plan, or lately reported that it stands until another vehicle moves.
     pub(super) fn is_waiting(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
-            || (self.has_flag(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
+            || (self.reports(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
             || self.is_landing_after_detour(now)
     }
 
     /// Whether it flew around and comes down at the end of that.
     pub(super) fn is_landing_after_detour(&self, now: Instant) -> bool {
-        self.has_flag(ON_DETOUR)
-            && !self.has_flag(GROUNDED)
+        self.reports(ON_DETOUR)
+            && !self.reports(GROUNDED)
             && self.may_come_down
             && self.points_for_now().last().is_some_and(|low| low.z < self.state.position.z)
             && self.state.velocity.xy().norm_squared() < MAX_HOVER_MPS * MAX_HOVER_MPS
@@ -220,7 +220,7 @@ impl NeighbourEntry {
 
     /// Whether it claims the turn: it is blocked, hovers, and is about to fly a detour.
     pub(super) fn claims_turn(&self, now: Instant) -> bool {
-        self.has_flag(BLOCKED)
+        self.reports(BLOCKED)
             && !self.is_waiting(now)
             && self.heard_within(now, HEARD_WITHIN)
             && self.state.velocity.norm() < MAX_HOVER_MPS
@@ -232,9 +232,9 @@ impl NeighbourEntry {
             && !self.is_reported_out_of_range(now)
             && !self.flies_plan_unheard();
         self.rank != STRANGER_RANK
-            && !self.has_flag(GROUNDED | LANDED)
+            && !self.reports(GROUNDED | LANDED)
             && !self.is_out_of_plan(now)
-            && (silent || (self.state.progress_m.is_none() && !self.has_flag(ON_DETOUR)))
+            && (silent || (self.state.progress_m.is_none() && !self.reports(ON_DETOUR)))
     }
 
     /// The columns it may come down in, `apart_m` around it; unheard it has come as far as `upto_m` along its points.
@@ -283,7 +283,7 @@ impl NeighbourEntry {
         let (top, here) = (self.points_for_now().last()?, self.state.position);
         let beside = (top - here).xy().norm_squared();
         let climbs = self.may_come_down
-            && !self.has_flag(LANDED | OUT_OF_PLAN)
+            && !self.reports(LANDED | OUT_OF_PLAN)
             && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
         (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
@@ -302,14 +302,14 @@ impl NeighbourEntry {
 
     /// Whether it is in the air, or about to be, as it reported last.
     pub(super) fn is_under_way(&self) -> bool {
-        !self.has_flag(GROUNDED | LANDED) || self.first_unheard_point > 0
+        !self.reports(GROUNDED | LANDED) || self.first_unheard_point > 0
     }
 
     /// Whether it is silent, and continues over an area as long as its lease allows, or as its autopilot takes it.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.is_leased()
             && self.is_under_way()
-            && !self.has_flag(OUT_OF_PLAN)
+            && !self.reports(OUT_OF_PLAN)
             && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
@@ -354,12 +354,12 @@ impl NeighbourEntry {
     /// How high it lies at most, once it came down from a place: on the ground that it reported, which away from pads is the
     /// lowest there is. Then it is below what it flew along, which is over the ground by [`Ground::height_m`] but for what it
     /// deviated; above its pad, and where it came down already, that is not known.
-    pub(super) fn max_ground_height_m(&self, field: AreaGround, place: &Point) -> f32 {
+    pub(super) fn max_ground_m(&self, field: AreaGround, place: &Point) -> f32 {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;
         };
         let away = self.pad.is_some_and(|pad| (pad - place).xy().norm() > OVER_PAD_M);
-        let below_m = if away && !self.has_flag(ON_DETOUR | OUT_OF_PLAN) && !self.may_come_down {
+        let below_m = if away && !self.reports(ON_DETOUR | OUT_OF_PLAN) && !self.may_come_down {
             ground.height_m / 2.0
         } else {
             0.0
@@ -384,13 +384,13 @@ impl NeighbourEntry {
             let to = from - Point::new(0.0, 0.0, self.column_depth_m(&from));
             KeepOutZone { from, to, radius_m: apart_m + VAGUE_POSITION_M, kind: nature }
         };
-        if self.has_flag(GROUNDED) && self.has_flag(OUT_OF_PLAN) && self.is_position_imprecise() {
+        if self.reports(GROUNDED) && self.reports(OUT_OF_PLAN) && self.is_imprecise() {
             tell(column(here, ZoneKind::Grounded));
-        } else if self.has_flag(GROUNDED)
-            && (self.has_flag(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
+        } else if self.reports(GROUNDED)
+            && (self.reports(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
         {
             tell(place(apart_m));
-        } else if self.has_flag(OUT_OF_PLAN) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
+        } else if self.reports(OUT_OF_PLAN) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
             let below = column(here, ZoneKind::Static);
             tell(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // The place of the vehicle may not be approached from above or the side, whatever its
@@ -406,7 +406,7 @@ impl NeighbourEntry {
             if let Some(field) = field.filter(|_| down && !self.ground_m.is_nan()) {
                 // No lane and no layer comes as low: as thin as it lies, and below that at corners alone.
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
-                let high = |at: Point| low(at, self.max_ground_height_m(field, &at));
+                let high = |at: Point| low(at, self.max_ground_m(field, &at));
                 return self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
                     let next = if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
                     let (from, lies) = (high(next), place(apart_m + VAGUE_POSITION_M));

@@ -51,7 +51,7 @@ pub(crate) struct ReachQuery<'a> {
 
 impl NeighbourEntry {
     /// Whether it stays out of reach wherever it can be: what most of them do, seen without making a set of it. Never where
-    /// [`Neighbours::filter_neighbour`] and its reach say otherwise.
+    /// [`Neighbours::for_filter`] and its reach say otherwise.
     #[inline(always)]
     fn is_beyond(&self, placed_at: Instant, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> bool {
         let away = self.state.position - reach.place;
@@ -72,12 +72,12 @@ impl NeighbourEntry {
             place_on_points: self.place_on_points,
             extent_m: self.extent_m,
             rests_within_m: 0.0,
-            grounded: self.has_flag(GROUNDED | LANDED),
+            grounded: self.reports(GROUNDED | LANDED),
             column_to_m: None,
         };
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
         let column =
-            !heard.grounded && (self.may_come_down || self.has_flag(OUT_OF_PLAN) || self.ground_m.is_nan());
+            !heard.grounded && (self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan());
         let above_m = if column { 0.0 } else { away.z };
         across_sq + above_m * above_m >= most_m * most_m
     }
@@ -163,7 +163,7 @@ impl NeighbourEntry {
 
     /// Whether it follows the plan out of range, as others report or as it was heard last.
     fn is_out_of_range(&self, now: Instant) -> bool {
-        let silent = !self.has_flag(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
+        let silent = !self.reports(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
         let unheard = silent && self.at_range_edge && self.on_plan();
         let flies_on = || self.flies_plan_unheard() || self.heard_within(now, UNHEARD_WAIT);
         self.is_reported_out_of_range(now) || (unheard && flies_on())
@@ -193,11 +193,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// A contact as the safety filter sees it; one that was never placed as if it had been at the start.
     #[inline(always)]
-    pub(crate) fn filter_neighbour<'a>(
-        &'a self,
-        contact: &'a NeighbourEntry,
-        now: Instant,
-    ) -> FilterNeighbour<'a> {
+    pub(crate) fn for_filter<'a>(&'a self, contact: &'a NeighbourEntry, now: Instant) -> FilterNeighbour<'a> {
         let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
         let placed_s = placed_for.as_secs_f32();
         // Most are heard: then nothing of what follows is so.
@@ -209,27 +205,24 @@ impl<const V: usize> Neighbours<V> {
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let dead = silent && contact.rests_silently(placed_for, now);
-        let down = silent
-            && (placed_for >= self.down || (contact.has_flag(GROUNDED) && contact.is_position_imprecise()));
-        let lies = down && (dead || contact.has_flag(GROUNDED)) && !contact.ground_m.is_nan();
+        let down =
+            silent && (placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise()));
+        let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
         let top = if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
         if lies {
-            highest_m = self
-                .area_ground()
-                .map_or(contact.ground_m, |field| contact.max_ground_height_m(field, &here));
+            highest_m = self.area_ground().map_or(contact.ground_m, |g| contact.max_ground_m(g, &here));
             here.z = libm::fminf(highest_m, here.z);
         } else if let Some(top) = top {
             here.z = top;
         }
-        let grounded = (contact.has_flag(GROUNDED | LANDED) && top.is_none()) || lies;
-        let down =
-            contact.may_come_down || contact.has_flag(OUT_OF_PLAN) || dead || contact.ground_m.is_nan();
+        let grounded = (contact.reports(GROUNDED | LANDED) && top.is_none()) || lies;
+        let down = dead || contact.may_come_down || contact.reports(OUT_OF_PLAN) || contact.ground_m.is_nan();
         let floor_m = if contact.ground_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.ground_m };
-        let rests = dead || top.is_some();
+        let (rests, unknown) = (dead || top.is_some(), by_intent || lies || top.is_some());
         let (points, extent_m) = contact.points_flown(dead);
         let heard = NeighbourMotion {
             position: here,
@@ -243,11 +236,7 @@ impl<const V: usize> Neighbours<V> {
                 _ => contact.message_delay.delay_s,
             },
             points: if top.is_some() || lies { &[] } else { points },
-            place_on_points: if by_intent || lies || top.is_some() {
-                PlaceOnPoints::Unknown
-            } else {
-                contact.place_on_points
-            },
+            place_on_points: if unknown { PlaceOnPoints::Unknown } else { contact.place_on_points },
             extent_m,
             rests_within_m: if dead && top.is_none() { contact.unheard_distance_m() } else { 0.0 },
             grounded,
@@ -260,7 +249,7 @@ impl<const V: usize> Neighbours<V> {
             out_of_range: silent && contact.is_out_of_range(now),
             shares_plan: contact.shares_plan,
             lost: dead,
-            waits: contact.has_flag(WAITING) && contact.heard_within(now, HEARD_WITHIN),
+            waits: contact.reports(WAITING) && contact.heard_within(now, HEARD_WITHIN),
             stands: grounded || (now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S),
             motion: heard,
             before_climb: top.map(|_| contact.state.position),

@@ -328,7 +328,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             hears_nobody: rng.next_u32().is_multiple_of(4),
             lands,
         };
-        let mut met = table.filter_neighbour(&table.contacts[1], now);
+        let mut met = table.for_filter(&table.contacts[1], now);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
         }
