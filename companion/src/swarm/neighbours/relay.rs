@@ -129,10 +129,12 @@ impl NeighbourEntry {
         self.heard_at.max(self.relayed_at)
     }
 
-    /// Whether it is out of range, and was lately reported to follow the plan.
+    /// Whether it is out of range, and was lately reported to follow the plan: by those that heard it longer than this vehicle
+    /// did. One that all heard up to the same moment has failed.
     #[inline(never)]
     pub(super) fn is_reported_out_of_range(&self, now: Instant) -> bool {
-        self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME)
+        let longer = |at: Instant| self.heard_at.is_none_or(|heard| at > heard + HEARD_DIRECTLY_WITHIN);
+        self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME && longer(at))
             && !self.heard_within(now, OUT_OF_RANGE_AFTER)
             && self.progress_m(now).is_some()
     }

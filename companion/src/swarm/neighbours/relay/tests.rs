@@ -156,3 +156,23 @@ fn progress_outlives_the_sight_of_a_vehicle() {
         }
     }
 }
+
+/// Those that heard it just as long pass on what they heard last: that does not make it one that flies on elsewhere.
+#[test]
+fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
+    let mut rng = Pcg32::seed_from_u64(12);
+    for _ in 0..200 {
+        let count = 3 + rng.next_u32() as u8 % 4;
+        let mut swarm = Swarm::new(count);
+        (0..20 + rng.next_u32() % 20).for_each(|_| swarm.step(&[true; 8], &[false; 8], true));
+        let lost: List<_> = (0..8).map(|i| i == 0).collect();
+        let mut far_to_others = false;
+        for _ in 0..60 {
+            swarm.step(&[true; 8], &lost, true);
+            let far = |of: usize| swarm.tables[of].contacts[0].is_reported_out_of_range(swarm.now);
+            assert!(!far(1), "it was heard until it failed");
+            far_to_others |= far(2);
+        }
+        assert!(far_to_others, "another was out of its range all the while");
+    }
+}
