@@ -41,10 +41,10 @@ impl Autopilot {
             39 | 73 if for_us(32, 33) => platform.handle_mission(from, frame.message_id, &fields),
             66 if for_us(2, 3) => firmware.handle_stream_request(platform, from, &fields),
             75 if for_us(30, 31) => {
-                firmware.handle_command(platform, from, &Command::from_command_int(&fields))
+                firmware.handle_command(platform, from, &Command::from_command_int(&fields));
             }
             76 if for_us(30, 31) => {
-                firmware.handle_command(platform, from, &Command::from_command_long(&fields))
+                firmware.handle_command(platform, from, &Command::from_command_long(&fields));
             }
             84 | 86 if for_us(50, 51) => firmware.handle_setpoint(platform, frame.message_id, &fields),
             111 if fields.i64(0) == 0 => {

@@ -51,11 +51,11 @@ impl ParamValue {
 
     /// A value of the same integer type; `None` of a float.
     pub fn with_integer(self, integer: i32) -> Option<Self> {
-        self.as_i32().map(|_| self.from_i32_like(integer))
+        self.as_i32().map(|_| self.with_same_type(integer))
     }
 
     /// A value of the same type from a whole number, kept within the type's range.
-    fn from_i32_like(self, integer: i32) -> Self {
+    fn with_same_type(self, integer: i32) -> Self {
         match self {
             Int8(_) => Int8(integer.clamp(i32::from(i8::MIN), i32::from(i8::MAX)) as i8),
             Int16(_) => Int16(integer.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16),
@@ -133,9 +133,9 @@ impl Params {
             (_, Encoding::Bytewise) if foreign => return false,
             (Real(_), _) if wire.is_finite() => Real(wire),
             (Real(_), _) => return false,
-            (old, Encoding::Bytewise) => old.from_i32_like(wire.to_bits() as i32),
+            (old, Encoding::Bytewise) => old.with_same_type(wire.to_bits() as i32),
             (_, Encoding::Cast) if !wire.is_finite() => return false,
-            (old, Encoding::Cast) => old.from_i32_like(libm::roundf(wire) as i32),
+            (old, Encoding::Cast) => old.with_same_type(libm::roundf(wire) as i32),
         };
         true
     }

@@ -240,11 +240,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.links.send_text(true, "What is left cannot be divided");
             }
             Err(_) if may_take && self.detours.field_detour.is_flying() => {
-                self.detours.end_field_detour(false)
+                self.detours.end_field_detour(false);
             }
             Ok(plan) if may_take && self.detours.field_detour.is_flying() => self.resume_own_plan(plan),
             Err(_) if may_take && division > self.mission.division_count() => {
-                self.mission.keep_plan_after_division(division)
+                self.mission.keep_plan_after_division(division);
             }
             Err(_) => {}
             Ok(plan) if fleet.needs_division() => fleet.take_plan_crc(plan.plan_crc),

@@ -170,11 +170,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::HoldHere => self.guidance.hold_at(position),
             Action::HoldOver => self.timers.set(Timer::Request, now),
             Action::RequestOffboard | Action::RequestArming | Action::RequestTakeOff => {
-                self.timers.set(Timer::Request, now)
+                self.timers.set(Timer::Request, now);
             }
             Action::RequestLandMode => self.request_landing(from),
             Action::RequestDisarming if to == State::Disarm => {
-                self.timers.set(Timer::Request, now + DISARM_EVERY)
+                self.timers.set(Timer::Request, now + DISARM_EVERY);
             }
             Action::RequestDisarming | Action::CancelStart => self.timers.set(Timer::Request, now),
             Action::BeginClimb => self.guidance.begin_climb(&position),

@@ -72,6 +72,8 @@ pub(crate) const fn return_row(
 /// Twice the time by which the armed bit lags behind the ack of arming.
 const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
+/// Time for which the column above the pad may be occupied between the last look at the gates and arming.
+const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
 /// A vehicle that has stood beside its setpoint for this long is held by something.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
 
@@ -213,6 +215,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Scheduled],        G::NeighboursSilent, secs(10),  Scheduled,   A::None,              "No neighbour hears us: start waits"),
     warning_row(&[Scheduled],        G::PlansDiffer,     secs(10),   Scheduled,   A::None,              "Another plan is heard: start waits"),
     info_row(&[Scheduled],           G::GatesOpen,       AT_ONCE,    Streaming,   A::HoldHere,          ""),
+    warning_row(&[Streaming, Engaging], G::ColumnBlocked, COLUMN_BLOCKED_MOST, Scheduled, A::None,      "Vehicle above the pad: start waits"),
     info_row(&[Streaming],           G::Elapsed,         secs(1),    Engaging,    A::RequestOffboard,   ""),
     info_row(&[Engaging],            G::Offboard,        AT_ONCE,    Arming,      A::RequestArming,     "Setpoints followed: arming"),
     warning_row(&[Engaging],         G::Elapsed,         secs(5),    Aborted,     A::ForgetStart,       "Setpoint mode refused: mission aborted"),

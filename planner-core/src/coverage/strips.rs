@@ -97,7 +97,7 @@ impl<'a> Strips<'a> {
     }
 
     /// The place of a point of the lanes' frame.
-    fn from_lane_frame(&self, u: f32, v: f32) -> Flat {
+    fn to_place(&self, u: f32, v: f32) -> Flat {
         self.base + self.direction.along * u + self.direction.across * v
     }
 
@@ -273,7 +273,7 @@ impl<'a> Strips<'a> {
         [from, to]: Span,
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
-        let (from, to) = (self.from_lane_frame(from, v), self.from_lane_frame(to, v));
+        let (from, to) = (self.to_place(from, v), self.to_place(to, v));
         let lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip };
         out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
     }

@@ -83,7 +83,7 @@ fn a_far_origin_takes_the_place_of_none_in_flight_and_leaves_none_on_the_ground(
         let change = telemetry.handle_frame(Instant::ZERO, &origin, &frame(&far, 1));
         match armed {
             true => {
-                assert_eq!((change, telemetry.ekf_origin.is_some()), (TelemetryChange::OriginDoubted, true))
+                assert_eq!((change, telemetry.ekf_origin.is_some()), (TelemetryChange::OriginDoubted, true));
             }
             false => assert_eq!((change, telemetry.ekf_origin), (TelemetryChange::OriginFar(111), None)),
         }

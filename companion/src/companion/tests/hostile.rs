@@ -247,16 +247,17 @@ proptest::proptest! {
 }
 
 proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(32))]
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
     /// Positions of ids that the roster does not name, anywhere, the goal included, for as long as they like: the vehicle comes
-    /// to the ground all the same, and where the strangers leave the safety distance beside the path, at its goal.
+    /// to the ground all the same, and where the strangers leave 0.4 m more than the safety distance beside the path, at its
+    /// goal: a vehicle that was stopped continues only with some room to spare.
     #[test]
     fn strangers_deny_no_goal(
         places in proptest::collection::vec((5f32..19.0, 0f32..4.0, 0f32..5.0, 1u8..=255), 1..7),
         lasts_s in 5u32..120,
     ) {
         let mut bench = Bench::following(config());
-        let beside = places.iter().all(|(_, off_m, _, _)| *off_m > 1.8);
+        let beside = places.iter().all(|(_, off_m, _, _)| *off_m > 1.9);
         for tick in 0..240 * 20u32 {
             if tick % 4 == 0 && tick < lasts_s * 20 {
                 for (i, (x, off_m, z, id)) in places.iter().enumerate() {

@@ -94,7 +94,7 @@ impl Guidance {
             bounds,
             ahead_s: if self.filter.is_stopped() { YIELD_LOOK_AHEAD_S } else { 0.0 },
             on_plan,
-            hears_nobody: hears_nobody,
+            hears_nobody,
             lands: comes_down,
         };
         let follows = !lands && !hears_nobody;

@@ -33,8 +33,10 @@ impl Guidance {
         let position = &scene.telemetry.position;
         let ground_m = || self.landing_height_m(state, scene, plan);
         let top_m = || plan.path.point_at(0.0).map_or(position.z, |p| p.z);
+        let on_pad = matches!(state, State::Scheduled | State::Streaming | State::Engaging | State::Arming);
+        let whole_column = on_pad || matches!(state, State::Land | State::LandingHeld);
         let way = match state {
-            State::Scheduled => FlightDirection::Vertical { to_m: top_m(), speed_mps: 0.0 },
+            _ if on_pad => FlightDirection::Vertical { to_m: top_m(), speed_mps: 0.0 },
             State::Land | State::LandingHeld => {
                 FlightDirection::Vertical { to_m: ground_m(), speed_mps: 0.0 }
             }
@@ -62,7 +64,7 @@ impl Guidance {
             }
             _ => FlightDirection::Stands,
         };
-        if !matches!(state, State::Scheduled | State::Land | State::LandingHeld) {
+        if !whole_column {
             (self.filter.column_clear, self.filter.column_since) = (true, None);
             self.filter.column_blocked_for_good_since = None;
             self.filter.landing_held_since =
@@ -72,7 +74,6 @@ impl Guidance {
             self.filter.reset();
             return;
         }
-        let whole_column = matches!(state, State::Scheduled | State::Land | State::LandingHeld);
         let back = matches!(way, FlightDirection::Path { back: true });
         if back != self.filter.scanned_backwards {
             self.filter.reset_stop();

@@ -373,7 +373,7 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
             }
             match store.upload_state() {
                 Some(UploadState::Taking) if store.take_piece(0, &road[..200]) == PieceOutcome::Yes => {
-                    store.finish_upload()
+                    store.finish_upload();
                 }
                 Some(UploadState::Ended(result)) => break assert!(result.is_err()),
                 _ => break,

@@ -155,7 +155,7 @@ pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     view.neighbours.for_each_place(view.now, [apart_m; 2], &mut *tell);
     let beside_m = apart_m + view.neighbours.pair_position_error_m();
     view.neighbours.for_each_landing_column(view.now, beside_m, |column| {
-        tell(KeepOutZone { kind: ZoneKind::Static, ..column })
+        tell(KeepOutZone { kind: ZoneKind::Static, ..column });
     });
 }
 

@@ -95,7 +95,8 @@ impl Watch {
             Pilot => (b.mode, b.status) = (pilot_mode(b.kind), 3),
             Back if b.status < 5 => b.mode = b.kind.setpoint_mode(),
             Failsafe => {
-                (b.mode, b.status) = (if b.kind == AutopilotKind::Px4 { px4::RTL } else { ardupilot::RTL }, 5)
+                (b.mode, b.status) =
+                    (if b.kind == AutopilotKind::Px4 { px4::RTL } else { ardupilot::RTL }, 5);
             }
             NoPosition => b.no_position = true,
             Position => b.no_position = false,

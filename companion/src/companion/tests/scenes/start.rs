@@ -109,6 +109,18 @@ pub(super) fn scheduled(scenes: &mut Scenes) {
         b.run(25.0);
     };
     scenes.play(Bench::new(two_vehicles()), hovers_over_the_pad, Scheduled, 1.0);
+    // It comes when the gates are open and arming is not requested yet.
+    for state in [Streaming, Engaging] {
+        let comes_over_the_pad = |b: &mut Bench| {
+            b.refused.push(176);
+            b.neighbour = on_pad(ON_PLAN);
+            b.until(Ready, 6.0);
+            b.start();
+            b.until(state, 10.0);
+            b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
+        };
+        scenes.play(Bench::new(two_vehicles()), comes_over_the_pad, Scheduled, 2.0);
+    }
     // Nobody hears it on the ground.
     let unheard = |b: &mut Bench| {
         b.start();
