@@ -32,8 +32,6 @@ use self::planner::around;
 use self::scene::{Scene, What, floor_z, landing};
 use crate::setpoints::SetpointStats;
 
-/// A meeting is over by then, seconds after its start.
-pub const LIMIT_S: f32 = 180.0;
 /// After everything has happened and all stand, this much is still flown, seconds.
 const AFTERMATH_S: f32 = 3.0;
 /// A landing keeps this much more than the safety distance from what is below, metres.

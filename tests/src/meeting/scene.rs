@@ -13,11 +13,10 @@ use planner_core::schedule::{self, ScheduleWorkspace};
 use self::happenings::happenings;
 pub use self::passing::{PASSINGS, passing};
 pub use self::types::{
-    CLIMB_MPS, CRUISE_MPS, GATES, Happening, Lie, PLATFORM_M, Plan, SAFETY_M, SCHEDULE, START_S, Scene,
-    VEHICLES, Vehicle, WAYPOINTS, What,
+    CLIMB_MPS, CRUISE_MPS, GATES, Happening, LIMIT_S, Lie, PLATFORM_M, Plan, SAFETY_M, SCHEDULE, START_S,
+    Scene, VEHICLES, Vehicle, WAYPOINTS, What,
 };
 use self::ways::{KINDS, Shape, fits, flight, pads, way};
-use super::LIMIT_S;
 use super::autopilot::{Catch, Failsafe};
 use super::dice::Dice;
 

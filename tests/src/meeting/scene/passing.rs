@@ -4,9 +4,9 @@ use planner_core::Point;
 use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
-use super::types::{Happening, SCHEDULE, START_S, Scene, WAYPOINTS, What};
+use super::types::{Happening, LIMIT_S, SCHEDULE, START_S, Scene, WAYPOINTS, What};
+use super::vehicle;
 use super::ways::{Way, at_height, flight};
-use super::{LIMIT_S, vehicle};
 use crate::meeting::dice::Dice;
 
 /// How two vehicles pass in [`passing`].

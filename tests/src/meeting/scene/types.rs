@@ -21,6 +21,8 @@ pub const CRUISE_MPS: f32 = 2.0;
 pub const CLIMB_MPS: f32 = 1.0;
 /// Missions are started then, seconds.
 pub const START_S: f32 = 6.0;
+/// A meeting is over by then, seconds after its start.
+pub const LIMIT_S: f32 = 180.0;
 /// A platform reaches this far around its pad, metres.
 pub const PLATFORM_M: f32 = 0.7;
 /// The schedule of these vehicles, as a mission's.
