@@ -68,7 +68,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "one match: an arm for each kind of message, in the order in which they are due",
     ),
     (
-        "companion/src/mission/guard.rs",
+        "companion/src/mission/inputs.rs",
         "GuardInputs",
         "a record: a field for each fact that a guard of the table asks for",
     ),
