@@ -308,7 +308,7 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
             to.call("flight::Path::label_times", || path.label_times(hard, other));
             to.call("flight::Path::set_last_times", || path.set_last_times(hard, other));
             to.call("flight::Path::label_times_by", || {
-                path.label_times_by(hard, |from, to| (to - from).norm() * other)
+                path.label_times_by(hard, |from, to| (to - from).norm() * other);
             });
             let at =
                 to.call("flight::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
