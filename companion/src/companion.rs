@@ -276,6 +276,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             in_state,
             climb_m: self.mission.climb_m(),
             guided_timeout_s: timeout_s,
+            column_clear,
             may_land: RequestContext::may_request_landing(in_state, column_clear, self.must_land()),
         }
     }

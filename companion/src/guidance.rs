@@ -1,5 +1,5 @@
-//! Where to go now: the raw point of each state, made from the path, the neighbours and the autopilot's position. The smoother
-//! makes the setpoint of it.
+//! Guidance makes the setpoint: from the path, the neighbours and the autopilot's position it makes the raw point of each state,
+//! and its smoother makes the setpoint of the raw point.
 //!
 //! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's start, the path, the
 //! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it continues
@@ -101,7 +101,7 @@ const MIN_LEG_M: f32 = 1e-3;
 /// Advice before the neighbours are evaluated: wait.
 const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
-/// The raw point's course, and the smoother that makes setpoints of it.
+/// State of guidance: flight phase, raw point, smoother and safety filter.
 #[derive(Clone, Debug)]
 pub struct Guidance {
     track: TrackConfig,
@@ -151,8 +151,9 @@ pub struct Guidance {
     stopped_at_fence: bool,
     progress_m: f32,
     progress_at: Instant,
-    /// When the vehicle last moved, or was at its setpoint.
+    /// When the vehicle last was at its setpoint or the setpoint went on, and where that was then.
     followed_at: Instant,
+    followed_place: Point,
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
@@ -215,6 +216,7 @@ impl Guidance {
             progress_m: 0.0,
             progress_at: Instant::ZERO,
             followed_at: Instant::ZERO,
+            followed_place: Point::zeros(),
             reported_m: f32::NEG_INFINITY,
             returning: false,
             heard_by_others_m: f32::INFINITY,

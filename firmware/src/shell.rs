@@ -196,7 +196,7 @@ impl Shell {
                     Event::PlanRequested(wanted) => self.wants_plan.signal(wanted),
                     Event::RestartRequested => self.request_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
-                        if let Some(reported) = self.setpoints.take_flight(now_ms()) {
+                        if let Some(reported) = self.setpoints.take_setpoint_stats(now_ms()) {
                             companion.send_text_with_numbers(
                                 false,
                                 "Setpoints: #, at most # ms apart",
@@ -430,8 +430,8 @@ impl SetpointGaps {
         }
     }
 
-    /// Number and longest gap of a flight that is over; none if it had none.
-    fn take_flight(&self, now_ms: u32) -> Option<[u32; 2]> {
+    /// Returns the count and the longest gap of the setpoints of a flight that is over, and clears both; `None` without any.
+    fn take_setpoint_stats(&self, now_ms: u32) -> Option<[u32; 2]> {
         self.end_stream(now_ms);
         let reported = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
         (reported[0] > 0).then_some(reported)
@@ -463,8 +463,8 @@ mod tests {
         assert_eq!(setpoints.since_last_ms(9000), None);
         setpoints.begin_stream(9000);
         setpoints.note_setpoint(9000);
-        assert_eq!(setpoints.take_flight(9000), Some([3, 450]));
-        assert_eq!(setpoints.take_flight(9000), None);
+        assert_eq!(setpoints.take_setpoint_stats(9000), Some([3, 450]));
+        assert_eq!(setpoints.take_setpoint_stats(9000), None);
     }
 
     #[test]

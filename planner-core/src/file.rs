@@ -6,13 +6,13 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final
 /// xor 0xFFFFFFFF. One set of tables serves every file and record.
-pub static CRC32: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISO_HDLC);
+pub static CRC32: Crc<u32, CrcTable> = Crc::<u32, CrcTable>::new(&CRC_32_ISO_HDLC);
 
-/// 1 kB of tables on a board; a desk takes sixteen bytes at once by 16 kB.
+/// Lookup tables: one (1 kB) on a board; sixteen (16 kB) on a desk, which process sixteen bytes at once.
 #[cfg(target_os = "none")]
-type Tables = crc::Table<1>;
+type CrcTable = crc::Table<1>;
 #[cfg(not(target_os = "none"))]
-type Tables = crc::Table<16>;
+type CrcTable = crc::Table<16>;
 
 /// Reason why bytes are not a whole file of any kind. Its text has at most 41 characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

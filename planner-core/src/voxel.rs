@@ -43,7 +43,7 @@ impl GridShape {
         self.dims.map(|d| d.div_ceil(BRICK_CELLS))
     }
 
-    /// Words the grid needs; `usize::MAX` where they cannot be counted.
+    /// Number of bricks, and so of 64-bit words, that the grid needs; `usize::MAX` on overflow.
     pub fn brick_count(&self) -> usize {
         self.bricks().iter().fold(1, |count: usize, &b| count.saturating_mul(b as usize))
     }

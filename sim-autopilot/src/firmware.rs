@@ -4,7 +4,7 @@ use super::ardupilot::{self, Copter};
 use super::command::Command;
 use super::config::Config;
 use super::params::Params;
-use super::platform::{ActuatorCommand, Platform, SensorReadings};
+use super::platform::{ControlDemand, Platform, SensorReadings};
 use super::port::Sender;
 use super::px4::{self, Px4};
 use super::status::FirmwareStatus;
@@ -78,12 +78,13 @@ impl Firmware {
         }
     }
 
+    /// One step of the firmware's mode logic.
     pub(super) fn update(
         &mut self,
         platform: &mut Platform,
         sensors: &SensorReadings,
         dt_s: f32,
-    ) -> ActuatorCommand {
+    ) -> ControlDemand {
         match self {
             Self::Px4(px4) => px4.update(platform, sensors),
             Self::Copter(copter) => copter.update(platform, sensors, dt_s),

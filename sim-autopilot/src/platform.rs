@@ -51,7 +51,7 @@ pub struct SensorReadings {
 
 /// Control of the vehicle in this step.
 #[derive(Clone, Copy, Debug)]
-pub struct ActuatorCommand {
+pub struct ControlDemand {
     /// Motors carry weight.
     pub lift: bool,
     /// Treatment of the controller's integral.

@@ -48,8 +48,8 @@ impl Board {
         }
     }
 
-    /// Bytes of flash for the program.
-    pub fn flash(self) -> usize {
+    /// Most bytes of flash that the program may take.
+    pub fn flash_budget(self) -> usize {
         match self {
             Self::Qemu | Self::NucleoH743 => 512 << 10,
             Self::Pico2 => 1 << 20,

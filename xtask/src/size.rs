@@ -48,12 +48,12 @@ pub type Row = (&'static str, usize, usize);
 pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
     let program = bare_metal::build(board)?.folder.join("flockmate");
     let Parts { code, constants, initialised, regions } = parts(&program, board)?;
-    let most_flash = board.flash();
+    let flash_budget = board.flash_budget();
     let flash = code + constants + initialised;
     let mut rows = vec![
-        ("code_bytes", code, most_flash),
-        ("constants_bytes", constants, most_flash),
-        ("flash_bytes", flash, most_flash),
+        ("code_bytes", code, flash_budget),
+        ("constants_bytes", constants, flash_budget),
+        ("flash_bytes", flash, flash_budget),
     ];
     rows.extend(board.regions().iter().zip(regions).map(|(region, bytes)| (region.name, bytes, region.most)));
     rows.push(("stack_bytes", stack, STACK));

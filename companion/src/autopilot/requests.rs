@@ -59,6 +59,8 @@ pub(crate) struct RequestContext {
     pub(crate) climb_m: f32,
     /// How long Guided keeps the last velocity, seconds.
     pub(crate) guided_timeout_s: f32,
+    /// Whether no vehicle is in the column that it is about to climb or descend.
+    pub(crate) column_clear: bool,
     /// Whether a landing may be requested now.
     pub(crate) may_land: bool,
 }
@@ -204,7 +206,7 @@ impl Requests {
             if silent {
                 self.handshake.note_heartbeat_gap();
             }
-            if self.handshake.should_request_arming(now, telemetry.armed) {
+            if s.column_clear && self.handshake.should_request_arming(now, telemetry.armed) {
                 links.push(Link::Autopilot, Outgoing::Arm(true));
             }
         } else {

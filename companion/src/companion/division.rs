@@ -117,7 +117,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
     }
 
-    /// Whether the others have divided its part while a pilot flew it, so that it must not resume that part.
+    /// Whether the vehicle would resume its part after it has reported that it leaves: the others may have divided that part by then.
     fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,

@@ -1,23 +1,21 @@
 //! The setpoint waits for a vehicle that lags behind it, and how long it has waited in vain.
 
-use super::{ARRIVED_M, AT_REST_MPS, Guidance};
+use super::{ARRIVED_M, Guidance};
 use crate::autopilot::telemetry::Telemetry;
 use crate::time::{Duration, Instant};
-
-/// Share of its speed below which a setpoint waits for its vehicle: nearly as far ahead as it may be.
-const WAITING_SHARE: f32 = 0.25;
 
 impl Guidance {
     /// Share of its speed at which the setpoint goes on: none where it is as far ahead of the vehicle as it may be.
     /// `moves` for a vehicle that is to fly on.
     pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
-        let lead_m = (telemetry.position - self.smoother.position()).norm();
-        let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
-        if (lead_m < ARRIVED_M && !(moves && share < WAITING_SHARE))
-            || telemetry.velocity.norm() > AT_REST_MPS
-        {
-            self.followed_at = now;
+        let place = self.smoother.position();
+        let lead_m = (telemetry.position - place).norm();
+        let advance = place - self.followed_place;
+        // The speed of the vehicle says nothing: the wind may carry it away from its setpoint.
+        if lead_m < ARRIVED_M || advance.norm_squared() > ARRIVED_M * ARRIVED_M {
+            (self.followed_at, self.followed_place) = (now, place);
         }
+        let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
         match moves {
             true => share.min(self.pace),
             // Settled it holds; before the take-off it follows the estimate.
@@ -26,7 +24,8 @@ impl Guidance {
         }
     }
 
-    /// Time for which the vehicle has stood though its setpoint is ahead: something holds it.
+    /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on either: something holds the
+    /// vehicle, or carries it away.
     pub(crate) fn unfollowed_for(&self, now: Instant) -> Duration {
         now - self.followed_at
     }

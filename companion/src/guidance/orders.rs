@@ -90,6 +90,7 @@ impl Guidance {
         now: Instant,
     ) {
         self.hold_at(*position);
+        self.followed_at = now;
         if climbs {
             self.phase = Phase::Climb;
             return;

@@ -94,7 +94,7 @@ pub enum Guard {
     PathDone,
     /// No progress along the path for the limit.
     Stalled,
-    /// For the limit the vehicle has stood though its setpoint is ahead: something holds it.
+    /// For the limit the vehicle has not come to its setpoint: something holds it, or carries it away.
     Unfollowed,
     /// DO_PAUSE_CONTINUE 0.
     PauseCommanded,

@@ -15,7 +15,7 @@ pub struct GuardInputs {
     pub jumped: bool,
     /// Time without progress along the path.
     pub stalled_for: Duration,
-    /// Time for which the vehicle has stood though its setpoint is ahead.
+    /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on.
     pub unfollowed_for: Duration,
     /// Time since its path was first blocked, short of where it has come no further; clear in between or not.
     pub blocked_for: Duration,

@@ -72,9 +72,10 @@ pub(crate) const fn return_row(
 /// Twice the time by which the armed bit lags behind the ack of arming.
 const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
-/// Time for which the column above the pad may be occupied between the last look at the gates and arming.
+/// Time for which the column above the pad may be occupied between the last look at the gates and arming. Arming is not
+/// requested meanwhile.
 const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
-/// A vehicle that has stood beside its setpoint for this long is held by something.
+/// A vehicle that does not come to its setpoint for this long is held by something, or carried away.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
 
 use Action as A;

@@ -22,7 +22,7 @@ fn printed() -> String {
         let from: Vec<String> = row.from.iter().map(|s| std::format!("{s:?}")).collect();
         let limit = match row.min_duration.as_micros() {
             0 => String::new(),
-            us => std::format!("{} s", us as f64 * 1e-6),
+            us => std::format!("{} s", us as f64 / 1e6),
         };
         let to = match row.to {
             TargetState::State(to) => std::format!("{to:?}"),

@@ -69,8 +69,8 @@ pub struct Bench {
     pub no_position: bool,
     /// Accuracy that ESTIMATOR_STATUS reports, metres; none: the message is not sent.
     pub accuracy_m: Option<f32>,
-    /// ArduCopter: variance ratio of EKF_STATUS_REPORT.
-    pub variance: f32,
+    /// ArduCopter: `pos_horiz_variance` that EKF_STATUS_REPORT reports.
+    pub pos_horiz_variance: f32,
     pub stays_armed: bool,
     /// Arming is accepted, and undone by the pilot before a HEARTBEAT shows it.
     pub never_arms: bool,
@@ -140,7 +140,7 @@ impl Bench {
             silent: false,
             no_position: false,
             accuracy_m: Some(0.02),
-            variance: 0.1,
+            pos_horiz_variance: 0.1,
             stays_armed: false,
             never_arms: false,
             stuck: false,

@@ -160,12 +160,13 @@ fn call_flight_plans(
     for (max_gates, held_layers) in [(0, 0), (usize::MAX, u64::MAX)] {
         let _ = plan(good, routes, &FlightInputs { max_gates, held_layers, ..SWARM });
     }
-    wrong_routes(&mut plan, good, routes);
+    unusual_routes(&mut plan, good, routes);
     call_field_plans(&mut plan, good, routes);
 }
 
-/// Plans routes whose lanes or vehicles are not those of the request: each must be refused.
-fn wrong_routes(
+/// Plans with routes of an unknown vehicle or a wrong waypoint range, which must be refused; with an odd heading or layer, where
+/// any answer will do; and with no routes, which must succeed.
+fn unusual_routes(
     plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Result<(), PlanError>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,

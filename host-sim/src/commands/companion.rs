@@ -60,7 +60,7 @@ const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_sec
 /// Bad input or a link that fails, by name and place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = load(&args.scenario, None)?;
-    // The flash is opened before the work.
+    // Opens the flash first: a bad file must fail before the planning, which takes long.
     let mut flash = DeskFlash::open(args.flash.as_deref())?;
     let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;

@@ -56,9 +56,9 @@ pub struct MapInfo {
     pub resolution_m: f64,
     /// Smallest cells along east, north, up, over the known space.
     pub dims: [u32; 3],
-    /// Corners of the known space, metres.
+    /// Lower corner of the known space, metres.
     pub min_m: [f64; 3],
-    /// See `min_m`.
+    /// Upper corner of the known space, metres.
     pub max_m: [f64; 3],
     /// Nodes of the octree.
     pub nodes: usize,

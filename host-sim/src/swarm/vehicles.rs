@@ -86,7 +86,8 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
         .collect()
 }
 
-/// The settings of the companion of one vehicle; the same whether it runs in a swarm simulation or alone.
+/// The settings of the companion of one vehicle: the mission file's, with the scenario's fence, method and radio range; the same
+/// whether it runs in a swarm simulation or alone.
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().companion_config(id);

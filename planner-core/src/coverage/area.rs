@@ -14,7 +14,7 @@ pub const MAX_VERTEX_M: f32 = 150_000.0;
 pub const SAME_VERTEX_M: f32 = 1e-3;
 /// Two edges cross if each reaches at least this far beyond the other, metres: neighbouring fields
 /// share borders, and coordinates are rounded.
-const MIN_CROSSING_M: f64 = 0.01;
+const MIN_EDGE_OVERSHOOT_M: f64 = 0.01;
 
 /// Kind of the region that a ring encloses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -320,7 +320,7 @@ fn interior_point(ring: &[Flat]) -> Flat {
     best.1
 }
 
-/// Whether the segments `a b` and `c d` cross, each reaching at least [`MIN_CROSSING_M`] beyond the other.
+/// Whether the segments `a b` and `c d` cross, each reaching at least [`MIN_EDGE_OVERSHOOT_M`] beyond the other.
 fn segments_cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
     let apart = |p: f32, q: f32, r: f32, s: f32| {
         libm::fmaxf(p, q) < libm::fminf(r, s) || libm::fmaxf(r, s) < libm::fminf(p, q)
@@ -332,7 +332,7 @@ fn segments_cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
         let along = to - from;
         let length = sqrt(cross_product(&along, &Flat::new(-along.y, along.x)));
         let (p, q) = (cross_product(&along, &(p - from)), cross_product(&along, &(q - from)));
-        p * q < 0.0 && libm::fmin(fabs(p), fabs(q)) > MIN_CROSSING_M * length
+        p * q < 0.0 && libm::fmin(fabs(p), fabs(q)) > MIN_EDGE_OVERSHOOT_M * length
     };
     beyond(a, b, c, d) && beyond(c, d, a, b)
 }

@@ -220,7 +220,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
 enum RayClass {
     /// The ray ends inside, so many cells from the nearest face, but for rounding.
     Clear(f32),
-    /// The ray meets an obstacle behind a face.
+    /// The ray leaves the box into an occupied cell.
     Blocked,
     /// This share of the ray lies in the box; the rest is open.
     Leaves(f32),

@@ -125,8 +125,8 @@ impl<'a> OwnSet<'a> {
         apart(0) || apart(1) || apart(2)
     }
 
-    /// Square of the least distance to another set's line, or `most_m` squared if it is not less.
-    fn min_distance_sq(&self, other: &ReachableSet, most_m: f32) -> f32 {
+    /// Square of the least distance between the polylines of both sets, at most `most_m` squared.
+    fn centreline_distance_sq(&self, other: &ReachableSet, most_m: f32) -> f32 {
         let wide_m = most_m + BOUNDS_ROUNDING_M;
         let mut least_sq = most_m * most_m;
         for (from, to) in other.segments() {
@@ -155,7 +155,7 @@ impl<'a> OwnSet<'a> {
     pub fn conflicts(&self, other: &ReachableSet, place: &Point, apart_m: f32) -> bool {
         let most_m = apart_m + other.widened_by_m + self.set.widened_by_m;
         let most_sq = most_m * most_m;
-        let motion_sq = self.min_distance_sq(other, most_m);
+        let motion_sq = self.centreline_distance_sq(other, most_m);
         motion_sq < most_sq && self.comes_nearer(motion_sq, other, place, most_m)
     }
 

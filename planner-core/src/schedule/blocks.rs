@@ -268,7 +268,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
-        /// A flight that is left out has no segment in conflict.
+        /// A flight that is left out as too far away has no segment in conflict.
         #[test]
         fn who_is_far_is_in_no_conflict(
             own in points(),

@@ -31,7 +31,7 @@ use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
 use super::params::Params;
-use super::platform::{ActuatorCommand, IntegralAction, Platform, SensorReadings};
+use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
 use super::status::FirmwareStatus;
 use super::vehicle::VehicleLimits;
@@ -369,12 +369,7 @@ impl Copter {
     }
 
     /// One step: timers, failsafes, phases, and the demand of the mode.
-    pub fn update(
-        &mut self,
-        platform: &mut Platform,
-        sensors: &SensorReadings,
-        dt_s: f32,
-    ) -> ActuatorCommand {
+    pub fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> ControlDemand {
         let now_us = sensors.now_us;
         self.send_progress_messages(platform, now_us);
         if self.armed {
@@ -406,12 +401,12 @@ impl Copter {
         self.detect_landing(sensors, climbing);
         let integral =
             if core::mem::take(&mut self.starts) { IntegralAction::Match } else { IntegralAction::Keep };
-        ActuatorCommand { lift: true, integral, demand }
+        ControlDemand { lift: true, integral, demand }
     }
 
     /// Motors off or idle.
-    fn idle_command(&self) -> ActuatorCommand {
-        ActuatorCommand { lift: false, integral: IntegralAction::Clear, demand: self.tuning.empty_demand() }
+    fn idle_command(&self) -> ControlDemand {
+        ControlDemand { lift: false, integral: IntegralAction::Clear, demand: self.tuning.empty_demand() }
     }
 
     /// Origin and position, each once.

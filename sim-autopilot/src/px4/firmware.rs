@@ -7,7 +7,7 @@ use crate::AutopilotKind;
 use crate::command::{DO_SET_MODE, accepted_or_rejected};
 use crate::itinerary::MissionLeg;
 use crate::params::Params;
-use crate::platform::{ActuatorCommand, Platform, SensorReadings};
+use crate::platform::{ControlDemand, Platform, SensorReadings};
 use crate::port::Sender;
 use crate::status::FirmwareStatus;
 use crate::vehicle::VehicleLimits;
@@ -44,7 +44,7 @@ impl Px4 {
 
     /// One step. A requested mode is decided now: a setpoint that came just behind the command
     /// counts.
-    pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> ActuatorCommand {
+    pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> ControlDemand {
         self.commander.set_mission_ready(platform.has_mission());
         if let Some((from, mode)) = self.pending_mode.take() {
             let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sensors, &self.tuning));

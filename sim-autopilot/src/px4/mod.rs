@@ -28,7 +28,7 @@ pub use self::modes::Mode;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
 use super::itinerary::MissionLeg;
-use super::platform::{ActuatorCommand, IntegralAction, SensorReadings};
+use super::platform::{ControlDemand, IntegralAction, SensorReadings};
 use super::shaping::JerkLimitedRate;
 
 /// Delay of the failsafe after `COM_OF_LOSS_T`, seconds: 1.23 s seen at most, and gaps of 1.25 s
@@ -260,7 +260,8 @@ impl Commander {
         true
     }
 
-    /// Changes the mode if it can run; the second ack of DO_SET_MODE says so.
+    /// Enters the mode and returns true; an armed vehicle enters only a mode that can run. The second COMMAND_ACK of DO_SET_MODE
+    /// carries the result.
     pub fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
@@ -324,7 +325,7 @@ impl Commander {
     }
 
     /// One step: timers, failsafe, phases, and the demand of the mode.
-    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> ActuatorCommand {
+    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> ControlDemand {
         let now = sensors.now_us;
         if self.armed {
             self.update_failsafe(sensors, tuning);
@@ -337,7 +338,7 @@ impl Commander {
                 self.landed_us = now;
             }
             let demand = tuning.empty_demand();
-            return ActuatorCommand { lift: false, integral: IntegralAction::Clear, demand };
+            return ControlDemand { lift: false, integral: IntegralAction::Clear, demand };
         }
         let mut demand = self.demand(sensors, tuning);
         let wants_up = self.demands_lift_off(sensors, &demand);
@@ -372,7 +373,7 @@ impl Commander {
                 self.detect_landing(sensors, -demand.velocity.z >= share * MIN_LAND_RATE_MPS, tuning);
             }
         }
-        ActuatorCommand { lift: self.phase != FlightPhase::Ground, integral, demand }
+        ControlDemand { lift: self.phase != FlightPhase::Ground, integral, demand }
     }
 
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {

@@ -42,6 +42,10 @@ pub enum Catch {
     Wall,
     /// It rests on something, and moves no more.
     Ledge,
+    /// It hangs in something and swings.
+    Net,
+    /// A wind stronger than it carries it off.
+    Wind,
 }
 
 /// What flies the vehicle at this moment.

@@ -56,7 +56,7 @@ pub fn caught(seed: u64) -> Scene {
     scene.happenings.retain(|happening| happening.what == What::Start);
     let vehicle = dice.below(scene.vehicles.len());
     let at_s = START_S + scene.vehicles[vehicle].plan.depart_s + dice.real(3.0, 20.0);
-    let how = if dice.chance(0.5) { Catch::Wall } else { Catch::Ledge };
+    let how = [Catch::Wall, Catch::Ledge, Catch::Net, Catch::Wind][dice.below(4)];
     scene.happenings.push(Happening { at_s, vehicle, what: What::Caught(how) });
     scene.happenings.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     // Those that waited for it, one after the other, fly around it or land.

@@ -74,7 +74,7 @@ fn unsound_variance_ratios_stop_an_arducopter() {
         bench.until(State::Ready, 60.0);
         bench.start();
         bench.until(State::Follow, 30.0);
-        bench.variance = variance;
+        bench.pos_horiz_variance = variance;
         bench.until(State::Land, 40.0);
         assert!(
             bench.texts.iter().any(|t| t == "Estimate worse than margin for 30 s: landing"),

@@ -16,6 +16,7 @@ pub const NAK: u8 = 129;
 
 /// Opcodes.
 pub mod op {
+    /// `kCmdNone`: no operation, always acknowledged.
     pub const NONE: u8 = 0;
     pub const TERMINATE: u8 = 1;
     pub const RESET: u8 = 2;

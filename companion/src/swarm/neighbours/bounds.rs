@@ -39,8 +39,8 @@ pub(super) const COLUMN_KEPT: Duration = Duration::from_secs(600);
 /// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
 /// [`HEARD_WITHIN`] and 1 s, and stops. Over an area it flies on as long as its lease allows.
 pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
-/// Growth of [`UNHEARD_STRETCH_M`] for each second that messages are late, m/s.
-pub(super) const UNHEARD_STRETCH_MPS: f32 = 2.0;
+/// Growth of [`UNHEARD_STRETCH_M`] for each second that a message takes to another vehicle and back, m/s.
+pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
 /// Over an area, a vehicle that has been silent for this long may land further along its path than

@@ -297,7 +297,7 @@ impl NeighbourEntry {
 
     /// The stretch of a vehicle that stops where it notices that no other vehicle hears it, metres.
     pub(super) fn unheard_stop_m(&self) -> f32 {
-        UNHEARD_STRETCH_M + UNHEARD_STRETCH_MPS * 2.0 * self.message_delay.delay_s
+        UNHEARD_STRETCH_M + UNHEARD_STRETCH_PER_DELAY_MPS * 2.0 * self.message_delay.delay_s
     }
 
     /// Whether it is in the air, or about to be, as it reported last.

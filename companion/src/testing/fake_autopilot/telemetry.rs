@@ -39,7 +39,7 @@ impl Bench {
     fn report_ardupilot(&mut self) {
         if self.sends(193) {
             let flags = EkfStatusFlags::from_bits_retain(self.ekf_flags);
-            let pos_horiz_variance = self.variance;
+            let pos_horiz_variance = self.pos_horiz_variance;
             self.send(&EKF_STATUS_REPORT_DATA { flags, pos_horiz_variance, ..Default::default() });
         }
         if self.sends(33) {

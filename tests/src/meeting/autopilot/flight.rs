@@ -10,6 +10,11 @@ use super::{ARDUPILOT_LOITER, Autopilot, Catch, PX4_POSITION, STEP_S};
 
 /// Slowest setpoint with which PX4 looks for the ground, m/s.
 const MIN_SINK_MPS: f32 = 0.275;
+/// Half of the way that a vehicle in a net swings, metres, and its phase by time, 1/s: up to 0.7 m/s.
+const SWING_M: f32 = 0.25;
+const SWING_PER_S: f32 = 2.8;
+/// How fast the wind carries a vehicle off, m/s.
+const WIND_MPS: f32 = 0.7;
 /// Height over home that a return climbs to, metres.
 const RETURN_M: f32 = 6.0;
 
@@ -75,11 +80,21 @@ impl Autopilot {
     }
 
     /// Keeps a vehicle that is caught where it is; returns the height of what it rests on.
-    fn keep_caught(&mut self) -> Option<f32> {
+    fn keep_caught(&mut self, now: Instant) -> Option<f32> {
         let (how, place) = self.caught?;
         let ledge = how == Catch::Ledge;
-        (self.position.x, self.position.y) = (place.x, place.y);
-        (self.velocity.x, self.velocity.y) = (0.0, 0.0);
+        let t_s = (now - self.lifted_at?).as_secs_f32();
+        let (away_m, speed_mps) = match how {
+            Catch::Wall | Catch::Ledge => (0.0, 0.0),
+            // On the ground its net lies still.
+            Catch::Net if self.grounded_since.is_some() => (self.position.x - place.x, 0.0),
+            Catch::Net => {
+                (SWING_M * (SWING_PER_S * t_s).sin(), SWING_M * SWING_PER_S * (SWING_PER_S * t_s).cos())
+            }
+            Catch::Wind => (self.position.x - place.x + WIND_MPS * STEP_S, WIND_MPS),
+        };
+        (self.position.x, self.position.y) = (place.x + away_m, place.y);
+        (self.velocity.x, self.velocity.y) = (speed_mps, 0.0);
         if ledge {
             (self.position.z, self.velocity.z) = (place.z, 0.0);
         }
@@ -115,7 +130,7 @@ impl Autopilot {
         self.acceleration += (wanted - self.acceleration) * (STEP_S / 0.12);
         self.velocity += self.acceleration * STEP_S;
         self.position += self.velocity * STEP_S;
-        let floor_z = self.keep_caught().unwrap_or(floor_z);
+        let floor_z = self.keep_caught(now).unwrap_or(floor_z);
         // A floor is met from above only.
         if self.position.z <= floor_z && self.position.z > floor_z - 0.3 {
             self.position.z = floor_z;
