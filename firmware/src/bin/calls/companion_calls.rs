@@ -44,7 +44,8 @@ const ACK: u8 = 128;
 const FTP_DATA: usize = 239;
 const GROUND: (u8, u8) = (255, 190);
 
-/// All of them.
+/// All of them, each part in a stack frame of its own: a companion takes 36 kB of the stack, and three of them in one frame ran
+/// over the statics below it.
 #[inline(never)]
 pub fn measure_companion_calls(meter: &mut impl Meter) {
     measure_framing(meter);
@@ -65,6 +66,7 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
 }
 
 /// Bytes that look like the start of a frame again and again, each with a wrong checksum; and noise.
+#[inline(never)]
 fn measure_framing(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
     let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
@@ -110,6 +112,7 @@ fn measure_framing(meter: &mut impl Meter) {
 }
 
 /// A mission file for as many vehicles as there may be.
+#[inline(never)]
 fn measure_mission_parsing(meter: &mut impl Meter) {
     let header = MissionHeader {
         roadmap_crc: 0,
@@ -158,6 +161,7 @@ fn measure_mission_parsing(meter: &mut impl Meter) {
 }
 
 /// The agreement on what lost vehicles leave, among as many as there may be, each of which reports something new.
+#[inline(never)]
 fn measure_fleet_agreement(meter: &mut impl Meter) {
     let mut fleet = Fleet::<VEHICLES>::new(0, VEHICLES, FleetTimeouts::of_flight(Duration::from_secs(60)));
     let bytes = size_of_val(&fleet);
@@ -201,6 +205,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
     }
 }
 
+#[inline(never)]
 fn values(meter: &mut impl Meter) {
     let mut values = Parameters::default();
     let mut config = flight::config();
