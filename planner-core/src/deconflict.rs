@@ -4,8 +4,9 @@
 //! schedule: before each stretch that conflicts with one an earlier-labelled vehicle has yet to leave, it stops (the
 //! gates of [`crate::schedule`]); a vehicle that is out of the plan opens its gates, and is flown around ([`crate::detour`]). A neighbour that flies no plan we know is an obstacle to stop in front of.
 
+use fpu::sqrtf;
 use heapless::Vec;
-use libm::{fmaxf, fminf, sqrtf};
+use libm::{fmaxf, fminf};
 
 use crate::flight::{Gate, Path};
 use crate::{ConfigError, Point, all_positive};

@@ -11,8 +11,9 @@
 
 use core::ops::Range;
 
+use fpu::sqrtf;
 use heapless::Vec;
-use libm::{fmaxf, fminf, sqrtf};
+use libm::{fmaxf, fminf};
 
 use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::geometry::segments_distance_sq;

@@ -346,7 +346,7 @@ impl<'a> RoadmapView<'a> {
     /// Straight distance between two nodes, metres; NaN if either does not exist.
     #[inline]
     pub fn distance_m(&self, a: u16, b: u16) -> f32 {
-        libm::sqrtf((self.node(b) - self.node(a)).norm_squared())
+        fpu::sqrtf((self.node(b) - self.node(a)).norm_squared())
     }
 
     /// Whether a vehicle that needs `required_m` (radius + margin) may fly `edge`. An edge with exactly the required

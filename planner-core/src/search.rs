@@ -121,7 +121,7 @@ impl Graph for RoadmapView<'_> {
 
     #[inline]
     fn length(&self, _k: usize, here: &Point, target: u16) -> f32 {
-        libm::sqrtf((self.node(target) - here).norm_squared())
+        fpu::sqrtf((self.node(target) - here).norm_squared())
     }
 
     #[inline]
@@ -298,7 +298,7 @@ pub fn cost_matrix<const N: usize>(
     }
     let ((starts_at, starts_across), (goals_at, goals_across)) =
         (bounding_box(view, starts), bounding_box(view, goals));
-    let between = libm::sqrtf((goals_at - starts_at).norm_squared());
+    let between = fpu::sqrtf((goals_at - starts_at).norm_squared());
     let from_starts = starts.len() as f32 * (between + goals_across);
     let from_goals = goals.len() as f32 * (between + starts_across);
     if from_starts <= from_goals {
@@ -322,7 +322,7 @@ fn bounding_box(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
     let corners = nodes.iter().map(|&node| view.node(node));
     let (low, high) = corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
-    ((low + high) / 2.0, libm::sqrtf((high - low).norm_squared()))
+    ((low + high) / 2.0, fpu::sqrtf((high - low).norm_squared()))
 }
 
 /// Index of the values of a half-edge's target. No target of a checked roadmap is beyond `N`; where
@@ -359,7 +359,7 @@ fn search<const N: usize>(
                 return 0.0;
             }
             let [a, b] = view.landmark_distances_m(node);
-            let straight = libm::sqrtf((view.node(node) - goal).norm_squared());
+            let straight = fpu::sqrtf((view.node(node) - goal).norm_squared());
             straight.max(libm::fabsf(a - goal_a)).max(libm::fabsf(b - goal_b))
         };
         if informed && ws.heap.entry_index(target) != SETTLED {

@@ -7,7 +7,8 @@
 //! leaves. Between corners the acceleration goes along as feed-forward, so that braking is followed without a lag.
 //! (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre away.)
 
-use libm::{fabsf, fmaxf, fminf, sqrtf};
+use fpu::sqrtf;
+use libm::{fabsf, fmaxf, fminf};
 
 use crate::deconflict::Advice;
 use crate::flight::{Path, Waypoint};

@@ -15,8 +15,8 @@ use anyhow::{Result, ensure};
 use self::sources::Tree;
 
 /// The crates that are checked, by folder.
-const CRATES: [&str; 7] =
-    ["planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
+const CRATES: [&str; 8] =
+    ["fpu", "planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 
 /// Prints every cycle of imports and every struct or function beyond the limits; fails if there is one without a reason, or if
 /// docs/margins.md is not that of the sources.

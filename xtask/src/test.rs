@@ -36,7 +36,7 @@ fn sources() -> Result<()> {
     })?;
     step("documents", || {
         let mut doc = cargo();
-        doc.args(["doc", "--no-deps", "--locked", "-p", "planner-core", "-p", "companion"]);
+        doc.args(["doc", "--no-deps", "--locked", "-p", "fpu", "-p", "planner-core", "-p", "companion"]);
         shell::run(doc.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
     step("structure", structure::run)

@@ -131,7 +131,7 @@ pub fn step_back<const W: usize>(
         return None;
     }
     let corner_m = path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
-    let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
+    let allowed = |end: f32, left_m: f32| fpu::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
     let ahead = allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
     // The tracker's speed is that of flying on; back is below zero.
     let speed = ahead.min(MAX_LEG_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));

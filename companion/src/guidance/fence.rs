@@ -8,7 +8,8 @@
 //!
 //! ENU metres, seconds. Constant work.
 
-use libm::{fabsf, fmaxf, fminf, sqrtf};
+use fpu::sqrtf;
+use libm::{fabsf, fmaxf, fminf};
 use planner_core::Point;
 
 use super::limits::MotionLimits;

@@ -243,7 +243,7 @@ impl Guidance {
             return 1.0;
         };
         let over_m = top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_height_m);
-        let most_mps = libm::sqrtf(
+        let most_mps = fpu::sqrtf(
             TOUCHDOWN_MPS * TOUCHDOWN_MPS + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
         );
         // The scale is a share of the leg's speed, which the slower of the two limits.

@@ -18,7 +18,8 @@
 //!
 //! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most [`MAX_TICKS`] ticks a step.
 
-use libm::{fabsf, fmaxf, fminf, sqrtf};
+use fpu::sqrtf;
+use libm::{fabsf, fmaxf, fminf};
 use planner_core::Point;
 
 use super::fence::Fence;
@@ -231,7 +232,7 @@ impl SetpointSmoother {
     /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
     pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
-        let speed = velocity.norm();
+        let speed = sqrtf(velocity.norm_squared());
         if speed < STANDSTILL_MPS {
             return 0.0;
         }

@@ -309,7 +309,7 @@ fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     if length_m * PLANNED_ACCEL_MPS2 > most_mps * most_mps {
         length_m / most_mps + most_mps / PLANNED_ACCEL_MPS2
     } else {
-        2.0 * libm::sqrtf(length_m / PLANNED_ACCEL_MPS2)
+        2.0 * fpu::sqrtf(length_m / PLANNED_ACCEL_MPS2)
     }
 }
 

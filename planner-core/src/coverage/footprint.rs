@@ -2,7 +2,8 @@
 //!
 //! Source: CPP eqs. 1, 2, as SPEC §7 has them. Heights and sides in metres.
 
-use libm::{sqrtf, tanf};
+use fpu::sqrtf;
+use libm::tanf;
 
 use super::CoverageError;
 

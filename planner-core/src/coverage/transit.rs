@@ -50,7 +50,7 @@ impl<'a, const N: usize> Transit<'a, N> {
                 // Away from both edges: along their bisector, as far as keeps the clearance from both.
                 let outward = (into - out).try_normalize(1e-6);
                 let Some(outward) = outward else { continue };
-                let half = libm::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
+                let half = fpu::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
                 let far = ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_from_sin(half), 0.25), 4.0);
                 let place = corner + outward * far;
                 if !area.is_in_no_fly_zone(&place) {
@@ -172,5 +172,5 @@ impl<const N: usize> Default for Transit<'_, N> {
 
 /// The cosine from the sine of an angle of at most 90°.
 fn cos_from_sin(sine: f32) -> f32 {
-    libm::sqrtf(libm::fmaxf(1.0 - sine * sine, 0.0))
+    fpu::sqrtf(libm::fmaxf(1.0 - sine * sine, 0.0))
 }

@@ -58,7 +58,7 @@ impl Block {
     fn with_line(mut self, pieces: &[TimedSegment]) -> Self {
         let beside =
             |piece: &TimedSegment| segments_distance_sq((&self.line.0, &self.line.1), (&piece.to, &piece.to));
-        self.lateral_extent_m = libm::sqrtf(pieces.iter().map(beside).fold(0.0, fmaxf));
+        self.lateral_extent_m = fpu::sqrtf(pieces.iter().map(beside).fold(0.0, fmaxf));
         self
     }
 

@@ -249,14 +249,14 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
                     let square = segment.distance_sq_to_cell(&low);
                     if square <= nearest {
                         (nearest, found) = (square, true);
-                        bound = around(libm::sqrtf(nearest));
+                        bound = around(fpu::sqrtf(nearest));
                     }
                 }
             }
-            ControlFlow::Continue(libm::sqrtf(nearest))
+            ControlFlow::Continue(fpu::sqrtf(nearest))
         });
         if found {
-            return (libm::sqrtf(nearest) * shape.resolution_m).min(max_m);
+            return (fpu::sqrtf(nearest) * shape.resolution_m).min(max_m);
         }
         if tried >= limit || reach > longest {
             return (limit * shape.resolution_m).min(max_m);
