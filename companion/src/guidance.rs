@@ -468,7 +468,9 @@ impl Guidance {
     ) -> u8 {
         let before = self.filter;
         self.filter(state, scene, neighbours, now);
-        core::mem::replace(&mut self.filter, before).blocker()
+        let blocker = self.filter.blocker();
+        self.filter = before;
+        blocker
     }
 
     /// Whether waypoints and the end of the path are those of the paper.

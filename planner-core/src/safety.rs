@@ -14,10 +14,10 @@
 
 mod own;
 
+use fpu::sqrtf;
 use heapless::Vec;
-use libm::sqrtf;
 
-pub use self::own::OwnSet;
+pub use self::own::{Legs, OwnSet};
 use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision to the first motion that follows it, seconds: two setpoints.
@@ -80,6 +80,8 @@ impl ReachableSet {
 
     /// The set from `place` along the points `ahead`, for `length_m` from the first of them. The
     /// set ends where the points end.
+    // A board takes long to copy what it returns.
+    #[inline(always)]
     pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
         let mut set = Self::at(place);
         set.extend_along(ahead, length_m);
@@ -116,7 +118,8 @@ impl ReachableSet {
     }
 
     /// Greatest distance of the set from its first point, metres.
-    pub fn reach_m(&self) -> f32 {
+    #[cfg(test)]
+    fn reach_m(&self) -> f32 {
         let here = self.points[0];
         let most_sq = self.points.iter().fold(0.0_f32, |most, p| most.max((p - here).norm_squared()));
         sqrtf(most_sq) + self.widened_by_m
@@ -126,11 +129,6 @@ impl ReachableSet {
     fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];
         self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
-    }
-
-    /// First and last point of the set.
-    fn ends(&self) -> (&Point, &Point) {
-        (&self.points[0], &self.points[self.points.len() - 1])
     }
 
     /// Legs of the set, at least one, and the column.

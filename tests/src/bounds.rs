@@ -154,7 +154,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("Companion::handle_timeout, else", "the same"),
     ("a control step, 32 near", "the same as `Companion::handle_timeout`"),
     ("a control step, coverage, 32 near", "the same, and v entries of the fleet"),
-    ("Companion::query_filter, 32 near", "v, and 6 neighbours × 9 × 9 legs"),
+    ("Companion::query_filter, 32 near", "v, and 4 neighbours × 9 × 9 legs"),
     ("Companion::handle_plan", "w and g copied"),
     ("Companion::detour_request", "v × 16 places"),
     ("Companion::poll_transmit", "one frame"),

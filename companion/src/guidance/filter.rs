@@ -6,7 +6,7 @@
 //! In a descent it flies back up its own column. The filter knows no gates, no progress and no advice: it only asks the
 //! gates which vehicle goes first where both have stopped.
 //!
-//! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than six of those is a stop.
+//! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than four of those is a stop.
 
 mod conflict;
 mod look;

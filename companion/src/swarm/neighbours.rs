@@ -311,7 +311,7 @@ impl<const V: usize> Neighbours<V> {
         contact.unheard_way_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
-        contact.extent_m = libm::sqrtf(contact.points_for_now().iter().fold(0.0, most));
+        contact.extent_m = fpu::sqrtf(contact.points_for_now().iter().fold(0.0, most));
         contact.update_place_on_points();
         (contact.may_come_down, contact.ground_m) = (intent.may_come_down, intent.ground_m);
         contact.gates_open_up_to_m = if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };

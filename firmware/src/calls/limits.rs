@@ -9,7 +9,9 @@ use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour
 use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, WaypointRange};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
-use planner_core::safety::{Braking, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet};
+use planner_core::safety::{
+    Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet,
+};
 use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
@@ -477,11 +479,10 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             let other =
                 to.call("safety::NeighbourMotion::reachable_set", || heard.reachable_set(&bounds, hard));
             for own in &own {
-                let reach_m = to.call("safety::ReachableSet::reach_m", || own.reach_m());
-                let own = to.call("own::OwnSet::new", || OwnSet::new(own));
-                to.add(reach_m);
-                let reach_m = to.call("own::OwnSet::reach_m", || own.reach_m());
-                to.add(reach_m);
+                let mut legs = Legs::new();
+                let own = to.call("own::OwnSet::new", || OwnSet::new(own, &mut legs));
+                let away = to.call("own::OwnSet::away_from_box", || own.away_from_box(&p));
+                to.add(away.x + away.y + away.z);
                 let near = to.call("own::OwnSet::conflicts", || own.conflicts(&other, &p, hard));
                 to.add_bool(near);
             }

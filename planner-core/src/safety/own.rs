@@ -1,12 +1,11 @@
 //! A vehicle's own set, prepared once to be compared with those of many neighbours.
 //!
-//! Most pairs of legs are far apart, and a board sees that without their distance: by the box around the own set, by the
-//! line from its first to its last point and how far the others lie beside that, and by balls around the legs. What is
-//! left is compared leg by leg. Each of these bounds is a little wider than it has to be, so rounding skips no pair
-//! that counts.
+//! Most pairs of legs are far apart, and a board sees that without their distance: by the box around the own set and by
+//! balls around the legs. What is left is compared leg by leg. Each of these bounds is a little wider than it has to be,
+//! so rounding skips no pair that counts.
 
+use fpu::sqrtf;
 use heapless::Vec;
-use libm::sqrtf;
 
 use super::{MAX_SET_POINTS, ReachableSet};
 use crate::Point;
@@ -18,37 +17,43 @@ const APPROACH_ROUNDING_M: f32 = 0.003;
 /// Margin added to bounding boxes, metres: more than a coordinate of the mission frame is rounded
 /// by.
 const BOUNDS_ROUNDING_M: f32 = 0.01;
-/// Paths of more legs than this are first bounded by the line between their ends, which is cheaper
-/// than to compare each leg.
-const MAX_LEGS_WITHOUT_BOUND: usize = 2;
-
 /// No less than the square root, and at most 7 % more: half the exponent, and the line between two powers of four.
 #[inline]
 fn sqrt_upper_bound(square: f32) -> f32 {
     f32::from_bits((square.to_bits() >> 1) + (127 << 22))
 }
 
+/// Room for the legs of a set.
+pub type Legs<'a> = Vec<Leg<'a>, MAX_SET_POINTS>;
+
 /// A leg with its midpoint and an upper bound of half its length.
 #[derive(Clone, Copy, Debug)]
-struct Leg {
-    from: Point,
-    to: Point,
+pub struct Leg<'a> {
+    from: &'a Point,
+    to: &'a Point,
     middle: Point,
     half_m: f32,
 }
 
-impl Leg {
+impl<'a> Leg<'a> {
     #[inline]
-    fn new(from: &Point, to: &Point) -> Self {
+    fn new(from: &'a Point, to: &'a Point) -> Self {
         let half = (to - from) * 0.5;
-        Self { from: *from, to: *to, middle: from + half, half_m: sqrt_upper_bound(half.norm_squared()) }
+        Self { from, to, middle: from + half, half_m: sqrt_upper_bound(half.norm_squared()) }
     }
 
     /// Whether two cannot come nearer than `apart_m`.
     #[inline]
-    fn is_apart(&self, other: &Self, apart_m: f32) -> bool {
+    fn is_apart(&self, other: &Leg<'_>, apart_m: f32) -> bool {
         let most_m = self.half_m + other.half_m + apart_m;
         (self.middle - other.middle).norm_squared() >= most_m * most_m
+    }
+
+    /// Whether it may come nearer to a place than `near_m`.
+    #[inline]
+    fn may_come_within(&self, place: &Point, near_m: f32) -> bool {
+        let most_m = self.half_m + near_m + BOUNDS_ROUNDING_M;
+        (self.middle - place).norm_squared() < most_m * most_m
     }
 }
 
@@ -56,94 +61,65 @@ impl Leg {
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
     set: &'a ReachableSet,
-    legs: Vec<Leg, MAX_SET_POINTS>,
-    /// Reach of the set from its first point, metres.
-    reach_m: f32,
-    /// Greatest distance of the set from the line between its first point and its last, metres.
-    lateral_extent_m: f32,
-    /// Middle and size of the box around it.
+    legs: &'a [Leg<'a>],
+    /// Middle of the box around it, and half of its size.
     middle: Point,
-    size: Point,
+    half: Point,
 }
 
 impl<'a> OwnSet<'a> {
-    /// The set that a vehicle can no longer avoid.
-    pub fn new(set: &'a ReachableSet) -> Self {
-        let (first, _) = set.ends();
-        // Filled in place: a board takes long to copy it.
-        let mut own = Self {
-            set,
-            legs: Vec::new(),
-            reach_m: set.reach_m(),
-            lateral_extent_m: 0.0,
-            middle: *first,
-            size: *first,
-        };
+    /// The set that a vehicle can no longer avoid. The caller lends the room for its legs: a board takes long to copy them.
+    pub fn new<'s: 'a>(set: &'s ReachableSet, legs: &'a mut Legs<'s>) -> Self {
+        let first = set.points[0];
         // The second leg begins at the same point where a first leg has no length.
-        let double = set.points.len() > 2 && set.points[0] == set.points[1];
-        let (mut low, mut high) = (*first, *first);
-        set.segments()
-            .skip(usize::from(double))
-            .for_each(|(from, to)| own.add(from, to, &mut low, &mut high));
-        if own.legs.len() > MAX_LEGS_WITHOUT_BOUND {
-            own.lateral_extent_m = own.lateral_extent_m();
+        let double = set.points.len() > 2 && first == set.points[1];
+        let (mut low, mut high) = (first, first);
+        legs.clear();
+        for (from, to) in set.segments().skip(usize::from(double)) {
+            // Cannot overflow: as many legs as points at most.
+            let _ = legs.push(Leg::new(from, to));
+            low = merge_coordinates(&low, to, |a, b| a < b);
+            high = merge_coordinates(&high, to, |a, b| a > b);
         }
-        (own.middle, own.size) = ((low + high) * 0.5, high - low);
-        own
+        Self { set, legs, middle: (low + high) * 0.5, half: (high - low) * 0.5 }
     }
 
-    #[inline(never)]
-    fn add(&mut self, from: &Point, to: &Point, low: &mut Point, high: &mut Point) {
-        // Cannot overflow: as many legs as points at most.
-        let _ = self.legs.push(Leg::new(from, to));
-        (*low, *high) = (merge_coordinates(low, to, |a, b| a < b), merge_coordinates(high, to, |a, b| a > b));
-    }
-
-    /// No less than what its points lie beside the line between its ends, metres.
-    #[inline(never)]
-    fn lateral_extent_m(&self) -> f32 {
-        let beside_sq = |leg: &Leg| point_distance_sq(self.set.ends(), &leg.to);
-        sqrt_upper_bound(
-            self.legs.iter().map(beside_sq).fold(0.0, |most, sq| if sq > most { sq } else { most }),
-        )
-    }
-
-    /// Greatest distance of the set from its first point, metres.
+    /// From the box around the set to a place, metres; 0 on each axis along which the place is beside no face.
     #[inline]
-    pub fn reach_m(&self) -> f32 {
-        self.reach_m
+    pub fn away_from_box(&self, place: &Point) -> Point {
+        let axis = |axis: usize| {
+            let away = (place[axis] - self.middle[axis]).abs() - self.half[axis];
+            if away > 0.0 { away } else { 0.0 }
+        };
+        Point::new(axis(0), axis(1), axis(2))
     }
 
-    /// Whether a segment stays outside the box around this set, by `apart_m`.
+    /// Whether a segment, given by its middle and half of it, stays outside the box around this set, by `apart_m`.
     #[inline]
-    fn is_outside(&self, from: &Point, to: &Point, apart_m: f32) -> bool {
+    fn is_outside(&self, middle: &Point, half: &Point, apart_m: f32) -> bool {
         let apart = |axis: usize| {
-            let (a, b) = (from[axis] - self.middle[axis], to[axis] - self.middle[axis]);
-            // Twice: from middle to middle, less half of each.
-            (a + b).abs() - (b - a).abs() >= self.size[axis] + 2.0 * apart_m
+            (middle[axis] - self.middle[axis]).abs() - half[axis].abs() >= self.half[axis] + apart_m
         };
         apart(0) || apart(1) || apart(2)
     }
 
     /// Square of the least distance between the polylines of both sets, at most `most_m` squared.
     fn centreline_distance_sq(&self, other: &ReachableSet, most_m: f32) -> f32 {
-        let wide_m = most_m + BOUNDS_ROUNDING_M;
+        let mut wide_m = most_m + BOUNDS_ROUNDING_M;
         let mut least_sq = most_m * most_m;
         for (from, to) in other.segments() {
-            if self.is_outside(from, to, wide_m) {
+            let half = (to - from) * 0.5;
+            if self.is_outside(&(from + half), &half, wide_m) {
                 continue;
             }
-            if self.legs.len() > MAX_LEGS_WITHOUT_BOUND {
-                let line_m = wide_m + self.lateral_extent_m;
-                if segments_distance_sq((from, to), self.set.ends()) >= line_m * line_m {
-                    continue;
-                }
-            }
             let other = Leg::new(from, to);
-            for leg in &self.legs {
+            for leg in self.legs {
                 if !leg.is_apart(&other, wide_m) {
-                    let apart_sq = segments_distance_sq((from, to), (&leg.from, &leg.to));
-                    least_sq = if apart_sq < least_sq { apart_sq } else { least_sq };
+                    let apart_sq = segments_distance_sq((from, to), (leg.from, leg.to));
+                    if apart_sq < least_sq {
+                        least_sq = apart_sq;
+                        wide_m = sqrtf(apart_sq) + BOUNDS_ROUNDING_M;
+                    }
                 }
             }
         }
@@ -166,31 +142,22 @@ impl<'a> OwnSet<'a> {
             return true;
         }
         let here = &self.set.points[0];
-        if is_nearer(motion_sq, distance_sq(other, here, most_m * most_m)) {
+        // As near as this it is already: where the motion leads no nearer, one leg tells.
+        let here_m = sqrtf(motion_sq) + APPROACH_ROUNDING_M;
+        let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
+        if here_m < most_m && !other.segments().any(is_here) {
             return true;
         }
         // The vehicle stays as far from where the neighbour may come; but it must not fly towards
         // where the neighbour comes from.
         let now_sq = (here - place).norm_squared();
-        is_nearer(distance_sq(self.set, place, f32::INFINITY), now_sq.min(4.0 * most_m * most_m))
+        let nearer_m = sqrtf(now_sq.min(4.0 * most_m * most_m)) - APPROACH_ROUNDING_M;
+        let is_nearer = |leg: &Leg<'_>| {
+            leg.may_come_within(place, nearer_m)
+                && point_distance_sq((leg.from, leg.to), place) < nearer_m * nearer_m
+        };
+        nearer_m > 0.0 && self.legs.iter().any(is_nearer)
     }
-}
-
-/// Square of the least distance from a set's line to a place, or `most_sq` if it is not less.
-#[inline(never)]
-fn distance_sq(set: &ReachableSet, place: &Point, most_sq: f32) -> f32 {
-    let nearer = |least: f32, leg| {
-        let apart_sq = point_distance_sq(leg, place);
-        if apart_sq < least { apart_sq } else { least }
-    };
-    set.segments().fold(most_sq, nearer)
-}
-
-/// Whether a distance is less than another one, both squared.
-#[inline]
-fn is_nearer(least_sq: f32, than_sq: f32) -> bool {
-    // Most are not, and take no root.
-    least_sq < than_sq && sqrtf(least_sq) < sqrtf(than_sq) - APPROACH_ROUNDING_M
 }
 
 /// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about numbers that are none takes a

@@ -100,7 +100,8 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
             1 => ReachableSet::at(here),
             _ => ReachableSet::along(here, ahead.iter().copied(), uniform(rng, 0.0, 15.0)),
         };
-        let own = OwnSet::new(&set);
+        let mut legs = Legs::new();
+        let own = OwnSet::new(&set, &mut legs);
         let away_m = one_of(rng, &[2.0, 8.0, 20.0]);
         let position = here + near(rng, away_m);
         let beside_m = one_of(rng, &[0.0, 0.4, 3.0]);
@@ -116,6 +117,8 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
             "{seed}: what is remembered is the same"
         );
         assert!(other.reach_m() <= heard.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
+        let from_line_m = least_sq(&ReachableSet::at(position), &set, f32::INFINITY).sqrt();
+        assert!(own.away_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001, "{seed}: {set:?}");
         let apart_m = uniform(rng, 0.5, 3.0);
         let conflicts = own.conflicts(&other, &position, apart_m);
         assert_eq!(

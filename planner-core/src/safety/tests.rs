@@ -46,7 +46,7 @@ proptest! {
         let motion_m = least(&here, &there) - grow_m;
         let now_m = least(&here[..1], &there) - grow_m;
         let place = there[0];
-        let conflict = OwnSet::new(&own).conflicts(&other, &place, APART_M);
+        let conflict = OwnSet::new(&own, &mut Legs::new()).conflicts(&other, &place, APART_M);
         if motion_m > APART_M + 0.05 {
             prop_assert!(!conflict, "{motion_m} apart");
         } else if motion_m < APART_M - 0.05 && motion_m < now_m - 0.05 {
@@ -211,7 +211,7 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     grounded: false,
                     column_to_m: None,
                 };
-                OwnSet::new(&fliers[i].set()).conflicts(
+                OwnSet::new(&fliers[i].set(), &mut Legs::new()).conflicts(
                     &heard.reachable_set(&BOUNDS, 0.0),
                     &position,
                     APART_M,

@@ -15,7 +15,7 @@ use crate::time::{Duration, Instant};
 /// on, seconds.
 const YIELD_LOOK_AHEAD_S: f32 = 3.0;
 /// Most neighbours that are compared in one step: with more nearby the vehicle stops.
-const MAX_NEAR_COMPARED: usize = 6;
+const MAX_NEAR_COMPARED: usize = 4;
 /// Overshoot of two vehicles in the air beyond their stops, together, metres; the schedule leaves
 /// 0.5 m for this and for tracking errors.
 const OVERSHOOT_MARGIN_M: f32 = 0.25;
@@ -41,12 +41,12 @@ impl Guidance {
         extra_m: f32,
         back: bool,
     ) -> ReachableSet {
-        let velocity_mps = telemetry.velocity.norm();
+        let velocity_mps = fpu::sqrtf(telemetry.velocity.norm_squared());
         // Beside the path it flies straight to where it continues.
         let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
-        let join = path.point_at(self.tracker.along_m).filter(|_| joins);
+        let join = if joins { path.point_at(self.tracker.along_m) } else { None };
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
-        let reference_mps = self.smoother.velocity().norm();
+        let reference_mps = fpu::sqrtf(self.smoother.velocity().norm_squared());
         let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
         let braking_m = bounds.braking.stop_m(speed_mps).max(self.smoother.stopping_distance_m(true));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
@@ -77,7 +77,6 @@ impl Guidance {
     ) -> Option<FilterConflict> {
         let safety_m = self.deconflict.safety_distance_m;
         let place = scene.telemetry.position;
-        let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.hears_nobody(now);
         let deaf = lands && hears_nobody;
@@ -89,8 +88,8 @@ impl Guidance {
         let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m()))
             .max(2.0 * self.track.radius_m + STRANGER_HULL_GAP_M);
         let reach = ReachQuery {
-            place,
-            within_m: own_reach_m + most_apart_m,
+            own,
+            within_m: most_apart_m,
             bounds,
             ahead_s: if self.filter.is_stopped() { YIELD_LOOK_AHEAD_S } else { 0.0 },
             on_plan,
@@ -99,9 +98,9 @@ impl Guidance {
         };
         let follows = !lands && !hears_nobody;
         let mut next = 0;
-        while let Some((i, contact)) = neighbours.next_within(next, now, &reach) {
+        while let Some((i, contact, dead)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
-            let mut met = neighbours.for_filter(contact, now);
+            let mut met = neighbours.for_filter(contact, dead, now);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
                 // The neighbour is not within radio range, and is where the plan has it.
@@ -158,8 +157,8 @@ impl Guidance {
             if silent && !hears_nobody && !met.stranger && below() {
                 return Some(FilterConflict { id: met.id, yields: true, stranger: false, rests: met.lost });
             }
-            let reach_m = own_reach_m + apart_m + met.motion.reach_m(bounds, ahead_s);
-            let away = met.motion.position - place;
+            let reach_m = apart_m + met.motion.reach_m(bounds, ahead_s);
+            let away = own.away_from_box(&met.motion.position);
             let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
             if away.x * away.x + away.y * away.y + above_m * above_m >= reach_m * reach_m {
                 continue;
@@ -206,7 +205,7 @@ impl Guidance {
         let waits = |plan: &VehiclePlan<W, G>| {
             plan.gates.iter().any(|gate| gate.id == met.id && gate.at_m >= along_m)
         };
-        if on_plan && scene.plan.is_some_and(waits) && self.advice.waiting_for == met.id {
+        if on_plan && self.advice.waiting_for == met.id && scene.plan.is_some_and(waits) {
             return true;
         }
         // A vehicle on the plan that waits does so for one that goes first.

@@ -3,7 +3,7 @@
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{OwnSet, REACTION_S, ReachableSet};
+use planner_core::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
 
 use super::super::limits::bounds;
 use super::super::motion::clamp_to;
@@ -103,7 +103,8 @@ impl Guidance {
             }
             FlightDirection::Stands => return,
         };
-        let own = OwnSet::new(&set);
+        let mut legs = Legs::new();
+        let own = OwnSet::new(&set, &mut legs);
         let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if whole_column {
             self.filter.note_column(found.as_ref(), now);
@@ -162,18 +163,21 @@ impl Guidance {
     /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
     /// reference that turns back leaves the setpoint on its way.
     fn is_flying_back<const W: usize>(&self, path: &Path<W>) -> bool {
-        let along_m = self.tracker.along_m;
-        let velocity = self.smoother.velocity();
-        let beside = |by_m: f32| path.point_at(clamp_to(self.setpoint_m + by_m, 0.0, path.length_m()));
-        let onward = match (beside(-MAX_TURNING_SETPOINT_M), beside(MAX_TURNING_SETPOINT_M)) {
-            (Some(from), Some(to)) => velocity.dot(&(to - from)),
-            _ => 0.0,
-        };
-        let moves = velocity.norm_squared() > MAX_TURNING_SETPOINT_MPS * MAX_TURNING_SETPOINT_MPS;
-        if along_m > self.setpoint_m + MAX_TURNING_SETPOINT_M || (moves && onward > 0.0) {
+        if self.tracker.along_m > self.setpoint_m + MAX_TURNING_SETPOINT_M {
             return false;
         }
-        (moves && onward < 0.0) || self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
+        let velocity = self.smoother.velocity();
+        if velocity.norm_squared() > MAX_TURNING_SETPOINT_MPS * MAX_TURNING_SETPOINT_MPS {
+            let beside = |by_m: f32| path.point_at(clamp_to(self.setpoint_m + by_m, 0.0, path.length_m()));
+            let onward = match (beside(-MAX_TURNING_SETPOINT_M), beside(MAX_TURNING_SETPOINT_M)) {
+                (Some(from), Some(to)) => velocity.dot(&(to - from)),
+                _ => 0.0,
+            };
+            if onward != 0.0 {
+                return onward < 0.0;
+            }
+        }
+        self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
     }
 
     /// A standstill before a vehicle that no gate waits for counts as one of the filter's.

@@ -94,7 +94,7 @@ impl NeighbourEntry {
         if self.is_leased() {
             let mut at = self.state.position;
             let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
-            self.unheard_way_m = legs.map(|leg| libm::sqrtf(leg.norm_squared())).sum();
+            self.unheard_way_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
         }
     }
 
@@ -116,9 +116,11 @@ impl NeighbourEntry {
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most are heard.
-        let dead = Duration::from_millis(LOST_AFTER_MS + (1000.0 * self.unheard_flight_time_s()) as u64);
-        let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= dead);
-        self.rank != STRANGER_RANK && silent(self.heard_at) && silent(self.known_at())
+        let lost = |at: &Instant| now - *at >= LOST_AFTER && self.rank != STRANGER_RANK;
+        let Some(heard_at) = self.heard_at.filter(lost) else { return false };
+        let flight_ms = (1000.0 * self.unheard_flight_time_s()) as u32;
+        let dead = Duration::from_millis(LOST_AFTER_MS + u64::from(flight_ms));
+        now - heard_at >= dead && self.relayed_at.is_none_or(|at| now - at >= dead)
     }
 
     /// Whether it is heard, but has had no valid position for long.

@@ -1,7 +1,7 @@
 //! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it is too far away to matter.
 
 use planner_core::Point;
-use planner_core::safety::{MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, PlaceOnPoints};
+use planner_core::safety::{MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints};
 
 use super::*;
 
@@ -33,9 +33,9 @@ pub(crate) struct FilterNeighbour<'a> {
 /// Inputs of the first comparison of a vehicle with its neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReachQuery<'a> {
-    /// Place of the vehicle.
-    pub(crate) place: Point,
-    /// Reach of the vehicle's own set, and the greatest distance kept, metres.
+    /// The vehicle's own set.
+    pub(crate) own: &'a OwnSet<'a>,
+    /// Greatest distance kept, metres.
     pub(crate) within_m: f32,
     /// Bounds expected of the neighbours.
     pub(crate) bounds: &'a MotionBounds,
@@ -50,16 +50,20 @@ pub(crate) struct ReachQuery<'a> {
 }
 
 impl NeighbourEntry {
-    /// Whether it stays out of reach wherever it can be: what most of them do, seen without making a set of it. Never where
-    /// [`Neighbours::for_filter`] and its reach say otherwise.
+    /// Whether it counts as dead, where it may come within reach; `None` where it stays out of reach wherever it can be: what
+    /// most of them do, seen without making a set of it. Never `None` where [`Neighbours::for_filter`] and its reach say
+    /// otherwise.
     #[inline(always)]
-    fn is_beyond(&self, placed_at: Instant, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> bool {
-        let away = self.state.position - reach.place;
+    fn within_reach(&self, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> Option<bool> {
+        let placed_at = self.position_at?;
+        let away = reach.own.away_from_box(&self.state.position);
         let across_sq = away.x * away.x + away.y * away.y;
         let age = now - placed_at;
         if age > MAX_HEIGHT_AGE {
             let lies = age >= down && !self.ground_m.is_nan();
-            return self.is_silent_beyond((age, lies), across_sq, now, reach);
+            let dead = self.rests_silently(age, now);
+            let beyond = self.is_silent_beyond(age, (dead, lies), across_sq, now, reach);
+            return (!beyond).then_some(dead);
         }
         let heard = NeighbourMotion {
             position: self.state.position,
@@ -79,7 +83,8 @@ impl NeighbourEntry {
         let column =
             !heard.grounded && (self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan());
         let above_m = if column { 0.0 } else { away.z };
-        across_sq + above_m * above_m >= most_m * most_m
+        let beyond = across_sq + above_m * above_m >= most_m * most_m;
+        (!beyond).then_some(false)
     }
 
     /// The same where its place is old. Seen from above it is where it was or, known by its intents, at the first of its points;
@@ -87,13 +92,13 @@ impl NeighbourEntry {
     /// and a little further, and once it counts as dead along its points alone. What lies after so long moves no more.
     fn is_silent_beyond(
         &self,
-        (age, lies): (Duration, bool),
+        age: Duration,
+        (dead, lies): (bool, bool),
         across_sq: f32,
         now: Instant,
         reach: &ReachQuery<'_>,
     ) -> bool {
         let delay_s = self.message_delay.delay_s;
-        let dead = self.rests_silently(age, now);
         let mut most_m = 0.0;
         let mut reaches = |far_m: f32| most_m = if far_m > most_m { far_m } else { most_m };
         if reach.hears_nobody || !dead {
@@ -111,7 +116,7 @@ impl NeighbourEntry {
         let mut away_sq = across_sq;
         let told = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| told) {
-            away_sq = away_sq.min((first - reach.place).xy().norm_squared());
+            away_sq = away_sq.min(reach.own.away_from_box(first).xy().norm_squared());
             reaches(if self.is_leased() { self.unheard_distance_m() } else { self.extent_m });
         }
         most_m += reach.within_m;
@@ -171,7 +176,7 @@ impl NeighbourEntry {
 
     /// Whether it counts as dead and rests on its points, its place so old.
     #[inline(never)]
-    fn rests_silently(&self, age: Duration, now: Instant) -> bool {
+    pub(super) fn rests_silently(&self, age: Duration, now: Instant) -> bool {
         age >= LOST_AFTER
             && !self.points.is_empty()
             && (self.is_dead(now) || !self.is_reported_out_of_range(now))
@@ -179,21 +184,31 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The first contact from number `from` on that was placed and may be within reach, and its number.
+    /// The first contact from number `from` on that was placed and may be within reach, its number, and whether it counts as
+    /// dead.
     pub(crate) fn next_within(
         &self,
         from: usize,
         now: Instant,
         reach: &ReachQuery<'_>,
-    ) -> Option<(usize, &NeighbourEntry)> {
-        let within =
-            |c: &NeighbourEntry| c.position_at.is_some_and(|at| !c.is_beyond(at, self.down, now, reach));
-        self.contacts.iter().enumerate().skip(from).find(|(_, contact)| within(contact))
+    ) -> Option<(usize, &NeighbourEntry, bool)> {
+        // A loop: a board takes a third longer for the chain of iterators.
+        for (i, contact) in self.contacts.iter().enumerate().skip(from) {
+            if let Some(dead) = contact.within_reach(self.down, now, reach) {
+                return Some((i, contact, dead));
+            }
+        }
+        None
     }
 
-    /// A contact as the safety filter sees it; one that was never placed as if it had been at the start.
+    /// A contact as the safety filter sees it, `dead` or not; one that was never placed as if it had been at the start.
     #[inline(always)]
-    pub(crate) fn for_filter<'a>(&'a self, contact: &'a NeighbourEntry, now: Instant) -> FilterNeighbour<'a> {
+    pub(crate) fn for_filter<'a>(
+        &'a self,
+        contact: &'a NeighbourEntry,
+        dead: bool,
+        now: Instant,
+    ) -> FilterNeighbour<'a> {
         let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
         let placed_s = placed_for.as_secs_f32();
         // Most are heard: then nothing of what follows is so.
@@ -203,8 +218,7 @@ impl<const V: usize> Neighbours<V> {
             contact.intent_at.filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
         let told_s = told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
-        // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
-        let dead = silent && contact.rests_silently(placed_for, now);
+        // Dead, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let down =
             silent && (placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise()));
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();

@@ -124,11 +124,6 @@ impl NeighbourEntry {
         }
     }
 
-    /// When it was last known how it is: heard from itself, or on its way by others.
-    pub(super) fn known_at(&self) -> Option<Instant> {
-        self.heard_at.max(self.relayed_at)
-    }
-
     /// Whether it is out of range, and was lately reported to follow the plan: by those that heard it longer than this vehicle
     /// did. One that all heard up to the same moment has failed.
     #[inline(never)]

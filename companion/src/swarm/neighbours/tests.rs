@@ -1,6 +1,6 @@
 extern crate std;
 
-use planner_core::safety::{Braking, MotionBounds};
+use planner_core::safety::{Braking, Legs, MotionBounds, OwnSet, ReachableSet};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -319,8 +319,13 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         contact.moved_at = age(rng);
         let lands = seed % 2 == 0;
         let stopped = rng.next_u32().is_multiple_of(3);
+        let place = near(rng, 14.0);
+        // What lands is above where it lands; anything else goes anywhere.
+        let end = place + if lands { Point::new(0.0, 0.0, -4.0) } else { near(rng, 3.0) };
+        let set = ReachableSet::along(place, [place, end].into_iter(), 10.0);
+        let mut legs = Legs::new();
         let reach = ReachQuery {
-            place: near(rng, 14.0),
+            own: &OwnSet::new(&set, &mut legs),
             within_m: 2.0 + uniform(rng, 0.0, 4.0),
             bounds: &bounds,
             ahead_s: if stopped { 3.0 } else { 0.0 },
@@ -328,7 +333,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             hears_nobody: rng.next_u32().is_multiple_of(4),
             lands,
         };
-        let mut met = table.for_filter(&table.contacts[1], now);
+        let contact = &table.contacts[1];
+        let mut met = table.for_filter(contact, contact.rests_silently(now - placed_at, now), now);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
         }
@@ -347,10 +353,10 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);
-        let away = met.motion.position - reach.place;
+        let away = reach.own.away_from_box(&met.motion.position);
         let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
-        let below = lands && silent && table.may_lie_below(1, &reach.place, -MAX_COLUMN_M, reach.within_m);
+        let below = lands && silent && table.may_lie_below(1, &place, -MAX_COLUMN_M, reach.within_m);
         if table.next_within(1, now, &reach).is_none() {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
