@@ -82,6 +82,11 @@ impl Handshake {
         waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.heartbeat_gap)
     }
 
+    /// Whether arming was not requested yet.
+    pub(crate) fn is_arming_unrequested(&self) -> bool {
+        self.requested_at.is_none()
+    }
+
     /// Whether arming is to be requested now; notes that it is.
     pub(crate) fn should_request_arming(&mut self, now: Instant, armed: bool) -> bool {
         let due = match self.requested_at {

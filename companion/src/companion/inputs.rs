@@ -124,6 +124,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
             armed_unseen: handshake.is_armed_bit_overdue(now),
+            arming_unrequested: handshake.is_arming_unrequested(),
             arming_unanswered: handshake.is_arming_unanswered(now),
             disarm_refused: handshake.is_disarm_refused(),
             own_mode: handshake.is_in_own_mode(),

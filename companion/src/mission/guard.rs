@@ -78,6 +78,8 @@ pub enum Guard {
     StaysDisarmedPaused,
     /// Arming was accepted, but the armed bit did not come.
     ArmedUnseen,
+    /// As [`Guard::ColumnBlocked`], and arming was not requested yet.
+    ArmingHeld,
     /// Arming was requested and not answered.
     ArmingUnanswered,
     /// Motors on, and off the ground or moving up or down.
@@ -258,6 +260,7 @@ impl Guard {
                 !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start && i.pause
             }
             Self::ArmedUnseen => i.armed_unseen,
+            Self::ArmingHeld => i.arming_unrequested && i.column_blocked_for.min(i.in_state) >= limit,
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
             Self::Unattended => i.airborne && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE,

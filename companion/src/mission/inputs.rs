@@ -91,6 +91,8 @@ pub struct GuardInputs {
     pub armed: bool,
     /// Arming was accepted, and the armed bit is overdue.
     pub armed_unseen: bool,
+    /// Arming was not requested yet.
+    pub arming_unrequested: bool,
     /// Arming was requested as often as allowed, and not answered.
     pub arming_unanswered: bool,
     /// Disarming was refused.

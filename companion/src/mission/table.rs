@@ -221,6 +221,7 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Engaging],            G::Offboard,        AT_ONCE,    Arming,      A::RequestArming,     "Setpoints followed: arming"),
     warning_row(&[Engaging],         G::Elapsed,         secs(5),    Aborted,     A::ForgetStart,       "Setpoint mode refused: mission aborted"),
     info_row(&[Arming],              G::Armed,           AT_ONCE,    TakeOff,     A::RequestTakeOff,    "Taking off"),
+    warning_row(&[Arming],           G::ArmingHeld,      COLUMN_BLOCKED_MOST, Scheduled, A::None,          "Vehicle above the pad: start waits"),
     warning_row(&[Arming],           G::ArmedUnseen,     AT_ONCE,    CancelStart, A::CancelStart,       "Disarmed by someone else: start cancelled"),
     warning_row(&[Arming],           G::ArmingUnanswered, AT_ONCE,   CancelStart, A::CancelStart,       "Arming not answered: start cancelled"),
     warning_row(&[Arming],           G::Elapsed,         secs(20),   CancelStart, A::CancelStart,       "Arming refused: mission aborted"),

@@ -187,6 +187,9 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
         G::StaysDisarmedPaused => (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true),
         G::ArmedUnseen => i.armed_unseen = true,
+        G::ArmingHeld => {
+            (i.arming_unrequested, i.column_blocked_for, i.in_state) = (true, long, long);
+        }
         G::ArmingUnanswered => i.arming_unanswered = true,
         G::InAir => i.airborne = true,
         G::Unattended => (i.airborne, i.offboard, i.own_mode) = (true, true, true),

@@ -149,9 +149,33 @@ pub(super) fn arming(scenes: &mut Scenes) {
     scenes.play(unanswered, nothing, Aborted, 9.0);
     scenes.play(arming_after(|b| b.never_arms = true), nothing, Aborted, 9.0);
     scenes.play(denied(), armed_late, Disarm, 6.0);
+    arming_held(scenes);
     let lifted_off = |b: &mut Bench| {
         armed_late(b);
         b.enu.z = 1.0;
     };
     scenes.play(denied(), lifted_off, Land, 2.0);
+}
+
+/// Another vehicle comes over the pad so late that the mode is entered first: arming is not requested, and the start waits again.
+fn arming_held(scenes: &mut Scenes) {
+    let comes_after = |b: &mut Bench, steps: u32| {
+        b.neighbour = on_pad(ON_PLAN);
+        b.until(Ready, 6.0);
+        b.start();
+        b.until(Engaging, 10.0);
+        b.run(0.05 * steps as f32);
+        b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
+    };
+    let is_held = |steps: &u32| {
+        let mut b = Bench::new(two_vehicles());
+        comes_after(&mut b, *steps);
+        let unasked = |b: &Bench| b.state() == Arming && b.commands.iter().all(|c| c.0 != 400);
+        (0..20).any(|_| {
+            b.run(0.05);
+            unasked(&b)
+        })
+    };
+    let steps = (0..40).find(is_held).unwrap();
+    scenes.play(Bench::new(two_vehicles()), |b| comes_after(b, steps), Scheduled, 2.0);
 }
