@@ -22,6 +22,8 @@ const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
 /// A gate nearer ahead than this leaves no path to fly on, metres.
 const MIN_GATE_AHEAD_M: f32 = 0.2;
+/// Longest time that a climb takes beyond its height at 1 m/s, seconds.
+const MAX_CLIMB_BEGINS_S: f32 = 8.0;
 /// Greatest vertical speed of a vehicle that rests on the ground, m/s.
 const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
@@ -204,7 +206,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether it may continue its plan although no other vehicle hears it.
-    fn may_fly_unheard(&self) -> bool {
+    pub(super) fn may_fly_unheard(&self) -> bool {
         let follows =
             matches!(self.mission.state(), State::TakeOff | State::Climb | State::Follow | State::Alone);
         let left = self.detours.is_blocked() || self.detours.has_left_plan() || self.detours.is_on_detour();
@@ -221,13 +223,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && (clear_m > self.guidance.along_m() + MIN_GATE_AHEAD_M || clear_m >= length_m)
     }
 
-    /// Distance that this vehicle flies on its plan while it is unheard, metres along its path, and
-    /// the seconds after which all gates up to there are open for sure; −1e6 where it flies no such
-    /// distance.
-    pub(super) fn unheard_reach_m(&self) -> (f32, u8) {
+    /// Place on its plan up to which this vehicle flies while it is unheard, metres along its path, and the seconds by which its
+    /// gates and its climb delay it beyond a flight at the assumed speed from `progress_m`; −1e6 where it does not fly on.
+    pub(super) fn unheard_reach_m(&self, progress_m: f32) -> (f32, u8) {
         match self.may_fly_unheard() {
             true => {
-                self.guidance.gates_open_up_to_soon_m(&self.detour_view().scene, &self.neighbours, self.now)
+                let scene = self.detour_view().scene;
+                let (clear_m, in_s) =
+                    self.guidance.gates_open_up_to_soon_m(&scene, &self.neighbours, progress_m, self.now);
+                // The motors idle at first, and the vehicle comes to rest at the top. A metre a second is slow.
+                let climb_s =
+                    if progress_m < 0.0 { MAX_CLIMB_BEGINS_S + libm::ceilf(-progress_m) } else { 0.0 };
+                (clear_m, in_s.max(climb_s as u8))
             }
             false => (-1e6, 0),
         }

@@ -232,6 +232,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Dividing
                     | Paused
             )
+            // One that waits unheard for its gates to open follows the plan, whenever it was heard last.
+            || self.mission.state() == Alone && self.may_fly_unheard()
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
                 && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
@@ -252,7 +254,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let near = points.len();
         self.add_unheard_points(&mut points);
         let beyond = (points.len() - near) as u8;
-        let (clear_m, clear_in_s) = self.unheard_reach_m();
+        let (clear_m, clear_in_s) = self.unheard_reach_m(along_m);
         Intent {
             system_id: self.config.system_id,
             flags,
@@ -261,7 +263,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             progress_m: if self.detours.is_on_detour() { self.detours.left_at_m() } else { along_m },
             heard_bits: self.neighbours.heard_bits(self.now),
             gates_open_up_to_m: clear_m,
-            gates_open_in_s: clear_in_s,
+            unheard_delay_s: clear_in_s,
             ground_m: plan.map_or(self.mission.path_start().z, |plan| self.guidance.ground_m(plan)),
             may_come_down: column,
             echo: self.neighbours.next_echo(self.links.intents_sent(), self.now),

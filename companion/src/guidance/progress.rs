@@ -11,33 +11,20 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-/// Longest time until a gate opens for which an unheard vehicle waits, seconds: less than the row
-/// `Alone` waits.
-const UNHEARD_GATE_WAIT_S: f32 = 14.0;
-
 impl Guidance {
-    /// Place along the plan's path up to which every gate is open, or will be within
-    /// [`UNHEARD_GATE_WAIT_S`], metres, and the seconds after which that is sure.
+    /// Place along the plan's path up to which an unheard vehicle flies, metres, and the seconds by which gates delay it
+    /// ([`Neighbours::unheard_reach`]).
     pub(crate) fn gates_open_up_to_soon_m<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
+        progress_m: f32,
         now: Instant,
     ) -> (f32, u8) {
-        let mut in_s = 0.0;
-        let gates = scene.plan.map_or(&[][..], |plan| &plan.gates);
-        let closed = gates.iter().skip(self.gates_open).find(|gate| {
-            match neighbours
-                .time_until_passed_s(gate, now)
-                .filter(|passes_s| *passes_s <= UNHEARD_GATE_WAIT_S)
-            {
-                Some(passes_s) => in_s = libm::fmaxf(in_s, passes_s),
-                None => return true,
-            }
-            false
-        });
-        let length_m = scene.plan.map_or(f32::NEG_INFINITY, |plan| plan.path.length_m());
-        (closed.map_or(length_m, |gate| gate.at_m.min(length_m)), libm::ceilf(in_s) as u8)
+        let Some(plan) = scene.plan else { return (f32::NEG_INFINITY, 0) };
+        let gates = plan.gates.get(self.gates_open..).unwrap_or_default();
+        let (closed_m, delay_s) = neighbours.unheard_reach(gates, progress_m, now);
+        (libm::fminf(closed_m, plan.path.length_m()), delay_s)
     }
 
     /// Place along the plan's path up to which every gate is open, metres; −∞ where the vehicle

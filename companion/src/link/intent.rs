@@ -4,7 +4,7 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 5 |
+//! | 0 | u8 | version, 6 |
 //! | 1 | u8 | system id |
 //! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
 //! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where no other vehicle hears it |
@@ -14,7 +14,7 @@
 //! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears no other vehicle; −1e6 where it may stop at once |
 //! | 20 | u32 | vehicles that it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
-//! | 28 | u8 | 1: it climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
+//! | 28 | u8 | 1: it climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; the upper seven bits: seconds by which those gates and its climb delay it, at most, beyond a flight at 0.4 of the nominal speed from that progress |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
 //! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where no other vehicle hears it |
 //!
@@ -30,7 +30,7 @@ pub const PAYLOAD_TYPE: u16 = 0xF10C;
 /// Most path points reported.
 pub const MAX_POINTS: usize = 8;
 /// Version of the message's layout.
-pub const VERSION: u8 = 5;
+pub const VERSION: u8 = 6;
 const HEADER_LEN: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
@@ -69,8 +69,8 @@ pub struct Intent {
     /// Place along the own path up to which the sender's gates are open, metres: the sender flies
     /// on to there even when it hears no vehicle.
     pub gates_open_up_to_m: f32,
-    /// Seconds until the last of those gates is open for sure, at most 127.
-    pub gates_open_in_s: u8,
+    /// Seconds by which gates and climb delay that flight, at most 127.
+    pub unheard_delay_s: u8,
     /// Whom it heard lately, a bit for each rank.
     pub heard_bits: u32,
     /// Height of the ground below it, as far as it knows, metres.
@@ -108,7 +108,7 @@ impl Intent {
         let [rank, sequence, held] =
             self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held]);
         body[28..32].copy_from_slice(&[
-            u8::from(self.may_come_down) | self.gates_open_in_s.min(127) << 1,
+            u8::from(self.may_come_down) | self.unheard_delay_s.min(127) << 1,
             rank,
             sequence,
             held,
@@ -150,7 +150,7 @@ impl Intent {
             heard_bits: u32::from_le_bytes(word(20)),
             ground_m: float(24)?,
             may_come_down: body[28] & 1 != 0,
-            gates_open_in_s: body[28] >> 1,
+            unheard_delay_s: body[28] >> 1,
             echo: body[29].checked_sub(1).map(|rank| IntentEcho { rank, sequence: body[30], held: body[31] }),
             points,
             first_unheard_point: beyond,
@@ -175,7 +175,7 @@ mod tests {
             heard_bits: 0x8000_0005,
             ground_m: -0.5,
             may_come_down: count == 3,
-            gates_open_in_s: 15 * count as u8,
+            unheard_delay_s: 15 * count as u8,
             echo: (count > 2).then_some(IntentEcho { rank: 254, sequence: 9, held: count as u8 }),
             points,
             first_unheard_point: count as u8 / 2,

@@ -9,6 +9,7 @@ mod contact;
 mod division;
 mod met;
 mod places;
+mod reach;
 pub(crate) mod relay;
 
 use heapless::Vec;
@@ -162,7 +163,7 @@ impl<const V: usize> Neighbours<V> {
             unheard_way_m: -1.0,
             may_come_down: false,
             gates_open_up_to_m: f32::NEG_INFINITY,
-            gates_open_in_s: 0,
+            unheard_delay_s: 0,
             at_range_edge: false,
             assumed_speed_mps: self.assumed_speed_mps,
             ground_m: f32::NAN,
@@ -315,7 +316,7 @@ impl<const V: usize> Neighbours<V> {
         contact.update_place_on_points();
         (contact.may_come_down, contact.ground_m) = (intent.may_come_down, intent.ground_m);
         contact.gates_open_up_to_m = if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };
-        contact.gates_open_in_s = intent.gates_open_in_s;
+        contact.unheard_delay_s = intent.unheard_delay_s;
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m =
             shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
@@ -357,14 +358,6 @@ impl<const V: usize> Neighbours<V> {
             let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
             passed || c.out_since.is_some_and(|since| since <= self.clear_at) || c.is_dead(self.clear_at)
         })
-    }
-
-    /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where that is unknown.
-    pub(crate) fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
-        if self.has_passed(gate, now) {
-            return Some(0.0);
-        }
-        self.contacts[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)
     }
 
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.

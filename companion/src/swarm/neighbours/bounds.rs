@@ -27,6 +27,8 @@ pub(super) const RANGE_EDGE_SHARE: f32 = 0.7;
 pub(super) const RECKONED_SPEED_SHARE: f32 = 0.4;
 /// Silence after which progress is reckoned at [`RECKONED_SPEED_SHARE`], seconds.
 pub(super) const RECKONED_AFTER_S: f32 = 2.0;
+/// Distance before a closed gate at which an unheard vehicle stands at most, metres.
+pub(super) const STANDS_SHORT_M: f32 = 0.5;
 /// Longest time for which a vehicle flies on unheard, seconds.
 pub(super) const MAX_UNHEARD_FLIGHT_S: f32 = 75.0;
 /// Time for which an unheard vehicle stands on its path before it lands.

@@ -64,8 +64,8 @@ pub(crate) struct NeighbourEntry {
     /// Place along its path up to which the vehicle's gates were open, or would be, metres: the
     /// vehicle flies on to there unheard.
     pub(super) gates_open_up_to_m: f32,
-    /// Seconds until the last of those is open.
-    pub(super) gates_open_in_s: u8,
+    /// Seconds by which that flight is delayed.
+    pub(super) unheard_delay_s: u8,
     /// Whether it was last heard where the radio may not reach.
     pub(super) at_range_edge: bool,
     /// Progress that an unheard vehicle makes at least, m/s.
@@ -138,7 +138,7 @@ impl NeighbourEntry {
         match self.state.progress_m.filter(|_| self.flies_plan_unheard()) {
             Some(progress_m) => {
                 let fly_s = (self.gates_open_up_to_m - progress_m) / self.assumed_speed_mps
-                    + f32::from(self.gates_open_in_s);
+                    + f32::from(self.unheard_delay_s);
                 fly_s.clamp(0.0, MAX_UNHEARD_FLIGHT_S)
             }
             None => 0.0,
@@ -158,7 +158,7 @@ impl NeighbourEntry {
     pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now)?;
         let Some(known_at) = self.intent_at.max(self.relayed_at) else { return Some(known_m) };
-        let after_s = RECKONED_AFTER_S + f32::from(self.gates_open_in_s);
+        let after_s = RECKONED_AFTER_S + f32::from(self.unheard_delay_s);
         let silent_s = (now - known_at).as_secs_f32() - after_s;
         let beyond = self.at_range_edge || self.position_at.is_none();
         if silent_s <= 0.0 || !beyond || self.reports(ON_DETOUR | OUT_OF_PLAN) {
@@ -173,7 +173,7 @@ impl NeighbourEntry {
         let known_m = self.progress_m(now).filter(|_| !self.reports(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.intent_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.assumed_speed_mps;
-        let after_s = RECKONED_AFTER_S + f32::from(self.gates_open_in_s) - (now - known_at).as_secs_f32();
+        let after_s = RECKONED_AFTER_S + f32::from(self.unheard_delay_s) - (now - known_at).as_secs_f32();
         (until_m <= self.gates_open_up_to_m - PROGRESS_ERROR_M).then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 

@@ -6,21 +6,21 @@
 //! follow the shared plan a moment ago, is neither lost nor somewhere about: gates keep it apart. What a vehicle itself
 //! reports goes before what others say of it.
 //!
-//! The payload of TUNNEL under a private payload type, little-endian, at most 126 bytes:
+//! The payload of TUNNEL under a private payload type, little-endian, at most 122 bytes:
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 2 |
+//! | 0 | u8 | version, 3 |
 //! | 1 | u8 | system id, the sender's |
-//! | 2 | u8 | number n of vehicles, 0…14 |
+//! | 2 | u8 | number n of vehicles, 0…10 |
 //! | 3 | u8 | 0 |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
-//! | 12 + 8 i | u8 | rank in the roster sorted by system id |
-//! | 13 + 8 i | u8 | how old that is, 0.1 s; 255: so old or older |
-//! | 14 + 8 i | f32 | its progress on the plan, metres |
-//! | 18 + 8 i | u8 | how much further its gates are open, or will be, metres rounded down; 255: so far or further |
-//! | 19 + 8 i | u8 | seconds until the last of those is open for sure |
+//! | 12 + 11 i | u8 | rank in the roster sorted by system id |
+//! | 13 + 11 i | u8 | how old that is, 0.1 s; 255: so old or older |
+//! | 14 + 11 i | f32 | its progress on the plan, metres |
+//! | 18 + 11 i | f32 | place up to which its gates are open, or will be, metres: exactly as it reported it, since gates stand there |
+//! | 22 + 11 i | u8 | seconds by which that delays its flight |
 
 use heapless::Vec;
 
@@ -31,11 +31,11 @@ use crate::time::{Duration, Instant};
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
 /// Most vehicles reported in one message.
-const MAX_RELAYED: usize = 14;
-const VERSION: u8 = 2;
+const MAX_RELAYED: usize = 10;
+const VERSION: u8 = 3;
 const TUNNEL_HEAD: usize = 5;
 const HEADER_LEN: usize = 12;
-const ITEM_LEN: usize = 8;
+const ITEM_LEN: usize = 11;
 /// Longest TUNNEL payload, bytes.
 pub(crate) const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
 /// Age within which a vehicle's own messages replace relayed ones.
@@ -47,6 +47,8 @@ const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
 const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
 /// Age that each hop adds, microseconds: longer than most messages take.
 const HOP_AGE_US: u64 = 500_000;
+/// Delay that each hop adds to that of the flight, seconds: a progress is not as old as its age says.
+const HOP_DELAY_S: u8 = 1;
 /// Unit of an age in the message, microseconds.
 const AGE_TICK_US: u64 = 100_000;
 
@@ -56,8 +58,8 @@ struct RelayedProgress {
     rank: u8,
     age: u8,
     progress_m: f32,
-    clear: u8,
-    clear_in_s: u8,
+    gates_open_up_to_m: f32,
+    unheard_delay_s: u8,
 }
 
 /// Relayed reports of a vehicle.
@@ -85,7 +87,8 @@ impl Relay {
         for (to, item) in body[HEADER_LEN..].chunks_exact_mut(ITEM_LEN).zip(&self.items) {
             (to[0], to[1]) = (item.rank, item.age);
             to[2..6].copy_from_slice(&item.progress_m.to_le_bytes());
-            (to[6], to[7]) = (item.clear, item.clear_in_s);
+            to[6..10].copy_from_slice(&item.gates_open_up_to_m.to_le_bytes());
+            to[10] = item.unheard_delay_s;
         }
         TUNNEL_HEAD + len
     }
@@ -100,11 +103,17 @@ impl Relay {
         let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
         let mut relay = Self { mission_crc: word(4), plan_crc: word(8), items: Vec::new() };
         for item in body[HEADER_LEN..].get(..ITEM_LEN * usize::from(body[2]))?.chunks_exact(ITEM_LEN) {
-            let progress_m = f32::from_le_bytes([item[2], item[3], item[4], item[5]]);
-            let [rank, age, .., clear, clear_in_s] = *item else { return None };
-            let item = RelayedProgress { rank, age, progress_m, clear, clear_in_s };
+            let float = |at: usize| f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]]);
+            let item = RelayedProgress {
+                rank: item[0],
+                age: item[1],
+                progress_m: float(2),
+                gates_open_up_to_m: float(6),
+                unheard_delay_s: item[10],
+            };
             // Room for all that fits into a payload.
-            relay.items.push(item).ok().filter(|()| progress_m.is_finite())?;
+            let finite = item.progress_m.is_finite() && item.gates_open_up_to_m.is_finite();
+            relay.items.push(item).ok().filter(|()| finite)?;
         }
         Some(relay)
     }
@@ -138,15 +147,13 @@ impl NeighbourEntry {
     fn relayed_progress(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.progress_m(now)?;
         let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
-        // The difference is not below zero, and 0 where it is no number.
-        let clear = (self.gates_open_up_to_m - progress_m) as u8;
         let age = age.min(u64::from(u8::MAX)) as u8;
         Some(RelayedProgress {
             rank: self.rank as u8,
             age,
             progress_m,
-            clear,
-            clear_in_s: self.gates_open_in_s,
+            gates_open_up_to_m: libm::fmaxf(self.gates_open_up_to_m, progress_m),
+            unheard_delay_s: self.unheard_delay_s,
         })
     }
 }
@@ -187,16 +194,15 @@ impl<const V: usize> Neighbours<V> {
                 continue;
             }
             let known_m = contact.relayed_m.unwrap_or(f32::NEG_INFINITY);
-            if item.progress_m > known_m {
+            let newest_m = libm::fmaxf(known_m, contact.state.progress_m.unwrap_or(f32::NEG_INFINITY));
+            if item.progress_m > newest_m {
                 // Progress that others report of a vehicle is believed no faster than progress that
                 // the vehicle reports itself.
                 let believed_m = contact.plausible_progress_m(item.progress_m, fastest_mps, now);
                 contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
-                // Gates that are open stay open.
-                let clear_m = believed_m + f32::from(item.clear);
-                if clear_m > contact.gates_open_up_to_m {
-                    (contact.gates_open_up_to_m, contact.gates_open_in_s) = (clear_m, item.clear_in_s);
-                }
+                // Both belong to this progress.
+                contact.gates_open_up_to_m = item.gates_open_up_to_m;
+                contact.unheard_delay_s = item.unheard_delay_s.saturating_add(HOP_DELAY_S);
             }
             let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US;
             let then = Instant::from_micros(now.as_micros().saturating_sub(age_us));

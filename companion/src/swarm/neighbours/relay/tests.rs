@@ -31,8 +31,8 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
             rank,
             age: 9 * rank,
             progress_m: 0.5 * f32::from(rank) - 3.0,
-            clear: 5 * rank,
-            clear_in_s: rank,
+            gates_open_up_to_m: 1.25 * f32::from(rank) - 3.0,
+            unheard_delay_s: rank,
         };
         let items = (0..count).map(item).collect();
         let relay = Relay { mission_crc: 1, plan_crc: 2, items };
@@ -44,9 +44,16 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
             assert_eq!(Relay::decode(&bad, 5), None, "byte {at}");
         }
     }
-    let nan = RelayedProgress { rank: 0, age: 0, progress_m: f32::NAN, clear: 0, clear_in_s: 0 };
-    let relay = Relay { mission_crc: 1, plan_crc: 2, items: [nan].into_iter().collect() };
-    assert_eq!(Relay::decode(&padded(&relay), 5), None);
+    let sound =
+        RelayedProgress { rank: 0, age: 0, progress_m: 1.0, gates_open_up_to_m: 2.0, unheard_delay_s: 0 };
+    for item in [
+        RelayedProgress { progress_m: f32::NAN, ..sound },
+        RelayedProgress { gates_open_up_to_m: f32::NAN, ..sound },
+        RelayedProgress { gates_open_up_to_m: f32::INFINITY, ..sound },
+    ] {
+        let relay = Relay { mission_crc: 1, plan_crc: 2, items: [sound, item].into_iter().collect() };
+        assert_eq!(Relay::decode(&padded(&relay), 5), None);
+    }
 }
 
 /// A swarm in a row, each of which hears only its next; the progress of each grows with time.
@@ -175,4 +182,29 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
         }
         assert!(far_to_others, "another was out of its range all the while");
     }
+}
+
+/// How far it flies and with what delay belong to the progress that they came with: an older report changes none of them.
+#[test]
+fn the_delay_of_a_flight_goes_with_its_progress() {
+    let roster = [1, 2, 3].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
+    let mut table = Neighbours::<8>::new(&roster, 3, 2.0);
+    let (first, second) = (Instant::from_millis(1000), Instant::from_millis(1100));
+    let by =
+        Intent { system_id: 2, flags: ON_PLAN, mission_crc: MISSION, plan_crc: PLAN, ..Intent::default() };
+    table.handle_intent(first, 2, &by, MISSION, Some(PLAN));
+    let report = |progress_m, unheard_delay_s| {
+        let item = RelayedProgress { rank: 0, age: 0, progress_m, gates_open_up_to_m: 20.0, unheard_delay_s };
+        Relay { mission_crc: MISSION, plan_crc: PLAN, items: [item].into_iter().collect() }
+    };
+    table.handle_relay(first, 2, &report(5.0, 0));
+    table.handle_relay(second, 2, &report(7.0, 10));
+    table.handle_relay(second, 2, &report(6.0, 0));
+    let believed_m = |after_s: u64, table: &mut Neighbours<8>| {
+        let state =
+            table.states_at(second + Duration::from_secs(after_s)).iter().find(|n| n.id == 1).copied();
+        state.and_then(|n| n.progress_m).unwrap()
+    };
+    assert_eq!(believed_m(12, &mut table), 7.0);
+    assert!(believed_m(16, &mut table) > 8.0);
 }

@@ -1,0 +1,45 @@
+//! How far a vehicle flies on unheard, and when it comes there.
+//!
+//! It tells the others a line: from its progress on it flies at least at the assumed speed, but for so many seconds of delay, as
+//! far as its gates are open or will be. Not the time counts at which the last gate opens, but how much later the vehicle leaves
+//! a gate than one that flies along that line comes there: a gate far ahead that opens soon delays nothing. So a vehicle that
+//! waits for one that itself waits learns how far that one comes meanwhile, and so on along a row of them.
+
+use planner_core::flight::Gate;
+
+use super::Neighbours;
+use super::bounds::STANDS_SHORT_M;
+use crate::time::Instant;
+
+/// Longest time for which an unheard vehicle waits before a gate, seconds: less than the row `Alone` waits.
+const UNHEARD_GATE_WAIT_S: f32 = 14.0;
+
+impl<const V: usize> Neighbours<V> {
+    /// Place of the first of these gates before which an unheard vehicle would wait too long, metres, infinite if there is
+    /// none, and the seconds by which those before it delay a flight at the assumed speed from `progress_m`.
+    pub(crate) fn unheard_reach(&self, gates: &[Gate], progress_m: f32, now: Instant) -> (f32, u8) {
+        let mut delay_s = 0.0;
+        let closed = gates.iter().find(|gate| {
+            let Some(opens_s) = self.time_until_passed_s(gate, now) else { return true };
+            let ahead_m = gate.at_m - progress_m;
+            let waits = opens_s - ahead_m / self.fastest_mps > UNHEARD_GATE_WAIT_S;
+            if !waits {
+                let late_s = opens_s - (ahead_m - STANDS_SHORT_M) / self.assumed_speed_mps;
+                delay_s = libm::fmaxf(delay_s, late_s);
+            }
+            waits
+        });
+        (closed.map_or(f32::INFINITY, |gate| gate.at_m), libm::ceilf(delay_s) as u8)
+    }
+
+    /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where that is unknown.
+    fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
+        if self.has_passed(gate, now) {
+            return Some(0.0);
+        }
+        self.contacts[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)
+    }
+}
+
+#[cfg(test)]
+mod tests;
