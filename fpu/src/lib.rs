@@ -1,7 +1,7 @@
-//! The square root of an `f32` by the FPU of a Cortex-M.
+//! The square root of an `f32` by the FPU of a Cortex-M4F or M7.
 //!
 //! `core` has no square root, and `libm` has an instruction for it on x86, Arm64 and wasm, but takes some fifty
-//! instructions on 32-bit Arm, where `vsqrt.f32` does the same. Both are rounded to the nearest `f32`
+//! instructions on 32-bit Arm, where `vsqrt.f32` does the same. Elsewhere, on an Armv8-M too, it is `libm`'s. Both are rounded to the nearest `f32`
 //! (IEEE 754-2019, 5.4.1), so a board and a desk compute the same bits.
 #![no_std]
 
@@ -13,8 +13,7 @@
 /// ```
 #[inline(always)]
 pub fn sqrtf(square: f32) -> f32 {
-    // The hard-float calling convention: there is an FPU.
-    #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+    #[cfg(has_vfp2)]
     #[expect(unsafe_code)]
     {
         let root;
@@ -29,6 +28,6 @@ pub fn sqrtf(square: f32) -> f32 {
         }
         root
     }
-    #[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
+    #[cfg(not(has_vfp2))]
     libm::sqrtf(square)
 }
