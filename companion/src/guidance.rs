@@ -12,6 +12,7 @@ mod fence;
 pub(crate) mod filter;
 mod follower;
 mod hold;
+mod known_way;
 mod lag;
 pub(crate) mod limits;
 mod motion;
@@ -157,8 +158,8 @@ pub struct Guidance {
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
-    /// Place along the path that others at least heard of, metres; ∞ where no vehicle has heard of any.
-    heard_by_others_m: f32,
+    /// What others know of its way.
+    known_way: known_way::KnownWay,
     evade_search: EvadeSearch,
     /// Whether it keeps out from under a vehicle that comes down.
     pub evading: bool,
@@ -219,7 +220,7 @@ impl Guidance {
             followed_place: Point::zeros(),
             reported_m: f32::NEG_INFINITY,
             returning: false,
-            heard_by_others_m: f32::INFINITY,
+            known_way: known_way::KnownWay::of_new_path(Instant::ZERO),
             evade_search: EvadeSearch::default(),
             evading: false,
             wait_distance_m: f32::INFINITY,
@@ -247,9 +248,8 @@ impl Guidance {
         self.phase = Phase::Hold;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
-        self.on_path = false;
-        self.returning = false;
-        self.ends_aside = false;
+        (self.on_path, self.returning, self.ends_aside) = (false, false, false);
+        self.known_way = known_way::KnownWay::of_new_path(Instant::ZERO);
         self.reported_m = f32::NEG_INFINITY;
         self.advice = NO_ADVICE_YET;
         self.gates_open = 0;

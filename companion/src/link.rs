@@ -206,10 +206,11 @@ impl Links {
         self.outboxes[link as usize].next_header(system)
     }
 
-    /// The header of an intent: its number is remembered, so that an echo of it shows how late messages are.
-    pub(crate) fn intent_header(&mut self, system: u8, now: Instant) -> Header {
+    /// The header of an intent whose points lead to `ends_m` along the path: its number is remembered, so that an echo of it
+    /// shows how late messages are, and what others know.
+    pub(crate) fn intent_header(&mut self, system: u8, ends_m: f32, now: Instant) -> Header {
         let header = self.next_header(Link::Swarm, system);
-        self.sent.note_sent(header.sequence, now);
+        self.sent.note_sent(header.sequence, ends_m, now);
         header
     }
 
@@ -221,6 +222,11 @@ impl Links {
     /// Time that a message takes one way, seconds, by an echo of an own intent.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
         self.sent.message_delay_s(echo, now)
+    }
+
+    /// What is known of the own intents that arrived.
+    pub(crate) fn sent_intents(&mut self) -> &mut SentIntents {
+        &mut self.sent
     }
 
     /// Writes the first message that waits on a link; 0 if none does.

@@ -138,6 +138,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
             let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
+            if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().arrived(&echo)) {
+                self.guidance.note_reported_way(sent.at, sent.ends_m);
+            }
             if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
                 late.update(delay_s);
             }

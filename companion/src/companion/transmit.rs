@@ -47,7 +47,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Intent) {
             let mut payload = [0; 133];
             let len = self.own_intent().encode(&mut payload);
-            let header = self.links.intent_header(system, self.now);
+            let header = self.links.intent_header(system, self.reported_ends_m(), self.now);
             if self.guidance.hold.is_on() {
                 self.guidance.hold.note_reported(self.now);
             }
@@ -301,6 +301,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let from_m = self.guidance.setpoint_m.max(0.0);
         let most_m = if fleet.takes_part() { from_m + lease_m } else { f32::INFINITY };
         Some(most_m.min(plan.path.length_m()))
+    }
+
+    /// Place along its path to which the points lead that it reports, metres.
+    fn reported_ends_m(&self) -> f32 {
+        let from_m = self.guidance.setpoint_m;
+        let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_on();
+        let Some(plan) = self.mission.plan().filter(|_| flies) else { return from_m };
+        // With the setpoint as many as there is room for.
+        let last = plan.path.waypoints().iter().filter(|w| w.along_m > from_m).nth(intent::MAX_POINTS - 2);
+        self.guidance.stops_at_m.max(from_m).min(last.map_or(f32::INFINITY, |last| last.along_m))
     }
 
     /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.

@@ -17,7 +17,17 @@ const LINKED_WITHIN: Duration = Duration::from_millis(800);
 /// metres.
 const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
 
+/// Distance beyond the way that others know of for which a vehicle does not fly back, metres.
+const BEYOND_KNOWN_M: f32 = 0.3;
+
 impl Guidance {
+    /// An intent of `sent_at` has arrived, whose points lead to `ends_m` along the path.
+    pub(crate) fn note_reported_way(&mut self, sent_at: Instant, ends_m: f32) {
+        if sent_at > self.known_way.since {
+            self.known_way.to_m = ends_m;
+        }
+    }
+
     /// Stops the setpoint where it is: the state that follows does not go.
     pub fn begin_braking(&mut self) {
         self.evade_search.reset();
@@ -37,7 +47,7 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.linked_within(now, LINKED_WITHIN) {
-            self.heard_by_others_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
+            self.known_way.from_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let alone = state == State::Alone;
         // On its way down it continues, and on its way aside.
@@ -46,9 +56,11 @@ impl Guidance {
             State::Follow | State::Blocked | State::Replanning | State::Dividing | State::Alone
         ) && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_aside && state == State::Follow);
-        let wait_m = along_m + advice.stop_within_m.max(0.0);
+        let lands_m = along_m.min(self.expected_up_to_m(alone, neighbours));
+        let beyond = alone && along_m > lands_m + BEYOND_KNOWN_M;
+        let wait_m = if alone { lands_m } else { along_m + advice.stop_within_m.max(0.0) };
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
-        let waits_there = waits && advice.stop_within_m < WAIT_WITHIN_M;
+        let waits_there = waits && (alone || advice.stop_within_m < WAIT_WITHIN_M);
         if waits_there {
             self.evade_search.continue_search(path, wait_m, neighbours.len(), |i, tell| {
                 if alone {
@@ -65,8 +77,8 @@ impl Guidance {
             EvadeTarget::Back(to_m) => (Some(to_m.min(wait_m)), false),
             EvadeTarget::Nowhere => (None, !alone),
         };
-        let linked_m = self.heard_by_others_m;
-        let to_m = to_m.filter(|to_m| !alone || *to_m >= linked_m);
+        let from_m = self.known_way.from_m;
+        let to_m = to_m.filter(|to_m| !alone || *to_m >= from_m).or(beyond.then_some(lands_m));
         self.evading = to_m.is_some();
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);
@@ -74,6 +86,13 @@ impl Guidance {
         self.wait_distance_m = advice.stop_within_m;
         self.back_to_m = to_m.filter(|to_m| *to_m < along_m);
         self.no_better_place = nowhere;
+    }
+
+    /// Place along its path up to which others look for it once it is `alone`, metres. Gates that opened since may have led it further
+    /// than it could tell. Over an area, and where the range is known, they expect it further on.
+    fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
+        let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
+        if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
     }
 
     /// After the raw points of a step; `blocked` if one of them could not go back.

@@ -1,5 +1,6 @@
 //! What guidance is ordered: to begin the path, to continue, to turn back, to settle where it stands.
 
+use super::known_way::KnownWay;
 use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
@@ -15,7 +16,7 @@ impl Guidance {
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
         self.evade_search.reset();
-        self.heard_by_others_m = f32::INFINITY;
+        self.known_way.from_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
         self.progress_at = now;
     }
@@ -30,6 +31,7 @@ impl Guidance {
         self.guides_landing = false;
         self.reported_m = f32::NEG_INFINITY;
         self.gates_open = 0;
+        self.known_way = KnownWay::of_new_path(now);
         // A hindrance on the other path does not count on this one.
         self.filter.reset();
         self.start_following(now);

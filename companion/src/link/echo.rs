@@ -39,16 +39,26 @@ impl IntentEcho {
     }
 }
 
-/// The own intents sent last: number and time, a ring.
+/// An own intent: its number, when it was sent, and the place along the path to which its points led, metres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SentIntent {
+    sequence: u8,
+    pub(crate) at: Instant,
+    pub(crate) ends_m: f32,
+}
+
+/// The own intents sent last, a ring.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SentIntents {
-    ring: [Option<(u8, Instant)>; MAX_SENT_INTENTS],
+    ring: [Option<SentIntent>; MAX_SENT_INTENTS],
     count: usize,
+    /// When the last one was sent that is known to have arrived.
+    arrived: Instant,
 }
 
 impl SentIntents {
-    pub(crate) fn note_sent(&mut self, sequence: u8, now: Instant) {
-        self.ring[self.count % MAX_SENT_INTENTS] = Some((sequence, now));
+    pub(crate) fn note_sent(&mut self, sequence: u8, ends_m: f32, now: Instant) {
+        self.ring[self.count % MAX_SENT_INTENTS] = Some(SentIntent { sequence, at: now, ends_m });
         self.count = self.count.wrapping_add(1);
     }
 
@@ -57,10 +67,21 @@ impl SentIntents {
         self.count
     }
 
+    fn find(&self, echo: &IntentEcho) -> Option<SentIntent> {
+        self.ring.iter().flatten().find(|sent| sent.sequence == echo.sequence).copied()
+    }
+
+    /// The own intent that an echo shows to have arrived; `None` for an echo that was overtaken.
+    pub(crate) fn arrived(&mut self, echo: &IntentEcho) -> Option<SentIntent> {
+        let sent = self.find(echo).filter(|sent| sent.at > self.arrived)?;
+        self.arrived = sent.at;
+        Some(sent)
+    }
+
     /// Time that a message takes one way, seconds, by an echo of an own intent.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
-        let (_, sent) = self.ring.iter().flatten().find(|(sequence, _)| *sequence == echo.sequence)?;
-        let round_s = (now - *sent).as_secs_f32() - f32::from(echo.held) * HELD_TICK.as_secs_f32();
+        let round_s =
+            (now - self.find(echo)?.at).as_secs_f32() - f32::from(echo.held) * HELD_TICK.as_secs_f32();
         Some((0.5 * round_s).clamp(0.0, MAX_DELAY_S))
     }
 }
@@ -101,7 +122,7 @@ mod tests {
             let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
             for (i, way) in ways.iter().enumerate() {
                 let now = Instant::from_millis(i as u64 * 200);
-                sent.note_sent(i as u8, now);
+                sent.note_sent(i as u8, 0.0, now);
                 let echo = IntentEcho::new(3, i as u8, Duration::from_millis(held)).unwrap();
                 let back = now + Duration::from_millis(2 * way + held);
                 let delay_s = sent.message_delay_s(&echo, back).unwrap();
@@ -115,7 +136,7 @@ mod tests {
         fn wrong_echoes_stay_bounded(echoes in proptest::collection::vec((any::<u8>(), 0..255_u8, 0..60_000_u64), 1..50)) {
             let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
             for i in 0..20 {
-                sent.note_sent(i, Instant::from_millis(u64::from(i) * 200));
+                sent.note_sent(i, 0.0, Instant::from_millis(u64::from(i) * 200));
             }
             for (sequence, held, at_ms) in echoes {
                 let echo = IntentEcho { rank: 0, sequence, held };
@@ -125,6 +146,19 @@ mod tests {
                 prop_assert!((0.0..=MAX_DELAY_S).contains(&late.delay_s));
             }
         }
+    }
+
+    #[test]
+    fn the_newest_intent_that_arrived_says_where_its_points_led() {
+        let mut sent = SentIntents::default();
+        let at = |i: u8| Instant::from_millis(1000 + u64::from(i) * 200);
+        (0..8).for_each(|i| sent.note_sent(i, f32::from(i), at(i)));
+        let echo = |sequence| IntentEcho { rank: 0, sequence, held: 0 };
+        let mut arrived = |sequence| sent.arrived(&echo(sequence)).map(|sent| (sent.at, sent.ends_m));
+        assert_eq!(arrived(3), Some((at(3), 3.0)));
+        assert_eq!(arrived(2), None, "overtaken");
+        assert_eq!(arrived(99), None, "never sent");
+        assert_eq!(arrived(7), Some((at(7), 7.0)));
     }
 
     #[test]

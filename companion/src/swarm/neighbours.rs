@@ -109,13 +109,18 @@ impl<const V: usize> Neighbours<V> {
         self.place = place;
     }
 
+    /// Whether it is known how far the radio reaches.
+    pub(crate) fn knows_range(&self) -> bool {
+        self.range_edge_m.is_finite()
+    }
+
     /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the radio may not reach: no
     /// radio has failed.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports(LANDED | OUT_OF_PLAN)
         };
-        self.range_edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
+        self.knows_range() && self.contacts[..self.roster].iter().all(beyond)
     }
 
     /// Rank of this vehicle in the roster.

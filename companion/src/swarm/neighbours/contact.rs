@@ -347,9 +347,8 @@ impl NeighbourEntry {
                 let along_m = step as f32 * step_m;
                 tell(at + (next - at) * (along_m / leg_m), wider_m);
             }
-            if flown_m >= leg_m {
-                tell(next, wider_m);
-            }
+            // The end too: it may have come as far.
+            tell(if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next }, wider_m);
         });
     }
 

@@ -4,9 +4,7 @@ use planner_core::Point;
 use planner_core::detour::{KeepOutZone, ZoneKind};
 
 use super::contact::{AreaGround, NeighbourEntry};
-use super::{
-    LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M,
-};
+use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, VAGUE_POSITION_M};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
@@ -136,9 +134,7 @@ impl<const V: usize> Neighbours<V> {
             below |= (away - leg * share).norm_squared() < apart_m * apart_m && high_m > floor_m - apart_m;
         };
         contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
-            // Elsewhere than over an area to the last of the places that a reroute keeps off.
-            let share = libm::floorf(flown_m / UNHEARD_STRETCH_STEP_M) * UNHEARD_STRETCH_STEP_M / leg_m;
-            near(at, if flown_m < leg_m { at + (next - at) * share } else { next });
+            near(at, if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next });
         });
         below
     }

@@ -1,6 +1,9 @@
+extern crate std;
+
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use super::super::UNHEARD_STRETCH_STEP_M;
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
@@ -64,4 +67,39 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         *(if free { &mut far } else { &mut near }) += 1;
     }
     assert!(far > 1000 && near > 10, "{far} {near}");
+}
+
+/// Wherever on the stretch a vehicle is that fell silent, a place that is kept off is half a spacing away at most: to its end, and
+/// around its corners.
+#[test]
+fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
+    let mut rng = Pcg32::seed_from_u64(15);
+    let mut at_the_end = 0;
+    for case in 0..5000 {
+        let mut table = joined(0);
+        let contact = &mut table.contacts[1];
+        contact.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
+        let mut at = contact.state.position;
+        contact.points = (0..1 + rng.next_u32() % 8)
+            .map(|_| {
+                at += Point::from_fn(|_, _| uniform(&mut rng, -4.0, 4.0));
+                at
+            })
+            .collect();
+        let upto_m = contact.unheard_stop_m();
+        let mut places = std::vec::Vec::new();
+        contact.for_each_place(upto_m, &mut |place, _| places.push(place));
+        let flown_m = upto_m * uniform(&mut rng, 0.0, 1.2).min(1.0);
+        let (mut left_m, mut from) = (flown_m, contact.state.position);
+        for next in &contact.points {
+            let leg: Point = next - from;
+            let share = (left_m / leg.norm()).min(1.0);
+            from += leg * share;
+            left_m -= leg.norm() * share;
+        }
+        at_the_end += usize::from(flown_m >= upto_m && left_m <= 0.0);
+        let nearest_m = places.iter().map(|place| (place - from).norm()).fold(f32::INFINITY, f32::min);
+        assert!(nearest_m <= 0.5 * UNHEARD_STRETCH_STEP_M + 0.01, "{case}: {nearest_m} m beside {places:?}");
+    }
+    assert!(at_the_end > 300, "{at_the_end}");
 }
