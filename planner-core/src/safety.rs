@@ -117,14 +117,6 @@ impl ReachableSet {
         set
     }
 
-    /// Greatest distance of the set from its first point, metres.
-    #[cfg(test)]
-    fn reach_m(&self) -> f32 {
-        let here = self.points[0];
-        let most_sq = self.points.iter().fold(0.0_f32, |most, p| most.max((p - here).norm_squared()));
-        sqrtf(most_sq) + self.widened_by_m
-    }
-
     /// Adds the column below the first point, down to a height.
     fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];

@@ -13,6 +13,14 @@ const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
 /// As in the definition.
 const NEARER_M: f32 = 0.003;
 
+impl ReachableSet {
+    /// Greatest distance of the set from its first point, metres.
+    pub(super) fn reach_m(&self) -> f32 {
+        let most_m = |most: f32, p: &Point| most.max((p - self.points[0]).norm());
+        self.points.iter().fold(0.0, most_m) + self.widened_by_m
+    }
+}
+
 fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
     low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0
 }
