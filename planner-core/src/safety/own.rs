@@ -142,7 +142,7 @@ impl<'a> OwnSet<'a> {
             return true;
         }
         let here = &self.set.points[0];
-        // As near as this it is already: where the motion leads no nearer, one leg tells.
+        // A motion leads no nearer where the vehicle is as near to one leg already.
         let here_m = sqrtf(motion_sq) + APPROACH_ROUNDING_M;
         let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
         if here_m < most_m && !other.segments().any(is_here) {

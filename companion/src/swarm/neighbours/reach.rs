@@ -1,9 +1,9 @@
 //! How far a vehicle flies on unheard, and when it comes there.
 //!
-//! It tells the others a line: from its progress on it flies at least at the assumed speed, but for so many seconds of delay, as
-//! far as its gates are open or will be. Not the time counts at which the last gate opens, but how much later the vehicle leaves
-//! a gate than one that flies along that line comes there: a gate far ahead that opens soon delays nothing. So a vehicle that
-//! waits for one that itself waits learns how far that one comes meanwhile, and so on along a row of them.
+//! A vehicle reports a lower bound of its later progress: from its progress now it flies at least at the assumed speed, after a
+//! delay of some seconds, as far as its gates are open or will be. A gate adds to the delay only by how much later the vehicle
+//! leaves it than that bound passes it: a gate far ahead that opens soon adds nothing. So a vehicle that waits for one that itself
+//! waits knows how far that one flies meanwhile, and so on along a row of them.
 
 use planner_core::flight::Gate;
 

@@ -320,7 +320,6 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let lands = seed % 2 == 0;
         let stopped = rng.next_u32().is_multiple_of(3);
         let place = near(rng, 14.0);
-        // What lands is above where it lands; anything else goes anywhere.
         let end = place + if lands { Point::new(0.0, 0.0, -4.0) } else { near(rng, 3.0) };
         let set = ReachableSet::along(place, [place, end].into_iter(), 10.0);
         let mut legs = Legs::new();
@@ -333,8 +332,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             hears_nobody: rng.next_u32().is_multiple_of(4),
             lands,
         };
-        let contact = &table.contacts[1];
-        let mut met = table.for_filter(contact, contact.rests_silently(now - placed_at, now), now);
+        let dead = table.contacts[1].rests_silently(now - placed_at, now);
+        let mut met = table.for_filter(&table.contacts[1], dead, now);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
         }
