@@ -56,3 +56,17 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
         }
     }
 }
+
+/// Three meetings of the seeds 101 to 400 that came too near beside a silent vehicle on the ground: it lay at the end of the stretch that
+/// others keep off (123, 160), or where gates that opened had led it since it was heard last (360).
+#[test]
+fn a_vehicle_that_only_hears_lies_where_others_look_for_it() {
+    for seed in ["123", "160", "360"] {
+        let case = ["--only", "radio only hears", "--method", "priority", "--seeds", "1", "--first", seed];
+        let rows = suite(&case);
+        assert_eq!(rows.len(), 1, "{rows:?}");
+        for count in ["violations", "wall_contacts", "deadlocks"] {
+            assert_eq!(rows[0][count], 0, "seed {seed}: {}", rows[0]);
+        }
+    }
+}
