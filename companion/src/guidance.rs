@@ -27,10 +27,10 @@ mod setpoint;
 mod smoother;
 mod waypoints;
 
-use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, OwnVehicle};
 use planner_core::flight::Path;
 use planner_core::track::{TrackConfig, Tracker};
+use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
 use self::hold::Hold;
@@ -420,7 +420,7 @@ impl Guidance {
                 _ if matches!(state, State::Streaming | State::Engaging | State::Arming) && known => {
                     let away = position - self.smoother.raw_point();
                     let most = MAX_PAD_DRIFT_MPS * TICK_S;
-                    let share = most / away.norm().max(most);
+                    let share = most / away.length().max(most);
                     self.smoother.raw_point() + away * share
                 }
                 Some(plan) if sends && !self.raw_point_at_rest => self.next_braked_raw_point(&plan.path),
@@ -437,7 +437,7 @@ impl Guidance {
         };
         let change = self.smoother.acceleration() + correction - self.sent_acceleration;
         let most = self.smoother.jerk_mps3(urgent) * dt_s;
-        self.sent_acceleration += change * (most / change.norm().max(most).max(1e-6));
+        self.sent_acceleration += change * (most / change.length().max(most).max(1e-6));
         if self.tracker.along_m > self.progress_m + MIN_PROGRESS_M {
             self.progress_m = self.tracker.along_m;
             self.progress_at = now;

@@ -9,7 +9,7 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use crate::flight::{Gate, Path};
-use crate::{ConfigError, Point, all_positive};
+use crate::{ConfigError, Length, Point, all_positive};
 
 /// Rule by which vehicles keep apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,7 +141,7 @@ fn advise_by_algorithm2(
     position: &Point,
     neighbours: &[Neighbour],
 ) -> Advice {
-    let near = |n: &&Neighbour| n.rank > rank && (n.position - position).norm() < cfg.safety_distance_m;
+    let near = |n: &&Neighbour| n.rank > rank && (n.position - position).length() < cfg.safety_distance_m;
     match neighbours.iter().filter(near).max_by_key(|n| n.rank) {
         Some(n) => Advice {
             speed_scale: 1.0 / ((f32::from(n.rank) + 1.0) * 1.5),

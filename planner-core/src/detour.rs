@@ -19,7 +19,7 @@ use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::geometry::segments_distance_sq;
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::{self, SearchError, SearchWorkspace};
-use crate::{ConfigError, Point};
+use crate::{ConfigError, Length, Point};
 
 /// Sway of a hovering vehicle, metres: an approach by less than this is not counted as one.
 const HOVER_SWAY_M: f32 = 0.05;
@@ -314,7 +314,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
     }
     let passable = |from: u16, edge: &HalfEdge| {
         let to = view.node(edge.target);
-        let near = !request.aside || (to - here).norm() < MAX_SIDESTEP_M;
+        let near = !request.aside || (to - here).length() < MAX_SIDESTEP_M;
         near && view.has_clearance(edge, request.required_clearance_m) && clear(&view.node(from), &to)
     };
     let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
@@ -336,7 +336,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
             continue;
         };
         let length_m = match search(entry, nodes) {
-            Ok(length_m) => length_m + (end - here).norm(),
+            Ok(length_m) => length_m + (end - here).length(),
             Err(SearchError::NoPath) => continue,
             Err(error) => {
                 failed = Err(DetourError::Search(error));

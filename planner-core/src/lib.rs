@@ -48,6 +48,8 @@ mod sort;
 pub mod track;
 pub mod voxel;
 
+pub use geometry::Length;
+
 /// A point or vector in the mission frame: east, north, up, in metres.
 pub type Point = nalgebra::Vector3<f32>;
 

@@ -16,8 +16,8 @@ use mavlink::dialects::ardupilotmega::{
     GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
 };
 use nalgebra::Vector3;
-use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
+use planner_core::{Length, Point};
 
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::ardupilot;
@@ -347,7 +347,7 @@ impl Telemetry {
             }
             self.origin_doubtful_since = None;
         }
-        let away_m = frames::geodetic_to_enu(mission_origin, &origin).norm();
+        let away_m = frames::geodetic_to_enu(mission_origin, &origin).length();
         if away_m > MAX_ORIGIN_DISTANCE_M && !self.accept_any_origin {
             (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
             self.settled_at = now + POSITION_SETTLE_TIME;
@@ -411,7 +411,7 @@ impl Telemetry {
                 self.positions_valid_from = now + POSITION_SETTLE_TIME;
             }
             let led_to = self.position + self.velocity * dt_s;
-            if (position - led_to).norm() > POSITION_JUMP_M + POSITION_JUMP_MPS * dt_s {
+            if (position - led_to).length() > POSITION_JUMP_M + POSITION_JUMP_MPS * dt_s {
                 return self.lose_position(now);
             }
         }

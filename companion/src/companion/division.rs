@@ -1,5 +1,6 @@
 //! A coverage mission whose vehicles are lost: what this one says of itself, where it holds, and what it asks the shell for.
 
+use planner_core::Length;
 use planner_core::flight::{Task, VehiclePlan};
 
 use super::Companion;
@@ -209,7 +210,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(back_m) = self.detours.field_detour.rejoin_m() else { return };
         let ends = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
         let back = plan.path.point_at(back_m);
-        let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).norm() < AT_HOLD_M);
+        let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).length() < AT_HOLD_M);
         if meets {
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
             if left > 0 {

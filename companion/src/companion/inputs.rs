@@ -1,6 +1,6 @@
 //! What the guards of the mission table look at, from the state of the companion.
 
-use planner_core::Point;
+use planner_core::{Length, Point};
 
 use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::is_battery_known;
@@ -51,7 +51,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.on_ground == Some(true);
         let fence = self.config.geofence;
-        let standing = self.guidance.is_standing() && t.velocity.norm() < MAX_HOVER_MPS;
+        let standing = self.guidance.is_standing() && t.velocity.length() < MAX_HOVER_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
@@ -100,7 +100,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::NoRoadmap),
             has_goal: self.mission.plan().is_some_and(|plan| plan.task.leaves_pad()),
             plans_as_others: self.plans_as_others(),
-            at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
+            at_start: away.xy().length() <= self.config.start_tolerance_m
+                && away.z.abs() <= height_tolerance_m,
             imprecise: self.mission.state() == State::Ready && self.guidance.pace < 1.0,
             imprecise_for: self.mission.estimate_imprecise_for(now),
             origin_moved: t.origin_moved,

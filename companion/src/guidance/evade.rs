@@ -8,11 +8,11 @@
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
 //! dozen among the most columns there can be; in theory six for each place, if each is held by a column of its own.
 
-use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOutZone;
 use planner_core::flight::Path;
 use planner_core::track::Tracker;
+use planner_core::{Length, Point};
 
 use crate::swarm::sweep::IncrementalScan;
 
@@ -122,7 +122,7 @@ pub fn step_back<const W: usize>(
         return point_at(path, tracker);
     }
     let follows = |n: &&Neighbour| {
-        let apart = |p: &Point| (n.position - p).norm();
+        let apart = |p: &Point| (n.position - p).length();
         !n.grounded
             && n.progress_m.is_some()
             && apart(&back) < (safety_m + FOLLOWER_STRAY_M).min(apart(&here))

@@ -3,13 +3,14 @@
 use super::{ARRIVED_M, Guidance};
 use crate::autopilot::telemetry::Telemetry;
 use crate::time::{Duration, Instant};
+use planner_core::Length;
 
 impl Guidance {
     /// Share of its speed at which the setpoint goes on: none where it is as far ahead of the vehicle as it may be.
     /// `moves` for a vehicle that is to fly on.
     pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
         let place = self.smoother.position();
-        let lead_m = (telemetry.position - place).norm();
+        let lead_m = (telemetry.position - place).length();
         let advance = place - self.followed_place;
         // The speed of the vehicle says nothing: the wind may carry it away from its setpoint.
         if lead_m < ARRIVED_M || advance.norm_squared() > ARRIVED_M * ARRIVED_M {

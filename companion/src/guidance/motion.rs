@@ -1,7 +1,7 @@
 //! A point that moves.
 
 use libm::fmaxf;
-use planner_core::Point;
+use planner_core::{Length, Point};
 
 /// A moving point: place, velocity, acceleration.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ impl Motion {
 
 /// A vector no longer than `most`.
 pub(super) fn clamp_length(vector: Point, most: f32) -> Point {
-    vector * (most / fmaxf(vector.norm(), fmaxf(most, 1e-6)))
+    vector * (most / fmaxf(vector.length(), fmaxf(most, 1e-6)))
 }
 
 /// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a board carries the code

@@ -1,6 +1,6 @@
 //! The setpoint of the moment.
 
-use planner_core::Point;
+use planner_core::{Length, Point};
 
 use super::setpoint::Setpoint;
 use super::{Guidance, GuidanceInputs};
@@ -29,8 +29,8 @@ impl Guidance {
         // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
         let lead_s = scene.telemetry.kind.map_or(0.0, AutopilotKind::velocity_lead_s);
         let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
-        let most = smoother.velocity().norm().max(smoother.raw_speed_mps());
-        let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));
+        let most = smoother.velocity().length().max(smoother.raw_speed_mps());
+        let velocity = velocity * (most / velocity.length().max(most).max(1e-6));
         let heading = scene.plan.and_then(|plan| task::heading(&plan.task, &plan.path, self.setpoint_m));
         Setpoint::Move(smoother.position(), velocity, self.sent_acceleration, heading)
     }

@@ -1,5 +1,6 @@
 //! How far the vehicle has come along its flight, and which parts of it are flown.
 
+use planner_core::Length;
 use planner_core::flight::{Path, VehiclePlan};
 
 use super::motion::clamp_to;
@@ -77,7 +78,7 @@ impl Guidance {
                     path.project(&scene.telemetry.position, self.tracker.along_m - behind * 0.5, behind);
                 // Off its reference by less than counts as arrived, it has come as far as gates ask of one that waits.
                 let at = path.point_at(self.tracker.along_m);
-                let arrived = at.is_some_and(|at| (at - scene.telemetry.position).norm() < ARRIVED_M);
+                let arrived = at.is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_M);
                 let least = if arrived { self.tracker.along_m - REPORTED_SHORT_M } else { f32::NEG_INFINITY };
                 seen.max(least).min(self.tracker.along_m)
             }
@@ -119,7 +120,7 @@ impl Guidance {
                 // Both setpoint and vehicle at the top: a low climb must not count as done on the pad.
                 (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
                     && self.is_standing()
-                    && apart.norm() < 2.0 * ARRIVED_M
+                    && apart.length() < 2.0 * ARRIVED_M
                     && apart.z.abs() < CLIMBED_M
             })
     }
@@ -131,7 +132,7 @@ impl Guidance {
         now: Instant,
     ) -> bool {
         if self.is_algorithm2() {
-            let stands = self.is_standing() && scene.telemetry.velocity.norm() < AT_REST_MPS;
+            let stands = self.is_standing() && scene.telemetry.velocity.length() < AT_REST_MPS;
             return stands && self.on_path && self.waypoints.is_completed() && !self.ends_aside;
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
@@ -159,10 +160,10 @@ impl Guidance {
             && !self.ends_aside
             && self.is_standing()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
-                (end - scene.telemetry.position).norm() < ARRIVED_M
-                    && (end - self.smoother.position()).norm() < ARRIVED_M
+                (end - scene.telemetry.position).length() < ARRIVED_M
+                    && (end - self.smoother.position()).length() < ARRIVED_M
             })
-            && scene.telemetry.velocity.norm() < AT_REST_MPS
+            && scene.telemetry.velocity.length() < AT_REST_MPS
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 
@@ -179,13 +180,13 @@ impl Guidance {
         if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
             // Over its pad, on the way up.
             let away = position - first.position;
-            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().length() < ARRIVED_M {
                 return true;
             }
         }
         if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
             let away = position - last.position;
-            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z) && away.xy().length() < ARRIVED_M {
                 return true;
             }
         }

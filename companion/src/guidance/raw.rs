@@ -1,9 +1,9 @@
 //! The next raw point: along the path, or along the straight leg of a climb, a join or a descent.
 
-use planner_core::Point;
 use planner_core::deconflict::Advice;
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::{self, Reference, Tracker};
+use planner_core::{Length, Point};
 
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
@@ -76,7 +76,7 @@ impl Guidance {
         }
         if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.is_leg_done()) {
             // Back up a descent it ends where that began: beside the path yet.
-            let beside_m = (target - raw).norm();
+            let beside_m = (target - raw).length();
             let joined = beside_m < MIN_LEG_M + JOIN_MPS * TICK_S;
             (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
         }

@@ -20,7 +20,7 @@
 
 use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
-use planner_core::Point;
+use planner_core::{Length, Point};
 
 use super::fence::Fence;
 use super::limits::{MAX_SMOOTHING_S, MotionLimits};
@@ -205,7 +205,7 @@ impl SetpointSmoother {
 
     /// Speed that the raw point had last, m/s: that of the setpoint T later, if the clock runs.
     pub(crate) fn raw_speed_mps(&self) -> f32 {
-        self.steps[self.newest_step].norm() / TICK_S * self.clock_speed
+        self.steps[self.newest_step].length() / TICK_S * self.clock_speed
     }
 
     /// Greatest jerk, m/s³.
@@ -221,7 +221,7 @@ impl SetpointSmoother {
     /// Distance of the setpoint from its curve, metres.
     #[cfg(test)]
     pub(crate) fn off_curve_m(&self) -> f32 {
-        (self.curve_motion().0 - self.motion.position).norm()
+        (self.curve_motion().0 - self.motion.position).length()
     }
 
     /// Whether the setpoint stands.
@@ -294,7 +294,7 @@ impl SetpointSmoother {
     /// that of its places is not believed, and from what it has it can stop inside the fence.
     pub(crate) fn hold_with_velocity(&mut self, velocity: &Point) {
         let most_mps =
-            fminf(self.limits.max_speed_mps(), MAX_SPEED_OVER_FOLLOWED * self.followed_velocity.norm());
+            fminf(self.limits.max_speed_mps(), MAX_SPEED_OVER_FOLLOWED * self.followed_velocity.length());
         let velocity = clamp_length(*velocity, most_mps);
         if velocity.iter().all(|c| c.is_finite()) {
             self.motion.velocity = velocity;
@@ -380,12 +380,12 @@ impl SetpointSmoother {
         let jerk_mps3 = self.limits.jerk(self.stopping);
         self.motion.follow(&to, &self.limits, self.fence.as_ref(), jerk_mps3, dt_s);
         self.hold_inside();
-        let step_m = (self.motion.position - before.position).norm();
-        let jerk_mps3 = (self.motion.acceleration - before.acceleration).norm() / dt_s;
+        let step_m = (self.motion.position - before.position).length();
+        let jerk_mps3 = (self.motion.acceleration - before.acceleration).length() / dt_s;
         let worst = if self.stopping { &mut self.stats.urgent_jerk_mps3 } else { &mut self.stats.jerk_mps3 };
         *worst = fmaxf(*worst, jerk_mps3);
         self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / dt_s);
-        self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, self.motion.acceleration.norm());
+        self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, self.motion.acceleration.length());
         sound
     }
 
@@ -407,7 +407,7 @@ impl SetpointSmoother {
     fn run_clock(&mut self, pace: ClockPace, dt_s: f32) {
         let limits = &self.limits;
         let (_, slope, bend) = self.curve_motion();
-        let true_speed = slope.norm();
+        let true_speed = slope.length();
         let speed = fmaxf(true_speed, MIN_CURVE_MPS);
         let along = bend.dot(&slope) / speed;
         let third = (self.average_steps[2] - self.average_steps[1] * 2.0 + self.average_steps[0])

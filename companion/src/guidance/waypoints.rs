@@ -5,8 +5,8 @@
 //! last the path is completed: speed 0, then it lands where it is. Nothing of our tracker is in it: no speed that follows
 //! from a corner's clearance, no reference that waits, no guided descent. The paper does not state `Wp_radius`.
 
-use planner_core::Point;
 use planner_core::flight::Path;
+use planner_core::{Length, Point};
 
 /// A waypoint is reached within this distance, metres: nearer than the referee requires, by the
 /// greatest error of an RTK estimate.
@@ -29,7 +29,7 @@ impl Algorithm2Waypoints {
     ) -> Option<Point> {
         let points = path.waypoints();
         let goal = points.get(self.next)?.position;
-        if (goal - position).norm() < WP_RADIUS_M {
+        if (goal - position).length() < WP_RADIUS_M {
             if self.next + 1 < points.len() {
                 self.next += 1;
             } else {

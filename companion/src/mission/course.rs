@@ -1,8 +1,8 @@
 //! Where the mission is: its state and what that interrupts, what was commanded, and the plan.
 
-use planner_core::Point;
 use planner_core::detour::Goal;
 use planner_core::flight::{Path, Task, VehiclePlan, WaypointRange};
+use planner_core::{Length, Point};
 
 use crate::autopilot::telemetry::Ack;
 use crate::config::PlanFailure;
@@ -412,7 +412,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
-        let begins = first.is_some_and(|w| (w.position - place).norm() < PATH_BEGIN_M);
+        let begins = first.is_some_and(|w| (w.position - place).length() < PATH_BEGIN_M);
         finite && (begins || !plan.task.leaves_pad())
     }
 }

@@ -22,9 +22,9 @@ pub(crate) mod asking;
 mod beside;
 mod homeward;
 
-use planner_core::Point;
 use planner_core::detour;
 use planner_core::frames::Geodetic;
+use planner_core::{Length, Point};
 
 use self::beside::{FieldDetour, LOOK_AHEAD_M};
 use self::homeward::HomewardFlight;
@@ -293,7 +293,7 @@ impl Detours {
     ) -> bool {
         let now = view.now;
         let held = view.guidance.advice.waiting_for != 0 || view.guidance.filter.is_stopped();
-        let rests = view.telemetry.velocity.norm() < MAX_HOVER_MPS;
+        let rests = view.telemetry.velocity.length() < MAX_HOVER_MPS;
         let stands = view.guidance.is_standing() && rests;
         match view.mission.state() {
             State::Scheduled | State::PadReplanning => {
@@ -305,12 +305,12 @@ impl Detours {
             }
             State::Follow => held && stands,
             State::Climb => {
-                view.guidance.filter.is_stopped() && view.telemetry.velocity.norm() < MAX_HOVER_MPS
+                view.guidance.filter.is_stopped() && view.telemetry.velocity.length() < MAX_HOVER_MPS
             }
             // Blocked on its way down it stays there.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
             // The vehicle continues by itself only once its column is free.
-            State::LandingHeld => view.telemetry.velocity.norm() < MAX_HOVER_MPS,
+            State::LandingHeld => view.telemetry.velocity.length() < MAX_HOVER_MPS,
             _ => false,
         }
     }

@@ -15,11 +15,11 @@ pub(crate) mod relay;
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
-use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
 use planner_core::safety::PlaceOnPoints;
+use planner_core::{Length, Point};
 
 pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
@@ -268,7 +268,7 @@ impl<const V: usize> Neighbours<V> {
         contact.at_range_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
-        contact.speed_mps = contact.state.velocity.norm();
+        contact.speed_mps = contact.state.velocity.length();
         if contact.speed_mps >= MAX_HOVER_MPS {
             contact.moved_at = now;
         }

@@ -1,9 +1,9 @@
 //! Obstacles that were not on the map, reported by a ground station.
 
 use heapless::Vec;
-use planner_core::Point;
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::frames::{self, Geodetic};
+use planner_core::{Length, Point};
 
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 
@@ -33,7 +33,7 @@ impl Obstacles {
 
     /// Forgets the obstacle at this place.
     fn remove_at(&mut self, centre: &Point) {
-        while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_OBSTACLE_M) {
+        while let Some(at) = self.known.iter().position(|o| (o.from - centre).length() < SAME_OBSTACLE_M) {
             self.known.remove(at);
             self.avoided -= usize::from(at < self.avoided);
             self.requested -= usize::from(at < self.requested);
@@ -56,7 +56,7 @@ impl Obstacles {
             return ACCEPTED;
         }
         let radius_m = command.param1 + clearance_m;
-        let told = |o: &KeepOutZone| (o.from - centre).norm() < SAME_OBSTACLE_M && o.radius_m >= radius_m;
+        let told = |o: &KeepOutZone| (o.from - centre).length() < SAME_OBSTACLE_M && o.radius_m >= radius_m;
         if self.known.iter().any(told) {
             return ACCEPTED;
         }

@@ -4,6 +4,7 @@
 //! turns does not matter: a place is in the area if it is inside an odd number of outer rings and holes. Cost: O(n²) in
 //! the edges for the check, O(n) for a question.
 
+use crate::Length;
 use libm::{fabs, sqrt};
 
 use super::Flat;
@@ -281,7 +282,7 @@ pub(super) fn doubled_signed_area(ring: &[Flat]) -> f64 {
 }
 
 fn perimeter(ring: &[Flat]) -> f64 {
-    edges_of(ring).map(|(a, b)| f64::from((b - a).norm())).sum()
+    edges_of(ring).map(|(a, b)| f64::from((b - a).length())).sum()
 }
 
 fn cross_product(a: &Flat, b: &Flat) -> f64 {

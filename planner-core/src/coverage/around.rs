@@ -12,11 +12,11 @@ use libm::{ceilf, cosf, fabsf, fminf, sinf};
 
 use super::Flat;
 use super::transit::Transit;
-use crate::Point;
 use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone};
 use crate::field::FieldView;
 use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::search::SearchError;
+use crate::{Length, Point};
 
 /// Most places of the visibility graph.
 const MAX_PLACES: usize = 320;
@@ -64,7 +64,7 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
     /// Whether a leg stays above the height field, checked at samples half a node apart.
     fn is_above_field(&self, a: &Point, b: &Point) -> bool {
         let (Some(field), step) = (&self.field, b - a) else { return true };
-        let length_m = step.xy().norm();
+        let length_m = step.xy().length();
         if length_m < SAME_CORNER_M {
             return true;
         }
@@ -193,7 +193,7 @@ impl VisibilityGraph {
         self.distance_m[START_NODE] = 0.0;
         loop {
             let open = (0..self.places.len()).filter(|&i| !self.settled[i] && self.distance_m[i].is_finite());
-            let whole = |i: usize| self.distance_m[i] + (self.places[i] - to.xy()).norm();
+            let whole = |i: usize| self.distance_m[i] + (self.places[i] - to.xy()).length();
             let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else { return Ok(false) };
             if next == END_NODE {
                 break;
@@ -201,7 +201,7 @@ impl VisibilityGraph {
             self.settled[next] = true;
             let place = level(&self.places[next]);
             for i in 0..self.places.len() {
-                let far_m = self.distance_m[next] + (self.places[i] - place.xy()).norm();
+                let far_m = self.distance_m[next] + (self.places[i] - place.xy()).length();
                 // A look costs more than the sum: only at what would be shorter.
                 if !self.settled[i]
                     && far_m < self.distance_m[i]
@@ -239,7 +239,7 @@ impl VisibilityGraph {
                 continue;
             }
             let far_m = obstacle.radius_m * CORNER_RADIUS_SHARE + CORNER_ROUNDING_M;
-            let twice = (obstacle.from - obstacle.to).xy().norm() > SAME_CORNER_M;
+            let twice = (obstacle.from - obstacle.to).xy().length() > SAME_CORNER_M;
             let ends = [Some(obstacle.from), twice.then_some(obstacle.to)];
             for end in ends.into_iter().flatten() {
                 for i in 0..CORNERS_PER_END {
@@ -263,7 +263,7 @@ fn write_path<const W: usize>(
     out.push(request.here, request.leg_clearance_m)?;
     let mut before = request.here;
     for point in points {
-        if (point - before).norm() > SAME_CORNER_M {
+        if (point - before).length() > SAME_CORNER_M {
             out.push(*point, request.leg_clearance_m)?;
             before = *point;
         }

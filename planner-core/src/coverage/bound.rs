@@ -5,6 +5,7 @@
 //! largest cost is no less than the mean. The least over m. (2) Somebody flies to the waypoint that is furthest from
 //! everybody. O(n · K).
 
+use crate::Length;
 use libm::{fmaxf, fminf};
 
 use super::CoverageError;
@@ -36,7 +37,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
             let mut least_s = f32::INFINITY;
             for (near, vehicle) in nearest_m.iter_mut().zip(work.vehicles) {
                 // Straight: no way is shorter.
-                let there_m = (place - vehicle.place).norm() + (place - vehicle.home).norm();
+                let there_m = (place - vehicle.place).length() + (place - vehicle.home).length();
                 *near = fminf(*near, there_m);
                 least_s = fminf(least_s, there_m / vehicle.cruise_mps);
             }

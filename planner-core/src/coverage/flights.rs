@@ -11,12 +11,12 @@ use super::lanes::Lane;
 use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use super::{Flat, divide};
-use crate::Point;
 use crate::field::follow::TerrainFollowing;
 use crate::flight::{Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
+use crate::{Length, Point};
 
 /// Acceleration and braking that coverage flights are planned with, m/s².
 pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
@@ -445,7 +445,7 @@ fn finish_with_return<const N: usize, const W: usize>(
     draft.add_straight_leg(point_at_height(&vehicle.home, pad.end_z_m))?;
     let mut path = draft.path;
     let seconds = |from: &Point, to: &Point| {
-        let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
+        let (way_m, up_m) = ((to - from).xy().length(), to.z - from.z);
         let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
         leg_duration_s(way_m, vehicle.cruise_mps) + leg_duration_s(libm::fabsf(up_m), z_mps)
     };

@@ -1,5 +1,6 @@
 //! Lanes, and the way along all of them.
 
+use crate::Length;
 use heapless::Vec;
 use libm::{ceilf, fmaxf};
 
@@ -43,7 +44,7 @@ pub struct Lane {
 impl Lane {
     /// Length of the lane, metres.
     pub fn length_m(&self) -> f32 {
-        (self.to - self.from).norm()
+        (self.to - self.from).length()
     }
 
     /// Waypoint `k` of it, from 0: the last one for numbers beyond.

@@ -9,6 +9,7 @@
 use super::Flat;
 use super::lanes::Lane;
 use super::transit::Transit;
+use crate::Length;
 
 /// Least shortening of the tour that counts, metres: a smaller gain is rounding.
 const MIN_GAIN_M: f32 = 1e-3;
@@ -33,7 +34,7 @@ pub(super) fn order_lanes<const N: usize>(lanes: &mut [Lane], transit: &Transit<
 fn should_reverse_first(lanes: &[Lane]) -> bool {
     let mut gain_m = 0.0;
     for (i, pair) in lanes.windows(2).enumerate() {
-        let longer_m = (pair[1].to - pair[0].to).norm() - (pair[1].from - pair[0].from).norm();
+        let longer_m = (pair[1].to - pair[0].to).length() - (pair[1].from - pair[0].from).length();
         gain_m += if i % 2 == 0 { longer_m } else { -longer_m };
     }
     gain_m > MIN_GAIN_M
@@ -47,7 +48,7 @@ fn order_nearest_first<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_,
         for (i, lane) in lanes.iter().enumerate().skip(done) {
             for (end, turned) in [(lane.from, false), (lane.to, true)] {
                 // No way is shorter than the straight one.
-                if (end - here).norm() < best.0 {
+                if (end - here).length() < best.0 {
                     let way = transit.distance_m(&here, &end);
                     if way < best.0 {
                         best = (way, i, turned);
@@ -163,7 +164,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
 }
 
 fn straight_distance_m(from: Option<Flat>, to: Flat) -> f32 {
-    from.map_or(0.0, |from| (to - from).norm())
+    from.map_or(0.0, |from| (to - from).length())
 }
 
 /// Flies lanes the other way, the last one first.

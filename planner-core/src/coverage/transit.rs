@@ -4,6 +4,7 @@
 //! all pairs of corners once (Floyd and Warshall, n³), then a way between two places over the corners that both see
 //! (n² and 2 n segment checks of one comparison an edge). All in metres.
 
+use crate::Length;
 use heapless::Vec;
 use libm::fminf;
 
@@ -68,7 +69,7 @@ impl<'a, const N: usize> Transit<'a, N> {
             for j in 0..n {
                 let (a, b) = (self.corners[i], self.corners[j]);
                 self.between_m[i][j] =
-                    if self.is_line_clear(&a, &b) { (b - a).norm() } else { f32::INFINITY };
+                    if self.is_line_clear(&a, &b) { (b - a).length() } else { f32::INFINITY };
             }
             self.between_m[i][i] = 0.0;
         }
@@ -115,17 +116,17 @@ impl<'a, const N: usize> Transit<'a, N> {
     /// Length of the shortest path; infinite where there is none.
     pub fn distance_m(&self, from: &Flat, to: &Flat) -> f32 {
         if self.is_line_clear(from, to) {
-            return (to - from).norm();
+            return (to - from).length();
         }
         let mut ends: Vec<(usize, f32), N> = Vec::new();
         for (i, corner) in self.corners.iter().enumerate() {
             if self.is_line_clear(corner, to) {
-                let _ = ends.push((i, (to - corner).norm()));
+                let _ = ends.push((i, (to - corner).length()));
             }
         }
         let mut least = f32::INFINITY;
         for (i, corner) in self.corners.iter().enumerate() {
-            let first = (corner - from).norm();
+            let first = (corner - from).length();
             let rest = ends.iter().map(|&(j, last)| self.between_m[i][j] + last);
             let whole = first + rest.fold(f32::INFINITY, fminf);
             // A look costs more than the sums: only at what would be shorter.
@@ -152,7 +153,7 @@ impl<'a, const N: usize> Transit<'a, N> {
         while !self.is_line_clear(&here, to) {
             let mut best = (f32::INFINITY, None);
             for corner in self.corners.iter().filter(|corner| **corner != here) {
-                let whole = (corner - here).norm() + self.distance_m(corner, to);
+                let whole = (corner - here).length() + self.distance_m(corner, to);
                 if whole < best.0 && self.is_line_clear(&here, corner) {
                     best = (whole, Some(*corner));
                 }

@@ -8,8 +8,8 @@
 use libm::{ceilf, fmaxf, fminf};
 
 use super::FieldView;
-use crate::Point;
 use crate::coverage::Flat;
+use crate::{Length, Point};
 
 /// Most height samples of one leg: on a longer leg the samples are further apart.
 const MAX_LEG_SAMPLES: f32 = 65_536.0;
@@ -67,7 +67,7 @@ impl TerrainFollowing<'_> {
         mut corner: impl FnMut(Point) -> Result<(), E>,
     ) -> Result<(), E> {
         let (start, way) = (from.xy(), to - from.xy());
-        let length_m = way.norm();
+        let length_m = way.length();
         let wanted = ceilf(length_m * 2.0 / self.field.shape().cell_m);
         let count = fmaxf(fminf(wanted, MAX_LEG_SAMPLES), 1.0) as u32;
         let step_m = length_m / count as f32;

@@ -1,6 +1,7 @@
 //! What a vehicle photographs along its path.
 
 use super::{Path, PathError, Waypoint, WaypointRange};
+use crate::Length;
 
 /// Two points nearer than this along a path are the same place, metres.
 const SAME_PLACE_M: f32 = 1e-2;
@@ -56,7 +57,7 @@ fn straight_pieces(corners: &[Waypoint]) -> impl Iterator<Item = StraightPiece> 
         let (begin_m, length_m) = (ends[0].along_m, ends[1].along_m - ends[0].along_m);
         let step = ends[1].position - ends[0].position;
         // Level ones are as long over ground, to the bit.
-        let ground_m = if step.z == 0.0 { length_m } else { step.xy().norm() };
+        let ground_m = if step.z == 0.0 { length_m } else { step.xy().length() };
         StraightPiece { begin_m, length_m, ground_m }
     })
 }

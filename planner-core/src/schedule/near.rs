@@ -3,6 +3,7 @@
 //!
 //! Cost: one sort to build; a look takes the pieces in the cells within reach.
 
+use crate::Length;
 use libm::{fmaxf, fminf};
 
 use super::pieces::TimedSegment;
@@ -89,7 +90,7 @@ fn middle(piece: &TimedSegment) -> [f32; 2] {
 }
 
 fn half_length(piece: &TimedSegment) -> f32 {
-    (piece.to - piece.from).norm() * 0.5
+    (piece.to - piece.from).length() * 0.5
 }
 
 #[cfg(test)]

@@ -18,11 +18,11 @@ use super::pieces::{
     is_conflict, segment_count,
 };
 use super::{Forbidden, add_forbidden_interval, first_allowed, last_allowed};
-use crate::Point;
 use crate::flight::{Flight, Path};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::heap::{Heap, SETTLED};
 use crate::sort;
+use crate::{Length, Point};
 
 /// One node in one of its safe intervals.
 #[derive(Clone, Copy)]
@@ -127,7 +127,7 @@ struct StateTransition {
 
 /// A leg of the path, flown from time 0.
 fn leg_from_start(from: Point, to: Point, duration_s: f32) -> Leg {
-    let length_m = (to - from).norm();
+    let length_m = (to - from).length();
     Leg { from, to, length_m, from_s: 0.0, to_s: duration_s, stops: WaitingPlaces::Anywhere }
 }
 
@@ -156,7 +156,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     let landing = ws.plan_landing(cfg, goal, flight.descent_m)?;
     let piece_m = flight.segment_m;
     // At most so early, seconds from a place to the goal.
-    let left_s = |there: &Point| (goal - there).norm() / cfg.cruise_mps;
+    let left_s = |there: &Point| (goal - there).length() / cfg.cruise_mps;
 
     ws.add_states(cfg, view, route.from);
     ws.forbid_departures(cfg, &up, piece_m, (route.not_before_s, climb.leave_by_s));
@@ -180,7 +180,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
                 continue;
             }
             let there = view.node(edge.target);
-            let duration_s = (there - here).norm() / cfg.cruise_mps;
+            let duration_s = (there - here).length() / cfg.cruise_mps;
             ws.add_states(cfg, view, edge.target);
             let hop = StateTransition { node: edge.target, parent: Some(state), leave_s, duration_s };
             if ws.may_improve(&hop) {
@@ -429,7 +429,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
             (climb.up, climb.leave_by_s)
         } else {
             let from = view.node(before.node);
-            (leg_from_start(from, here, (here - from).norm() / cfg.cruise_mps), before.until_s)
+            (leg_from_start(from, here, (here - from).length() / cfg.cruise_mps), before.until_s)
         };
         let duration_s = leg.to_s;
         let earliest_s = reached.left_parent_s;

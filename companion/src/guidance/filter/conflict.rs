@@ -1,8 +1,8 @@
 //! Which neighbour's set meets that of the vehicle, and which of the two goes first.
 
-use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
+use planner_core::{Length, Point};
 
 use super::super::{Guidance, GuidanceInputs, Phase};
 use super::{FilterConflict, MAX_STOP_FOR_STRANGER};
@@ -58,7 +58,7 @@ impl Guidance {
             return ReachableSet::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
         }
         // The vehicle stops for its gates in any case.
-        let join_m = join.map_or(0.0, |join| (join - here).norm());
+        let join_m = join.map_or(0.0, |join| (join - here).length());
         let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
         let ahead = points[next..].iter().map(|w| w.position);

@@ -7,6 +7,7 @@
 
 use heapless::Deque;
 use libm::atan2f;
+use planner_core::Length;
 use planner_core::flight::{HeadingMode, Path, PicturePlan, PictureStretch, Trigger};
 
 use super::along::{PathProgress, PathRelation};
@@ -218,7 +219,7 @@ pub(super) fn heading<const W: usize>(
     let mut found = None;
     for shots in photographs.stretches(path) {
         let way = path.point_at(shots.to_m)? - path.point_at(shots.from_m)?;
-        if way.xy().norm() > MIN_STRETCH_M {
+        if way.xy().length() > MIN_STRETCH_M {
             found = Some(atan2f(way.y, way.x));
         }
         if shots.to_m >= along_m && found.is_some() {

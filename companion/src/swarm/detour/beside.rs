@@ -7,8 +7,8 @@
 //! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
 use heapless::Vec;
-use planner_core::Point;
 use planner_core::detour::{KeepOutZone, ZoneKind};
+use planner_core::{Length, Point};
 
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
@@ -173,7 +173,7 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     let far_m = |thing: &KeepOutZone, place: &Point| {
         let (axis, away) = (thing.to - thing.from, place - thing.from);
         let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
-        (away - axis * share).norm() - thing.radius_m
+        (away - axis * share).length() - thing.radius_m
     };
     let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
     // Full beyond what may be near at once: the search for the way knows them all.

@@ -1,11 +1,11 @@
 //! One vehicle as it was last heard, and where it may be since.
 
 use heapless::Vec;
-use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::flight::PROGRESS_ERROR_M;
 use planner_core::safety::PlaceOnPoints;
+use planner_core::{Length, Point};
 
 use super::bounds::*;
 use crate::autopilot::telemetry::SequenceFilter;
@@ -225,7 +225,7 @@ impl NeighbourEntry {
         self.reports(BLOCKED)
             && !self.is_waiting(now)
             && self.heard_within(now, HEARD_WITHIN)
-            && self.state.velocity.norm() < MAX_HOVER_MPS
+            && self.state.velocity.length() < MAX_HOVER_MPS
     }
 
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
@@ -327,7 +327,7 @@ impl NeighbourEntry {
         let mut at = self.state.position;
         tell([at; 2], [0.0; 2]);
         for next in &self.points {
-            let leg_m = (next - at).norm();
+            let leg_m = (next - at).length();
             if leg_m > left_m {
                 return tell([at, *next], [leg_m, left_m]);
             }
@@ -359,7 +359,7 @@ impl NeighbourEntry {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;
         };
-        let away = self.pad.is_some_and(|pad| (pad - place).xy().norm() > OVER_PAD_M);
+        let away = self.pad.is_some_and(|pad| (pad - place).xy().length() > OVER_PAD_M);
         let below_m = if away && !self.reports(ON_DETOUR | OUT_OF_PLAN) && !self.may_come_down {
             ground.height_m / 2.0
         } else {

@@ -1,7 +1,7 @@
 //! Where others are and may come to be, as the search for a detour asks for it.
 
-use planner_core::Point;
 use planner_core::detour::{KeepOutZone, ZoneKind};
+use planner_core::{Length, Point};
 
 use super::contact::{AreaGround, NeighbourEntry};
 use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, VAGUE_POSITION_M};
@@ -35,7 +35,7 @@ impl<const V: usize> Neighbours<V> {
     /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
     /// detour says so: `apart_m` away from it is far enough.
     pub fn for_each_zone_of(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
-        let avoided = |c: &NeighbourEntry| (c.avoided_at - c.state.position).norm() < VAGUE_POSITION_M;
+        let avoided = |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < VAGUE_POSITION_M;
         let unknown = |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
             contact.keep_out_zones(
@@ -141,7 +141,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether a neighbour was last heard lower than `position` and within `within_m` of its vertical.
     pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
-        let under = |p: &Point| p.z < position.z && (p - position).xy().norm() < within_m;
+        let under = |p: &Point| p.z < position.z && (p - position).xy().length() < within_m;
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
