@@ -70,16 +70,25 @@ impl<'p> PictureStretch<'p> {
         Some(Self { from_m, to_m, step_m, count, corners })
     }
 
-    /// Pictures of it that are taken once the vehicle is `along_m` metres along the path.
-    fn taken_count(&self, along_m: f32) -> u32 {
-        if along_m < self.from_m || along_m.is_nan() {
+    /// Pictures of the stretch with these corners that are taken once the vehicle is `along_m` metres along the path.
+    fn taken_count(corners: &'p [Waypoint], count: u32, along_m: f32) -> u32 {
+        let Some([first, last]) = corners.first().zip(corners.last()).map(<[_; 2]>::from) else { return 0 };
+        if along_m < first.along_m || along_m.is_nan() {
             0
-        } else if self.step_m > 0.0 && along_m < self.to_m {
-            // A number that is too large for a count becomes the largest.
-            ((self.ground_m(along_m) / self.step_m) as u32).saturating_add(1).min(self.count)
+        } else if along_m >= last.along_m {
+            count
         } else {
-            self.count
+            Self::new(corners, count).map_or(0, |stretch| stretch.taken_within(along_m))
         }
+    }
+
+    /// The same between its ends.
+    fn taken_within(&self, along_m: f32) -> u32 {
+        if self.step_m <= 0.0 {
+            return self.count;
+        }
+        // A number that is too large for a count becomes the largest.
+        ((self.ground_m(along_m) / self.step_m) as u32).saturating_add(1).min(self.count)
     }
 
     /// Distance over ground from the stretch's begin to `along_m`, metres.
@@ -193,6 +202,14 @@ impl PicturePlan {
         &self,
         path: &'p Path<W>,
     ) -> impl Iterator<Item = PictureStretch<'p>> {
+        self.corners_and_counts(path).filter_map(|(corners, count)| PictureStretch::new(corners, count))
+    }
+
+    /// The corners of each stretch and the number of its pictures.
+    fn corners_and_counts<'p, const W: usize>(
+        &self,
+        path: &'p Path<W>,
+    ) -> impl Iterator<Item = (&'p [Waypoint], u32)> {
         let (mut begins, mut ends) = (self.begins, self.ends);
         let waypoints = path.waypoints();
         self.counts.into_iter().map_while(move |count| {
@@ -200,14 +217,16 @@ impl PicturePlan {
             let corners = waypoints.get(from..=to)?;
             begins &= begins - 1;
             ends &= ends - 1;
-            PictureStretch::new(corners, u32::from(count))
+            Some((corners, u32::from(count)))
         })
     }
 
     /// Pictures taken once the vehicle is `along_m` metres along the path.
     pub fn taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         let reached_m = along_m + SAME_PLACE_M;
-        self.stretches(path).map(|shots| shots.taken_count(reached_m)).fold(0, u32::saturating_add)
+        self.corners_and_counts(path)
+            .map(|(corners, count)| PictureStretch::taken_count(corners, count, reached_m))
+            .fold(0, u32::saturating_add)
     }
 
     /// The pictures passed by `along_m`, but for one that the vehicle has not come a spacing
@@ -225,10 +244,12 @@ impl PicturePlan {
     /// Place of the last picture no further than `along_m` metres along the path; none before the
     /// first.
     pub fn last_picture_before_m<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
-        let last = |shots: PictureStretch<'_>| {
-            shots.taken_count(along_m).checked_sub(1).map(|k| shots.picture_at_m(k))
-        };
-        self.stretches(path).filter_map(last).last()
+        let (corners, count, taken) = self
+            .corners_and_counts(path)
+            .map(|(corners, count)| (corners, count, PictureStretch::taken_count(corners, count, along_m)))
+            .filter(|(.., taken)| *taken > 0)
+            .last()?;
+        PictureStretch::new(corners, count).map(|stretch| stretch.picture_at_m(taken - 1))
     }
 
     /// The waypoints of the area that these pictures show, counted along the path.
@@ -238,11 +259,11 @@ impl PicturePlan {
         pictures: WaypointRange,
     ) -> impl Iterator<Item = WaypointRange> {
         let (mut before, backward) = (0u32, self.backward);
-        self.stretches(path).zip(self.numbers).filter_map(move |(shots, number)| {
-            let within = |picture: u32| picture.saturating_sub(before).min(shots.count);
+        self.corners_and_counts(path).zip(self.numbers).filter_map(move |((_, count), number)| {
+            let within = |picture: u32| picture.saturating_sub(before).min(count);
             let (from, to) = (within(pictures.first), within(pictures.end));
-            before = before.saturating_add(shots.count);
-            let skipped = if backward { shots.count - to } else { from };
+            before = before.saturating_add(count);
+            let skipped = if backward { count - to } else { from };
             let first = u32::from(number).saturating_add(skipped);
             (from < to).then(|| WaypointRange { first, end: first.saturating_add(to - from) })
         })
@@ -250,7 +271,7 @@ impl PicturePlan {
 
     /// Pictures of the whole path.
     pub fn count<const W: usize>(&self, path: &Path<W>) -> u32 {
-        self.stretches(path).map(|shots| shots.count).fold(0, u32::saturating_add)
+        self.corners_and_counts(path).map(|(_, count)| count).fold(0, u32::saturating_add)
     }
 }
 
