@@ -46,6 +46,10 @@ const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
 /// Least distance of a neighbour that is beside, metres.
 const MIN_BESIDE_M: f32 = 4.0;
+/// Distance of a neighbour that is far away, metres.
+const MIN_FAR_M: f32 = 70.0;
+/// Greatest distance of a neighbour that is far away, metres.
+const MAX_FAR_M: f32 = 120.0;
 /// Control steps counted in each flight.
 const COUNTED_STEPS: usize = 200;
 /// Most steps of 0.9 s before the counted ones, in which silent neighbours grow old. A longer step
@@ -97,6 +101,11 @@ pub fn has_many_off_plan(seed: u64) -> bool {
     seed.is_multiple_of(2)
 }
 
+/// Whether those of a flight's neighbours that fall silent are far away, at the edge of what a search for a detour looks at.
+fn has_silent_far_away(seed: u64) -> bool {
+    seed % 8 == 2
+}
+
 /// Vector from this vehicle to a neighbour. In every other hard flight the neighbour is beside, so
 /// that the path is checked to its end.
 fn offset_to_neighbour(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
@@ -128,6 +137,10 @@ pub fn measure_flight<M: Meter>(
         // One neighbour is always heard, so that this vehicle is not alone.
         (other.flags, other.silent) = (flags, silent && i > 0);
         other.place = flight.place + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
+        if other.silent && has_silent_far_away(seed) {
+            other.place += random_point(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_default()
+                * random_between(&mut rng, MIN_FAR_M, MAX_FAR_M);
+        }
         other.progress_m = random_between(&mut rng, 0.0, 60.0);
     }
     flight.send_states_from(&mut rng, |_| true);

@@ -145,18 +145,36 @@ impl FieldDetour {
     }
 }
 
-/// Zones that other vehicles occupy over a field: their places, and the columns in which those in
-/// the air off the plan may come down.
+/// Number of the sources of [`zones_of_source`].
+fn source_count<const V: usize, const W: usize, const G: usize>(view: &DetourView<'_, V, W, G>) -> usize {
+    2 * view.neighbours.len()
+}
+
+/// Zones that one other vehicle occupies over a field: first come the places of each, then the columns in which those in the air
+/// off the plan may come down.
+fn zones_of_source<const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'_, V, W, G>,
+    source: usize,
+    tell: &mut dyn FnMut(KeepOutZone),
+) {
+    let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
+    match source.checked_sub(view.neighbours.len()) {
+        None => view.neighbours.places_of(source, view.now, [apart_m; 2], tell),
+        Some(i) => {
+            let beside_m = apart_m + view.neighbours.pair_position_error_m();
+            view.neighbours.landing_column(i, view.now, beside_m, |column| {
+                tell(KeepOutZone { kind: ZoneKind::Static, ..column });
+            });
+        }
+    }
+}
+
+/// Zones that all other vehicles occupy over a field.
 pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     tell: &mut dyn FnMut(KeepOutZone),
 ) {
-    let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
-    view.neighbours.for_each_place(view.now, [apart_m; 2], &mut *tell);
-    let beside_m = apart_m + view.neighbours.pair_position_error_m();
-    view.neighbours.for_each_landing_column(view.now, beside_m, |column| {
-        tell(KeepOutZone { kind: ZoneKind::Static, ..column });
-    });
+    (0..source_count(view)).for_each(|source| zones_of_source(view, source, tell));
 }
 
 /// The first free place of its path behind what blocks that, metres; none before its last descent, or before the gate that is
@@ -176,10 +194,17 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
         (away - axis * share).length() - thing.radius_m
     };
     let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
-    // Full beyond what may be near at once: the search for the way knows them all.
-    let mut add = |thing: KeepOutZone| _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
-    known.iter().for_each(|thing| add(*thing));
-    zones_of_others(view, &mut add);
+    let mut add = |thing: KeepOutZone, things: &mut Vec<_, MAX_ZONES>| {
+        _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
+    };
+    known.iter().for_each(|thing| add(*thing, &mut things));
+    for source in 0..source_count(view) {
+        // Full beyond what may be near at once: the search for the way knows them all.
+        if things.is_full() {
+            break;
+        }
+        zones_of_source(view, source, &mut |thing| add(thing, &mut things));
+    }
     let (mut at_m, mut met) = (from_m, false);
     for _ in 0..MAX_SAMPLES {
         let far = !met && at_m > from_m + LOOK_AHEAD_M + DETOUR_BEGINS_BEFORE_M;

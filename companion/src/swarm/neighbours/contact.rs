@@ -250,7 +250,7 @@ impl NeighbourEntry {
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
         if !self.heard_within(now, MAY_LAND_AFTER) {
             return self.for_each_place(upto_m, &mut |place, wider_m| {
-                let radius_m = libm::hypotf(apart_m, wider_m);
+                let radius_m = fpu::sqrtf(apart_m * apart_m + wider_m * wider_m);
                 let (from, to) = (place + up(LEVEL_M), place - up(self.column_depth_m(&place)));
                 tell(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
             });
@@ -420,7 +420,8 @@ impl NeighbourEntry {
             let nature = if down { ZoneKind::Grounded } else { ZoneKind::Static };
             let beside_m = if field.is_some() { VAGUE_POSITION_M } else { UNHEARD_BESIDE_M };
             self.for_each_place(upto_m, &mut |at, wider_m| {
-                let radius_m = libm::hypotf(apart_m + beside_m, wider_m);
+                let far_m = apart_m + beside_m;
+                let radius_m = fpu::sqrtf(far_m * far_m + wider_m * wider_m);
                 tell(KeepOutZone { radius_m, ..column(at, nature) });
             });
         } else {

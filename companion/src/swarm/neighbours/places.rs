@@ -60,17 +60,24 @@ impl<const V: usize> Neighbours<V> {
     /// Places of the other vehicles of the roster while they stand, those out of the plan among
     /// them: `apart_m` away from one in the air is far enough, and `lying_m` from one that lies,
     /// and no longer deviates.
-    pub fn for_each_place(
+    pub fn for_each_place(&self, now: Instant, apart: [f32; 2], mut tell: impl FnMut(KeepOutZone)) {
+        (0..self.roster).for_each(|i| self.places_of(i, now, apart, &mut tell));
+    }
+
+    /// The places of contact `i`.
+    pub(crate) fn places_of(
         &self,
+        i: usize,
         now: Instant,
         [apart_m, lying_m]: [f32; 2],
-        mut tell: impl FnMut(KeepOutZone),
+        tell: &mut dyn FnMut(KeepOutZone),
     ) {
-        let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
-        placed.for_each(|c| {
-            let far_m = if c.is_on_ground(now, self.down) { lying_m } else { apart_m };
-            c.keep_out_zones(now, [far_m, self.unheard_progress_m(c, now)], self.area_ground(), &mut tell);
-        });
+        let rostered = self.contacts[..self.roster].get(i);
+        if let Some(contact) = rostered.filter(|c| c.position_at.is_some()) {
+            let far_m = if contact.is_on_ground(now, self.down) { lying_m } else { apart_m };
+            let reach = [far_m, self.unheard_progress_m(contact, now)];
+            contact.keep_out_zones(now, reach, self.area_ground(), tell);
+        }
     }
 
     /// Columns in which vehicles that land without looking may come nearer than `apart_m`.
@@ -126,12 +133,12 @@ impl<const V: usize> Neighbours<V> {
     /// ground at `floor_m`: from where it may have come along its path it comes down, never up.
     pub(crate) fn may_lie_below(&self, i: usize, place: &Point, floor_m: f32, apart_m: f32) -> bool {
         let Some(contact) = self.contacts.get(i).filter(|c| c.is_under_way()) else { return false };
-        let mut below = false;
+        let (mut below, low_m) = (false, floor_m - apart_m);
         let mut near = |a: Point, b: Point| {
             let (leg, away) = ((b - a).xy(), (place - a).xy());
             let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
-            let high_m = libm::fmaxf(a.z, b.z);
-            below |= (away - leg * share).norm_squared() < apart_m * apart_m && high_m > floor_m - apart_m;
+            let high = a.z > low_m || b.z > low_m;
+            below |= high && (away - leg * share).norm_squared() < apart_m * apart_m;
         };
         contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
             near(at, if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next });
