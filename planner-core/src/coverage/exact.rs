@@ -163,7 +163,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
             state = ((state / sets) & !(1 << v)) * sets + ((state % sets) & !(1 << layer));
             let first = self.ws.states[state].0;
             debug_assert_eq!(self.ws.reaches[usize::from(step) * stride + first as usize], end);
-            let (ground_m, heading) = self.work.ground_distance_m(&self.work.vehicles[v], first, end);
+            let (ground_m, heading) =
+                self.work.ground_distance_m(&self.work.vehicles[v], &self.work.route_ends(first, end));
             let route = Route {
                 vehicle: v as u8,
                 first,

@@ -213,29 +213,42 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
     }
 
-    /// The way of a vehicle over ground if it flies from waypoint `from` to waypoint `to`, without the route between
-    /// them.
-    fn transit_m(&self, vehicle: &Vehicle, from: u32, to: u32) -> f32 {
-        let place = |number| self.tracks.waypoint(number).unwrap_or(vehicle.place);
-        self.transit.distance_m(&vehicle.place, &place(from))
-            + self.transit.distance_m(&place(to), &vehicle.home)
+    /// The ends of waypoints `first` up to before `end`.
+    #[inline(never)]
+    pub(super) fn route_ends(&self, first: u32, end: u32) -> RouteEnds {
+        let place = |number| self.tracks.waypoint(number).unwrap_or_default();
+        RouteEnds {
+            first: place(first),
+            last: place(end - 1),
+            inside_m: self.tracks.distance_to_waypoint_m(end - 1) - self.tracks.distance_to_waypoint_m(first),
+        }
     }
 
-    /// A vehicle's way over ground for waypoints `first` up to before `end`, in the better direction.
-    pub(super) fn ground_distance_m(&self, vehicle: &Vehicle, first: u32, end: u32) -> (f32, Heading) {
-        let inside = self.tracks.distance_to_waypoint_m(end - 1) - self.tracks.distance_to_waypoint_m(first);
-        let forward = self.transit_m(vehicle, first, end - 1);
+    /// A vehicle's way over ground for a route with these ends, in the better direction.
+    #[inline(never)]
+    pub(super) fn ground_distance_m(&self, vehicle: &Vehicle, ends: &RouteEnds) -> (f32, Heading) {
+        let transit_m = |from: &Flat, to: &Flat| {
+            self.transit.distance_m(&vehicle.place, from) + self.transit.distance_m(to, &vehicle.home)
+        };
+        let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.place == vehicle.home {
             // The same transits the other way round.
             forward
         } else {
-            self.transit_m(vehicle, end - 1, first)
+            transit_m(&ends.last, &ends.first)
         };
         match backward < forward {
-            true => (backward + inside, Heading::Backward),
-            false => (forward + inside, Heading::Forward),
+            true => (backward + ends.inside_m, Heading::Backward),
+            false => (forward + ends.inside_m, Heading::Forward),
         }
     }
+}
+
+/// The first and the last waypoint of a route, and the way between them, metres.
+pub(super) struct RouteEnds {
+    first: Flat,
+    last: Flat,
+    inside_m: f32,
 }
 
 /// BINPAT, or SIMPLE-BINPAT where a track is a lane: shares by the vehicles' weights.
@@ -379,11 +392,11 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
             cost_m: 0.0,
             cost_s: 0.0,
         };
-        let inside = work.tracks.distance_to_waypoint_m(end - 1) - work.tracks.distance_to_waypoint_m(start);
+        let ends = work.route_ends(start, end);
         for vehicle in work.vehicles {
             let may = bins == BinEligibility::Anyone || vehicle.weight == work.vehicles[k].weight;
-            let ground = work.ground_distance_m(vehicle, start, end).0;
-            let _ = ws.transits_m.push(if may { ground - inside } else { f32::INFINITY });
+            let ground = work.ground_distance_m(vehicle, &ends).0;
+            let _ = ws.transits_m.push(if may { ground - ends.inside_m } else { f32::INFINITY });
         }
         out.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
         start = end;
@@ -398,7 +411,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
         let vehicle = usize::from(ws.columns[row].ok_or(CoverageError::Unreachable)?);
         route.vehicle = vehicle as u8;
         (route.ground_m, route.heading) =
-            work.ground_distance_m(&work.vehicles[vehicle], route.first, route.end);
+            work.ground_distance_m(&work.vehicles[vehicle], &work.route_ends(route.first, route.end));
         if !route.ground_m.is_finite() {
             return Err(CoverageError::Unreachable);
         }

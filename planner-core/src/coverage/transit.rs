@@ -99,10 +99,15 @@ impl<'a, const N: usize> Transit<'a, N> {
 
     /// Whether a straight line stays outside all no-fly zones.
     pub fn is_line_clear(&self, from: &Flat, to: &Flat) -> bool {
-        let (low, high) = (from.inf(to), from.sup(to));
+        if !self.area.has_no_fly() {
+            return true;
+        }
+        // Both ends of an edge beyond the same end of the line, on one axis.
+        let beyond = |a: f32, b: f32, from: f32, to: f32| {
+            (a > from && a > to && b > from && b > to) || (a < from && a < to && b < from && b < to)
+        };
         let meets = |(a, b): (Flat, Flat)| {
-            let (c, d) = (a.inf(&b), a.sup(&b));
-            if c.x > high.x || d.x < low.x || c.y > high.y || d.y < low.y {
+            if beyond(a.x, b.x, from.x, to.x) || beyond(a.y, b.y, from.y, to.y) {
                 return false;
             }
             let (along, edge) = (to - from, b - a);
