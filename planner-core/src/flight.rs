@@ -70,6 +70,7 @@ impl<const W: usize> Path<W> {
     }
 
     /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of the two.
+    #[inline(never)]
     pub fn push(&mut self, position: Point, clearance_m: f32) -> Result<(), PathError> {
         if !(position.iter().all(|c| c.is_finite()) && clearance_m.is_finite()) {
             return Err(PathError::NotFinite);

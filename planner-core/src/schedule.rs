@@ -86,40 +86,66 @@ pub fn earliest_departure<'a, const W: usize>(
     departure_with_handover(cfg, flight, (not_before_s, 0.0), scheduled, ws)
 }
 
-/// As `departure`, but a place is free only `handover_s` after its vehicle has left it.
+/// As [`earliest_departure`], but a place is free only `handover_s` after its vehicle has left it.
 pub(crate) fn departure_with_handover<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
-    (not_before_s, handover_s): (f32, f32),
-    scheduled: impl Iterator<Item = &'a Flight<W>>,
+    times: (f32, f32),
+    mut scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
+    departure_and_conflicts(cfg, flight, times, &mut scheduled, ws, &mut |_, _| {})
+}
+
+/// As [`departure_with_handover`]. `met` is called for each of `scheduled`, by its place among them, with the numbers of timed segments
+/// of `flight` and of that one that are in conflict with the other's: neither has more gates for the other.
+#[inline(never)]
+pub(crate) fn departure_and_conflicts<'a, const W: usize>(
+    cfg: &ScheduleConfig,
+    flight: &Flight<W>,
+    (not_before_s, handover_s): (f32, f32),
+    scheduled: &mut dyn Iterator<Item = &'a Flight<W>>,
+    ws: &mut ScheduleWorkspace,
+    met: &mut dyn FnMut(usize, [u32; 2]),
+) -> Result<f32, ScheduleError> {
     cut_into_segments(cfg, flight, &mut ws.own)?;
-    ws.blocks.rebuild(&ws.own);
-    ws.forbidden.clear();
-    for other in scheduled {
-        if ws.blocks.are_far_from(cfg, other) {
-            continue;
-        }
-        cut_into_segments(cfg, other, &mut ws.other)?;
-        for block in ws.other.chunks(SEGMENTS_PER_BLOCK) {
-            let near = ws.blocks.blocks_near(cfg, block);
-            if near == 0 {
-                continue;
-            }
-            for q in block {
-                for p in segments_in_blocks(near, &ws.own).filter(|p| is_conflict(cfg, p, q)) {
-                    // Held together iff p.from + d < q.to and q.from < p.to + d.
-                    add_forbidden_interval(
-                        &mut ws.forbidden,
-                        other.depart_s + q.from_s - handover_s - p.to_s,
-                        other.depart_s + q.to_s + handover_s - p.from_s,
-                    );
+    let ScheduleWorkspace { own, blocks, forbidden, .. } = ws;
+    blocks.rebuild(own);
+    forbidden.clear();
+    for (nth, other) in scheduled.enumerate() {
+        let (mut own_in_conflict, mut others_in_conflict) = ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
+        for (part, near) in blocks.parts_near(cfg, other) {
+            let mut compare = |some: &[TimedSegment]| {
+                let (Some(first), Some(last)) = (some.first(), some.last()) else { return };
+                let short = last.to_m - first.from_m >= part.leg.length_m;
+                let near = if short { near } else { blocks.blocks_near_line(cfg, first.from, last.to) };
+                for q in some {
+                    let mut meets = false;
+                    for (i, p) in segments_in_blocks(near, own).filter(|(_, p)| is_conflict(cfg, p, q)) {
+                        // Held together iff p.from + d < q.to and q.from < p.to + d.
+                        let from_s = other.depart_s + q.from_s - handover_s - p.to_s;
+                        let to_s = other.depart_s + q.to_s + handover_s - p.from_s;
+                        add_forbidden_interval(forbidden, from_s, to_s);
+                        own_in_conflict[i / 64] |= 1 << (i % 64);
+                        meets = true;
+                    }
+                    others_in_conflict += u32::from(meets);
                 }
-            }
+            };
+            let mut block = Vec::<TimedSegment, SEGMENTS_PER_BLOCK>::new();
+            part.for_each_segment(other.segment_m, &mut |segment| {
+                if block.is_full() {
+                    compare(&block);
+                    block.clear();
+                }
+                // Cannot overflow: it was emptied.
+                let _ = block.push(segment);
+            });
+            compare(&block);
         }
+        met(nth, [own_in_conflict.iter().map(|bits| bits.count_ones()).sum(), others_in_conflict]);
     }
-    first_allowed(&ws.forbidden, not_before_s).ok_or(ScheduleError::Blocked)
+    first_allowed(forbidden, not_before_s).ok_or(ScheduleError::Blocked)
 }
 
 /// The differences of take-off times, of `a` after `b`, between which the two flights may meet: one interval, seconds; the
@@ -257,7 +283,7 @@ fn for_each_gate<const W: usize>(
     let moves = |piece: &&TimedSegment| piece.parked || piece.to_m > piece.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
-        if ws.blocks.are_far_from(cfg, other) {
+        if ws.blocks.parts_near(cfg, other).next().is_none() {
             continue;
         }
         cut_into_segments(cfg, other, &mut ws.other)?;
@@ -272,7 +298,7 @@ fn for_each_gate<const W: usize>(
                 other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && is_conflict(cfg, p, q)
             };
             let (mut until_m, mut open_s) = (highest, f32::NEG_INFINITY);
-            for q in segments_in_blocks(near, &ws.other).filter(moves).filter(earlier) {
+            for q in segments_in_blocks(near, &ws.other).map(|(_, q)| q).filter(moves).filter(earlier) {
                 let left_m = cleared_at_m(q, other);
                 if left_m > until_m {
                     (until_m, open_s) = (left_m, other.depart_s + q.to_s);

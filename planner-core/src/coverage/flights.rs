@@ -104,8 +104,9 @@ pub fn plan_flights<const L: usize, const N: usize, const K: usize, const V: usi
         let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
-    schedule_departures(swarm, ws, out)?;
-    for (index, flight) in out.flights.iter().enumerate() {
+    let most_gates = schedule_departures(swarm, ws, out)?;
+    let crowded = |index: &usize| most_gates[*index] as usize > swarm.max_gates;
+    for (index, flight) in out.flights.iter().enumerate().filter(|(index, _)| crowded(index)) {
         schedule::gate_merge_distance_m(&swarm.schedule, &out.flights, index, swarm.max_gates, ws)
             .map_err(|e| PlanError::Schedule(flight.id, e))?;
     }
@@ -164,12 +165,12 @@ pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
 }
 
 /// The vehicle that flies longest leaves first, each other one as early as those before it allow. One that they leave no
-/// departure goes before all of them, and the search begins again.
+/// departure goes before all of them, and the search begins again. Returns a bound of each vehicle's gates.
 fn schedule_departures<const V: usize, const W: usize>(
     swarm: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
-) -> Result<(), PlanError> {
+) -> Result<[u32; V], PlanError> {
     let cfg = &swarm.schedule;
     let mut order: Vec<(bool, f32, u16), V> = Vec::new();
     for (flight, i) in out.flights.iter().zip(0..) {
@@ -180,33 +181,44 @@ fn schedule_departures<const V: usize, const W: usize>(
     sort::sort_by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
     let stay = order.iter().filter(|(flies, ..)| !flies).count();
     let mut tries = order.len();
-    while let Err((place, error)) = schedule_in_order(cfg, &order, ws, out) {
-        tries = tries.saturating_sub(1);
-        if tries == 0 || place == stay || error != ScheduleError::Blocked {
-            return Err(PlanError::Schedule(out.flights[usize::from(order[place].2)].id, error));
+    loop {
+        match schedule_in_order(cfg, &order, ws, out) {
+            Ok(most_gates) => return Ok(most_gates),
+            Err((place, error)) => {
+                tries = tries.saturating_sub(1);
+                if tries == 0 || place == stay || error != ScheduleError::Blocked {
+                    return Err(PlanError::Schedule(out.flights[usize::from(order[place].2)].id, error));
+                }
+                order[stay..=place].rotate_right(1);
+            }
         }
-        order[stay..=place].rotate_right(1);
     }
-    Ok(())
 }
 
-/// Lets vehicles leave in this order; the place of the first that cannot.
+/// Lets vehicles leave in this order; a bound of each one's gates, or the place of the first that cannot.
 fn schedule_in_order<const V: usize, const W: usize>(
     cfg: &ScheduleConfig,
     order: &[(bool, f32, u16)],
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
-) -> Result<(), (usize, ScheduleError)> {
+) -> Result<[u32; V], (usize, ScheduleError)> {
+    let mut most_gates = [0; V];
     for (place, &(flies, _, i)) in order.iter().enumerate() {
         if !flies {
             continue;
         }
-        let before = order[..place].iter().map(|&(_, _, j)| &out.flights[usize::from(j)]);
+        let index = |place: usize| usize::from(order[place].2);
+        let mut before = (0..place).map(|place| &out.flights[index(place)]);
         let flight = &out.flights[usize::from(i)];
-        let departure = schedule::earliest_departure(cfg, flight, 0.0, before, ws);
+        let mut count = |place: usize, [own, theirs]: [u32; 2]| {
+            most_gates[usize::from(i)] += own;
+            most_gates[index(place)] += theirs;
+        };
+        let departure =
+            schedule::departure_and_conflicts(cfg, flight, (0.0, 0.0), &mut before, ws, &mut count);
         out.flights[usize::from(i)].depart_s = departure.map_err(|error| (place, error))?;
     }
-    Ok(())
+    Ok(most_gates)
 }
 
 fn point_at_height(place: &Flat, height_m: f32) -> Point {
@@ -260,20 +272,23 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// The corners of the way around no-fly zones, and its end.
-    fn corners_around_zones(&self, to: &Flat) -> impl Iterator<Item = Flat> + use<N, W> {
-        let mut corners: Vec<Flat, N> = Vec::new();
+    /// The corners of the way around no-fly zones.
+    #[inline(never)]
+    fn corners_around_zones(&self, to: &Flat) -> Vec<Flat, N> {
+        let mut corners = Vec::new();
         // The plan has a finite length, so there is a way between all that it joins.
         if self.transit.shortest_path(&self.here.xy(), to, &mut corners).is_err() {
             corners.clear();
         }
-        corners.into_iter().chain([*to])
+        corners
     }
 
     /// Appends legs around no-fly zones, all at one height.
     fn add_legs_around_zones(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
-        self.corners_around_zones(to)
-            .try_for_each(|corner| self.add_straight_leg(point_at_height(&corner, height_m)).map(|_| ()))
+        for corner in &self.corners_around_zones(to) {
+            self.add_straight_leg(point_at_height(corner, height_m))?;
+        }
+        self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
     }
 
     /// Appends the descent to the start of the first lane, which leads to `end`. Returns the index of that waypoint.
@@ -297,9 +312,10 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
 
     /// As `add_picture_leg`, around no-fly zones.
     fn add_picture_legs_around_zones(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
-        self.corners_around_zones(to)
-            .try_for_each(|corner| self.add_picture_leg(&corner, mission_m).map(|_| ()))?;
-        self.path.last().ok_or(PathError::NotFinite)
+        for corner in &self.corners_around_zones(to) {
+            self.add_picture_leg(corner, mission_m)?;
+        }
+        self.add_picture_leg(to, mission_m)
     }
 }
 

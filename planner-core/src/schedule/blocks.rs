@@ -5,10 +5,10 @@
 //! comparison of all with all. Cost: one pass over both flights, and blocks × blocks.
 
 use heapless::Vec;
-use libm::{fmaxf, fminf};
+use libm::fmaxf;
 
 use super::config::ScheduleConfig;
-use super::pieces::{MAX_TIMED_SEGMENTS, TimedSegment};
+use super::pieces::{MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, straight_part};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
@@ -24,6 +24,9 @@ const MAX_GROUPS: usize = MAX_BLOCKS.div_ceil(BLOCKS_PER_GROUP);
 /// Most that rounding takes from a distance between places kilometres away, metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
+/// Most that rounding takes from the length of a block's segments, metres.
+const LENGTH_ROUNDING_M: f32 = 0.01;
+
 /// Blocks of a flight, a bit each.
 pub(super) type Bits = u64;
 
@@ -38,28 +41,28 @@ struct Block {
     bounding_box: BoundingBox,
     /// Line from the beginning of the first segment to the end of the last.
     line: (Point, Point),
-    /// Greatest distance of the other segments beside that line, metres.
+    /// A bound of the distance of its segments beside that line, metres.
     lateral_extent_m: f32,
 }
 
 impl Block {
+    /// Around consecutive segments. No point of them is further beside the line from end to end than a curve as long can go:
+    /// half the minor axis of the ellipse about both ends.
     fn around_segments(pieces: &[TimedSegment]) -> Self {
-        let from = pieces[0].from;
-        let mut block =
-            Self { bounding_box: BoundingBox(from, from), line: (from, from), lateral_extent_m: 0.0 };
-        for piece in pieces {
-            block.bounding_box.include(&piece.to, &piece.to);
-            block.line.1 = piece.to;
-        }
+        let (first, last) = (&pieces[0], &pieces[pieces.len() - 1]);
+        let mut block = Self::around_line(first.from, last.to);
+        pieces.iter().for_each(|piece| block.bounding_box.include(&piece.to, &piece.to));
+        let length_m = last.to_m - first.from_m + LENGTH_ROUNDING_M;
+        let bent_sq = length_m * length_m - (last.to - first.from).norm_squared();
+        block.lateral_extent_m = 0.5 * fpu::sqrtf(fmaxf(bent_sq, 0.0));
         block
     }
 
-    /// The block with the greatest distance of its segments from its line.
-    fn with_line(mut self, pieces: &[TimedSegment]) -> Self {
-        let beside =
-            |piece: &TimedSegment| segments_distance_sq((&self.line.0, &self.line.1), (&piece.to, &piece.to));
-        self.lateral_extent_m = fpu::sqrtf(pieces.iter().map(beside).fold(0.0, fmaxf));
-        self
+    /// Around a straight line.
+    fn around_line(from: Point, to: Point) -> Self {
+        let mut bounding_box = BoundingBox(from, from);
+        bounding_box.include(&to, &to);
+        Self { bounding_box, line: (from, to), lateral_extent_m: 0.0 }
     }
 
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
@@ -74,10 +77,16 @@ impl Block {
 struct BoundingBox(Point, Point);
 
 impl BoundingBox {
+    #[inline(never)]
     fn include(&mut self, low: &Point, high: &Point) {
+        // Not `fminf`: what that does about numbers that are none takes a board ten times as long.
         for axis in 0..3 {
-            self.0[axis] = fminf(self.0[axis], low[axis]);
-            self.1[axis] = fmaxf(self.1[axis], high[axis]);
+            if low[axis] < self.0[axis] {
+                self.0[axis] = low[axis];
+            }
+            if high[axis] > self.1[axis] {
+                self.1[axis] = high[axis];
+            }
         }
     }
 
@@ -102,9 +111,7 @@ impl Blocks {
     pub(super) fn rebuild(&mut self, pieces: &[TimedSegment]) {
         self.blocks.clear();
         // Cannot overflow: there are no more pieces than blocks have room for.
-        pieces
-            .chunks(SEGMENTS_PER_BLOCK)
-            .for_each(|some| _ = self.blocks.push(Block::around_segments(some).with_line(some)));
+        pieces.chunks(SEGMENTS_PER_BLOCK).for_each(|some| _ = self.blocks.push(Block::around_segments(some)));
         self.groups.clear();
         for blocks in self.blocks.chunks(BLOCKS_PER_GROUP) {
             let mut around = blocks[0].bounding_box;
@@ -114,37 +121,58 @@ impl Blocks {
         }
     }
 
-    /// Whether another flight keeps so far away that no segment of it need be looked at: each of its legs, its climb and its
-    /// descent.
-    pub(super) fn are_far_from<const W: usize>(&self, cfg: &ScheduleConfig, flight: &Flight<W>) -> bool {
-        let waypoints = flight.path.waypoints();
-        let down =
-            |waypoint: &Waypoint, m: f32| (waypoint.position, waypoint.position - Point::new(0.0, 0.0, m));
-        let ends = [
-            waypoints.first().map(|first| down(first, flight.climb_m)),
-            waypoints.last().map(|last| down(last, flight.descent_m)),
-        ];
-        let legs = waypoints.windows(2).map(|leg| (leg[0].position, leg[1].position));
-        !ends.into_iter().flatten().chain(legs).any(|(from, to)| self.is_near_leg(cfg, &from, &to))
+    /// The straight parts of another flight that may come too near, in order, each with the blocks that it may come near to.
+    pub(super) fn parts_near<'f, const W: usize>(
+        &'f self,
+        cfg: &'f ScheduleConfig,
+        flight: &'f Flight<W>,
+    ) -> impl Iterator<Item = (StraightPart, Bits)> + use<'f, W> {
+        let (mut next, mut checked_to) = (0, 1);
+        core::iter::from_fn(move || {
+            loop {
+                if next >= checked_to {
+                    let run = level_run(&flight.path.waypoints()[next - 1..]);
+                    checked_to = next + run.len().saturating_sub(1).max(1);
+                    if run.len() > 2 && self.are_far_from_run(cfg, run) {
+                        next = checked_to;
+                    }
+                }
+                let part = straight_part(cfg.vertical_mps, flight, next)?;
+                next += 1;
+                let near = self.blocks_near_line(cfg, part.leg.from, part.leg.to);
+                if near != 0 {
+                    return Some((part, near));
+                }
+            }
+        })
     }
 
-    /// Whether a leg meets the box of any group.
-    #[inline(never)]
-    fn is_near_leg(&self, cfg: &ScheduleConfig, from: &Point, to: &Point) -> bool {
-        let mut leg = BoundingBox(*from, *from);
-        leg.include(to, to);
-        self.groups.iter().any(|group| group.is_within(&leg, conflict_distance_m(cfg)))
+    /// Whether no leg between these waypoints comes near.
+    fn are_far_from_run(&self, cfg: &ScheduleConfig, run: &[Waypoint]) -> bool {
+        let (reach_m, first) = (conflict_distance_m(cfg), run[0].position);
+        let mut around = BoundingBox(first, first);
+        run.iter().for_each(|waypoint| around.include(&waypoint.position, &waypoint.position));
+        self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).all(|(group, blocks)| {
+            let is_near = |own: &BoundingBox| own.is_within(&around, reach_m);
+            !is_near(group) || !blocks.iter().any(|own| is_near(&own.bounding_box))
+        })
+    }
+
+    /// The blocks that may come too near to another flight on a straight line.
+    pub(super) fn blocks_near_line(&self, cfg: &ScheduleConfig, from: Point, to: Point) -> Bits {
+        self.blocks_near_block(cfg, &Block::around_line(from, to))
     }
 
     /// The blocks that may come too near to these segments of another flight, which are at most [`SEGMENTS_PER_BLOCK`] in a row.
-    #[inline(never)]
     pub(super) fn blocks_near(&self, cfg: &ScheduleConfig, pieces: &[TimedSegment]) -> Bits {
-        if pieces.is_empty() {
-            return 0;
-        }
+        if pieces.is_empty() { 0 } else { self.blocks_near_block(cfg, &Block::around_segments(pieces)) }
+    }
+
+    /// The blocks that may come too near to another block.
+    #[inline(never)]
+    fn blocks_near_block(&self, cfg: &ScheduleConfig, other: &Block) -> Bits {
         let reach_m = conflict_distance_m(cfg);
-        let mut other = Block::around_segments(pieces);
-        let (mut near, mut has_line) = (0, false);
+        let mut near = 0;
         for (group, (around, blocks)) in
             self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
         {
@@ -152,19 +180,20 @@ impl Blocks {
                 continue;
             }
             for (bit, own) in blocks.iter().enumerate() {
-                if !own.bounding_box.is_within(&other.bounding_box, reach_m) {
-                    continue;
-                }
-                if !has_line {
-                    (other, has_line) = (other.with_line(pieces), true);
-                }
-                if own.lines_meet(&other, reach_m) {
+                if own.bounding_box.is_within(&other.bounding_box, reach_m) && own.lines_meet(other, reach_m)
+                {
                     near |= 1 << (group * BLOCKS_PER_GROUP + bit);
                 }
             }
         }
         near
     }
+}
+
+/// The first waypoints, as many as are at one height: legs between them are first compared together.
+fn level_run(waypoints: &[Waypoint]) -> &[Waypoint] {
+    let level = |waypoint: &&Waypoint| waypoint.position.z == waypoints[0].position.z;
+    &waypoints[..waypoints.iter().take_while(level).count()]
 }
 
 /// Distance from which on two segments are in no conflict, metres.
@@ -181,9 +210,15 @@ pub(super) fn set_bit_indices(mut bits: Bits) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The segments of these blocks, in order.
-pub(super) fn segments_in_blocks(near: Bits, pieces: &[TimedSegment]) -> impl Iterator<Item = &TimedSegment> {
-    set_bit_indices(near).flat_map(|block| pieces.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
+/// The segments of these blocks and their indices, in order.
+pub(super) fn segments_in_blocks(
+    near: Bits,
+    pieces: &[TimedSegment],
+) -> impl Iterator<Item = (usize, &TimedSegment)> {
+    set_bit_indices(near).flat_map(|block| {
+        let first = block * SEGMENTS_PER_BLOCK;
+        (first..).zip(pieces.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
+    })
 }
 
 #[cfg(test)]
@@ -239,7 +274,7 @@ mod tests {
                 let near = blocks.blocks_near(&CFG, some);
                 for q in some {
                     let expected = all(&mut own.iter(), q);
-                    prop_assert_eq!(all(&mut segments_in_blocks(near, &own), q), expected);
+                    prop_assert_eq!(all(&mut segments_in_blocks(near, &own).map(|(_, p)| p), q), expected);
                 }
             }
         }
@@ -283,7 +318,7 @@ mod tests {
             cut_into_segments(&CFG, &other, &mut other_pieces).unwrap();
             let mut blocks = Blocks::new();
             blocks.rebuild(&own_pieces);
-            let far = blocks.are_far_from(&CFG, &other);
+            let far = blocks.parts_near(&CFG, &other).next().is_none();
             let meet = other_pieces.iter().any(|q| own_pieces.iter().any(|p| is_conflict(&CFG, p, q)));
             prop_assert!(!(far && meet));
         }

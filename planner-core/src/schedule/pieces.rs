@@ -42,7 +42,9 @@ impl<const W: usize> Flight<W> {
     pub(crate) fn fit_segment_length(&mut self) {
         self.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_SEGMENT_DOUBLINGS {
-            if self.segment_count() <= MAX_TIMED_SEGMENTS {
+            // Each leg rounds its number of segments up: the path alone may show that they are too many.
+            let too_many = self.path.length_m() > self.segment_m * (MAX_TIMED_SEGMENTS + 1) as f32;
+            if !too_many && self.segment_count() <= MAX_TIMED_SEGMENTS {
                 break;
             }
             self.segment_m *= 2.0;
@@ -71,67 +73,107 @@ impl<const W: usize> Flight<W> {
     }
 }
 
-/// Cuts a flight into timed segments of at most `flight.piece_m`.
+/// A straight part of a flight: a stay, a leg, a stay. Either stay may be missing, and a leg without length has no segments.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StraightPart {
+    before: Option<TimedSegment>,
+    pub(super) leg: Leg,
+    /// Beginning and end of the leg, metres along the path.
+    from_m: f32,
+    to_m: f32,
+    after: Option<TimedSegment>,
+}
+
+impl StraightPart {
+    /// Gives out its timed segments of at most `segment_m`, in order. One copy of it: a board has little room.
+    #[inline(never)]
+    pub(super) fn for_each_segment(&self, segment_m: f32, tell: &mut dyn FnMut(TimedSegment)) {
+        self.before.into_iter().for_each(&mut *tell);
+        self.leg.segments(self.from_m, self.to_m, segment_m).for_each(&mut *tell);
+        self.after.into_iter().for_each(tell);
+    }
+}
+
+/// Straight part `part` of a flight, which lands at `vertical_mps`: the pad and the climb come first, then each leg after what is
+/// held at its beginning, and the descent after the last. `None` beyond that.
 ///
 /// A climb is flown in one go, and so are a descent and what follows it, the landing place. All segments of such a group are
 /// held from its beginning; each is free again when the vehicle has left it.
+pub(super) fn straight_part<const W: usize>(
+    vertical_mps: f32,
+    flight: &Flight<W>,
+    part: usize,
+) -> Option<StraightPart> {
+    let waypoints = flight.path.waypoints();
+    if part == 0 {
+        return waypoints.first().map(|first| climb_part(flight, first));
+    }
+    let (begin, next) = (waypoints.get(part - 1)?, waypoints.get(part));
+    if !flight.task.leaves_pad() {
+        return None;
+    }
+    let holds = begin.leave_s > begin.arrive_s;
+    let hold = stay(begin.position, begin.along_m, begin.arrive_s, begin.leave_s);
+    let before = holds.then_some(TimedSegment { parked: false, ..hold });
+    Some(match next {
+        Some(next) => StraightPart { before, ..leg_part(begin, next) },
+        None => StraightPart { before, ..descent_part(flight, begin, vertical_mps) },
+    })
+}
+
+/// A place that is held.
+fn stay(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
+    TimedSegment { from: at, to: at, from_m: m, to_m: m, from_s, to_s, parked: true }
+}
+
+fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightPart {
+    let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
+    let (from_m, to_m) = (-flight.climb_m, 0.0);
+    if !flight.task.leaves_pad() {
+        let before = Some(stay(pad, from_m, f32::NEG_INFINITY, f32::INFINITY));
+        return StraightPart { before, leg: Leg::climb(pad, pad, 0.0), from_m, to_m: from_m, after: None };
+    }
+    let leg = Leg::climb(pad, first.position, first.arrive_s);
+    let (left_m, left_s) = leg.first_segment(flight.segment_m);
+    let on_pad = stay(pad, from_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
+    let before = Some(TimedSegment { to_m: left_m - flight.climb_m, ..on_pad });
+    StraightPart { before, leg, from_m, to_m, after: None }
+}
+
+fn leg_part(begin: &Waypoint, next: &Waypoint) -> StraightPart {
+    let leg = Leg {
+        from: begin.position,
+        to: next.position,
+        length_m: next.along_m - begin.along_m,
+        from_s: begin.leave_s,
+        to_s: next.arrive_s,
+        stops: WaitingPlaces::Anywhere,
+    };
+    StraightPart { before: None, leg, from_m: begin.along_m, to_m: next.along_m, after: None }
+}
+
+fn descent_part<const W: usize>(flight: &Flight<W>, last: &Waypoint, vertical_mps: f32) -> StraightPart {
+    let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
+    let end_m = last.along_m + flight.descent_m;
+    let landed_s = last.leave_s + flight.descent_m / vertical_mps;
+    let leg = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
+    let landed = stay(ground, end_m, last.leave_s, f32::INFINITY);
+    let after = Some(TimedSegment { from_m: last.along_m, ..landed });
+    StraightPart { before: None, leg, from_m: last.along_m, to_m: end_m, after }
+}
+
+/// Cuts a flight into timed segments of at most `flight.segment_m`.
 pub(super) fn cut_into_segments<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
     out: &mut Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
 ) -> Result<(), ScheduleError> {
     out.clear();
-    let waypoints = flight.path.waypoints();
-    let (Some(first), Some(last)) = (waypoints.first(), waypoints.last()) else {
-        return Ok(());
-    };
-    let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
-    let stay = |at: Point, m: f32, from_s: f32, to_s: f32| TimedSegment {
-        from: at,
-        to: at,
-        from_m: m,
-        to_m: m,
-        from_s,
-        to_s,
-        parked: true,
-    };
-    let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
-    if !flight.task.leaves_pad() {
-        return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
+    let mut full = false;
+    for part in (0..).map_while(|part| straight_part(cfg.vertical_mps, flight, part)) {
+        part.for_each_segment(flight.segment_m, &mut |segment| full |= out.push(segment).is_err());
     }
-    let climb = Leg::climb(pad, first.position, first.arrive_s);
-    let (left_m, left_s) = climb.first_segment(flight.segment_m);
-    let on_pad = stay(pad, -flight.climb_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
-    push(TimedSegment { to_m: left_m - flight.climb_m, ..on_pad })?;
-    for piece in climb.segments(-flight.climb_m, 0.0, flight.segment_m) {
-        push(piece)?;
-    }
-    for (i, waypoint) in waypoints.iter().enumerate() {
-        if waypoint.leave_s > waypoint.arrive_s {
-            let hold = stay(waypoint.position, waypoint.along_m, waypoint.arrive_s, waypoint.leave_s);
-            push(TimedSegment { parked: false, ..hold })?;
-        }
-        let Some(next) = waypoints.get(i + 1) else { break };
-        let leg = Leg {
-            from: waypoint.position,
-            to: next.position,
-            length_m: next.along_m - waypoint.along_m,
-            from_s: waypoint.leave_s,
-            to_s: next.arrive_s,
-            stops: WaitingPlaces::Anywhere,
-        };
-        for piece in leg.segments(waypoint.along_m, next.along_m, flight.segment_m) {
-            push(piece)?;
-        }
-    }
-    let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
-    let end_m = last.along_m + flight.descent_m;
-    let landed_s = last.leave_s + flight.descent_m / cfg.vertical_mps;
-    let descent = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
-    for piece in descent.segments(last.along_m, end_m, flight.segment_m) {
-        push(piece)?;
-    }
-    push(TimedSegment { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
+    if full { Err(ScheduleError::PiecesFull) } else { Ok(()) }
 }
 
 /// Part of a leg on which a vehicle may wait.
@@ -185,8 +227,10 @@ impl Leg {
             let mix = |a: f32, b: f32| a + (b - a) * share;
             (self.from + (self.to - self.from) * share, mix(from_m, to_m), mix(self.from_s, self.to_s))
         };
+        let mut begin = at(0);
         (0..parts).map(move |part| {
-            let ((from, start_m, start_s), (to, to_m, to_s)) = (at(part), at(part + 1));
+            let (to, to_m, to_s) = at(part + 1);
+            let (from, start_m, start_s) = core::mem::replace(&mut begin, (to, to_m, to_s));
             let (from_m, from_s) =
                 if self.stops == WaitingPlaces::Before { (from_m, self.from_s) } else { (start_m, start_s) };
             TimedSegment { from, to, from_m, to_m, from_s, to_s, parked: false }

@@ -1,3 +1,5 @@
+extern crate std;
+
 pub(crate) mod checker;
 
 use super::*;
@@ -61,6 +63,59 @@ proptest! {
         if schedule(&mut pair).is_ok() {
             let apart = checker::fly(&CFG, &pair, &[speeds.0, speeds.1], 8000);
             prop_assert!(apart.as_ref().is_ok_and(|&d| d >= CFG.parked_separation_m - 1e-3), "{apart:?} {pair:?}");
+        }
+    }
+}
+
+/// A flight over a field: many lanes at one height, or corners at any.
+fn field_flight(id: u8, corners: &[(f32, f32, f32)], level: bool, climb_m: f32) -> Flight<8> {
+    let mut path = Path::new();
+    for &(x, y, z) in corners {
+        path.push(Point::new(x, y, if level { 30.0 } else { z }), 1.0).unwrap();
+    }
+    path.label_times(climb_m / CFG.vertical_mps, CFG.cruise_mps);
+    let mut flight = Flight { climb_m, descent_m: climb_m, path, ..flight(id, &[(0.0, 0.0)]) };
+    flight.fit_segment_length();
+    flight
+}
+
+fn field_corners() -> impl Strategy<Value = std::vec::Vec<(f32, f32, f32)>> {
+    proptest::collection::vec((-120.0f32..120.0, -120.0f32..120.0, 25.0f32..60.0), 1..8)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1500))]
+    /// A departure is that of a comparison of all segments with all, to the bit, and neither flight has more gates for the other than
+    /// segments in conflict.
+    #[test]
+    fn departures_are_those_of_all_segments(
+        own in (field_corners(), any::<bool>(), 0.0f32..40.0),
+        other in (field_corners(), any::<bool>(), 0.0f32..40.0),
+        (handover_s, depart_s) in (0.0f32..3.0, 0.0f32..60.0),
+    ) {
+        let own = field_flight(1, &own.0, own.1, own.2);
+        let other = Flight { depart_s, ..field_flight(2, &other.0, other.1, other.2) };
+        let mut ws = ScheduleWorkspace::new();
+        let mut most = [0; 2];
+        let departure =
+            departure_and_conflicts(&CFG, &own, (0.0, handover_s), &mut [&other].into_iter(), &mut ws, &mut |_, met| most = met);
+        cut_into_segments(&CFG, &own, &mut ws.own).unwrap();
+        cut_into_segments(&CFG, &other, &mut ws.other).unwrap();
+        ws.forbidden.clear();
+        for (q, p) in ws.other.iter().flat_map(|q| ws.own.iter().map(move |p| (q, p))) {
+            if is_conflict(&CFG, p, q) {
+                let from_s = depart_s + q.from_s - handover_s - p.to_s;
+                add_forbidden_interval(&mut ws.forbidden, from_s, depart_s + q.to_s + handover_s - p.from_s);
+            }
+        }
+        prop_assert_eq!(departure, first_allowed(&ws.forbidden, 0.0).ok_or(ScheduleError::Blocked));
+        if let Ok(depart_s) = departure {
+            let pair = [Flight { depart_s, ..own }, other];
+            for index in 0..2 {
+                let mut found: Vec<Gate, 400> = Vec::new();
+                gates(&CFG, &pair, index, &mut ws, &mut found).unwrap();
+                prop_assert!(found.len() as u32 <= most[index], "{found:?} {most:?}");
+            }
         }
     }
 }

@@ -323,6 +323,7 @@ impl NeighbourEntry {
 
     /// Legs of its path for `left_m`, as far as it may come unheard, each with its length and the part that counts, metres; the first is the
     /// place where it was heard.
+    #[inline(never)]
     pub(super) fn for_each_leg(&self, mut left_m: f32, tell: &mut dyn FnMut([Point; 2], [f32; 2])) {
         let mut at = self.state.position;
         tell([at; 2], [0.0; 2]);
@@ -338,6 +339,7 @@ impl NeighbourEntry {
 
     /// Places along its path for `upto_m`, as far as it may come unheard, and how much further than from one of them it may be from the
     /// nearest of them.
+    #[inline(never)]
     pub(super) fn for_each_place(&self, upto_m: f32, tell: &mut dyn FnMut(Point, f32)) {
         let step_m =
             if upto_m > self.unheard_stop_m() { upto_m / STRETCH_PLACES } else { UNHEARD_STRETCH_STEP_M };
