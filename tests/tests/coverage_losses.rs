@@ -219,6 +219,12 @@ fn what_a_lost_vehicle_leaves_of_a_large_area_is_photographed_too() {
     are_whole(Draw { area: large, until_s: 900, ..EVEN });
 }
 
+/// Some are struck before they know where they are, have a plan, or are started.
+#[test]
+fn what_a_vehicle_leaves_that_is_lost_before_it_flies_is_photographed_by_the_others() {
+    are_whole(Draw { until_s: 30, ..EVEN });
+}
+
 /// One vehicle is lost among others with radios that lose messages one by one.
 const EVEN: Draw = Draw { area: areas::lost, until_s: 220, struck: 1, radio: Radio::Even, most_in_three: 1 };
 /// Two of three or of five are lost at once. Of three the last one has no majority: it lands.

@@ -327,18 +327,18 @@ impl<const V: usize> Neighbours<V> {
             shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was checked
-    /// whether it blocks the path ([`Self::mark_path_clear`]).
+    /// Every neighbour whose position or progress was ever heard, or which is lost, with its age at `now`. A vehicle that is out opens
+    /// no gate before it was checked whether it blocks the path ([`Self::mark_path_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
         for contact in &self.contacts {
             let progress_m = contact.passed_m(now);
             let placed_at = contact.position_at;
-            if placed_at.is_none() && progress_m.is_none() {
+            let dead = contact.is_dead(self.clear_at);
+            if placed_at.is_none() && progress_m.is_none() && !dead {
                 continue;
             }
-            let dead = contact.is_dead(self.clear_at);
             let state = Neighbour {
                 // Of a vehicle that was never heard itself only the progress is known.
                 position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),

@@ -3,8 +3,8 @@ extern crate std;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use super::super::UNHEARD_STRETCH_STEP_M;
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
+use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M};
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
 
@@ -102,4 +102,33 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         assert!(nearest_m <= 0.5 * UNHEARD_STRETCH_STEP_M + 0.01, "{case}: {nearest_m} m beside {places:?}");
     }
     assert!(at_the_end > 300, "{at_the_end}");
+}
+
+#[test]
+fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
+    let mut rng = Pcg32::seed_from_u64(13);
+    let mut seen = [0; 3];
+    for _ in 0..2000 {
+        let flags =
+            [0, OUT_OF_PLAN, GROUNDED, GROUNDED | OUT_OF_PLAN][(uniform(&mut rng, 0.0, 3.999)) as usize];
+        let mut table = joined(0);
+        table.contacts[0].flags = GROUNDED;
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+        table.handle_intent(Instant::ZERO, 1, &intent(flags, 1, 2), 1, Some(2));
+        let silent_s = uniform(&mut rng, 1.0, 120.0);
+        let now = Instant::from_millis((1000.0 * silent_s) as u64);
+        let lying_m = uniform(&mut rng, 1.0, 2.0);
+        let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
+        let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
+        let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
+        table.for_each_place(now, [apart_m, lying_m], |off| {
+            // Of a silent one the place is not known any better than that.
+            let most_m = lying_m + VAGUE_POSITION_M;
+            let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
+            assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");
+        });
+        assert_eq!(table.any_comes_down_unheard(now), comes_down, "{flags:#x}, {silent_s} s");
+        seen[if lies { 0 } else { 1 + usize::from(comes_down) }] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
 }
