@@ -46,17 +46,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let own = self.own_fleet_report();
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
-        let home_m = self.last_descent_start_m();
+        let (home_m, around) = (self.last_descent_start_m(), self.detours.field_detour.is_flying());
         // A vehicle that has left the mission is on its way to the ground.
         let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing(now, MISSED_AFTER));
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
-            None if waits && self.guidance.along_m() <= home_m + AT_HOLD_M => home_m,
+            // The end of a way around is not its pad.
+            None if waits && !around && self.guidance.along_m() <= home_m + AT_HOLD_M => home_m,
             None => f32::INFINITY,
         };
         let behind = fleet.division_count() > self.mission.division_count();
-        let wants = fleet.needs_division()
-            || ((behind || self.detours.field_detour.is_flying()) && self.is_at_division_start());
+        let wants = fleet.needs_division() || ((behind || around) && self.is_at_division_start());
         let fingerprint = fleet.division_hash();
         self.guidance.set_halt_m(halt_m);
         if wants && self.mission.should_request_division(fingerprint, now, REQUEST_RETRY) {

@@ -13,7 +13,7 @@ use proptest::prelude::{ProptestConfig, any};
 use super::State::*;
 use super::*;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
-use crate::link::intent::ON_PLAN;
+use crate::link::intent::{GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use crate::{Link, RosterEntry};
 
@@ -274,6 +274,21 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     );
     b.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
     b.until(Done, 60.0);
+}
+
+/// Beside its path it waits for none: what it comes to is not its pad. Vehicle 77 lies there.
+#[test]
+fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
+    let mut b = over_a_field(true);
+    b.start();
+    b.until(Follow, 30.0);
+    b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
+    b.until(Blocked, 5.0);
+    b.neighbour = None;
+    b.until(Dividing, 20.0);
+    assert!(b.companion.detours.field_detour.is_flying(), "{:?}", b.texts);
+    b.until(Follow, 5.0);
+    assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }
 
 /// A roster as a liar sends it: one that would be true, with some of it replaced.
