@@ -230,7 +230,8 @@ impl Detours {
             && view.guidance.along_m() >= 0.0;
         let over_field = view.config.division.is_some();
         let flies = view.mission.plan().is_some_and(|plan| plan.task.leaves_pad());
-        (self.obstructed || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
+        // Whatever it stopped for on its way around, it seeks another one.
+        (self.obstructed || self.field_detour.is_flying() || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
             && over_field
             && on_path
             && flies

@@ -142,3 +142,23 @@ fn an_interrupted_way_home_is_flown_to_its_end() {
         is_home(&mut bench);
     }
 }
+
+/// Another vehicle stops it on its way around, for so long that there it is blocked too, and flies on.
+#[test]
+fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
+    let mut b = over_a_field(Follow);
+    b.neighbour = below_the_path(OUT_OF_PLAN);
+    b.until(Blocked, 5.0);
+    b.until(Follow, 30.0);
+    b.run(0.5);
+    let ahead_m = b.companion.guidance.along_m() + 2.5;
+    let ahead = b.companion.mission.plan().and_then(|plan| plan.path.point_at(ahead_m));
+    b.answer_detour = detours::NO_WAY;
+    b.neighbour = flies(ahead.unwrap(), ON_PLAN | crate::link::intent::ON_DETOUR);
+    b.until(Blocked, 40.0);
+    b.neighbour = below_the_path(OUT_OF_PLAN);
+    b.answer_detour = Some(Ok(()));
+    b.until(Dividing, 60.0);
+    b.until(Follow, 5.0);
+    assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
+}
