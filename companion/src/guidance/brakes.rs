@@ -20,6 +20,9 @@ const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
 /// Distance beyond the way that others know of for which a vehicle does not fly back, metres.
 const BEYOND_KNOWN_M: f32 = 0.3;
 
+/// Setpoint faster than this gets away from below a vehicle that comes down, m/s.
+const ESCAPES_MPS: f32 = 0.5;
+
 impl Guidance {
     /// An intent of `sent_at` has arrived, whose points lead to `ends_m` along the path.
     pub(crate) fn note_reported_way(&mut self, sent_at: Instant, ends_m: f32) {
@@ -49,18 +52,16 @@ impl Guidance {
         if neighbours.linked_within(now, LINKED_WITHIN) {
             self.known_way.from_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
-        let alone = state == State::Alone;
+        let (alone, follows) = (state == State::Alone, state == State::Follow);
         // On its way down it continues, and on its way aside.
-        let waits = matches!(
-            state,
-            State::Follow | State::Blocked | State::Replanning | State::Dividing | State::Alone
-        ) && matches!(self.phase, Phase::Path | Phase::Join)
-            && !(self.ends_aside && state == State::Follow);
+        let waits = state.holds_place()
+            && matches!(self.phase, Phase::Path | Phase::Join)
+            && !(self.ends_aside && follows);
         let lands_m = along_m.min(self.expected_up_to_m(alone, neighbours));
         let beyond = alone && along_m > lands_m + BEYOND_KNOWN_M;
-        let wait_m = if alone { lands_m } else { along_m + advice.stop_within_m.max(0.0) };
+        let wait_m = if follows { along_m + advice.stop_within_m.max(0.0) } else { lands_m };
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
-        let waits_there = waits && (alone || advice.stop_within_m < WAIT_WITHIN_M);
+        let waits_there = waits && (!follows || advice.stop_within_m < WAIT_WITHIN_M);
         if waits_there {
             self.evade_search.continue_search(path, wait_m, neighbours.len(), |i, tell| {
                 if alone {
@@ -97,9 +98,10 @@ impl Guidance {
 
     /// After the raw points of a step; `blocked` if one of them could not go back.
     pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {
-        if self.no_better_place || (self.back_to_m.is_some() && blocked) {
+        let barred = blocked || (self.filter.scans_backwards() && self.filter.is_stopped());
+        if self.no_better_place || (self.back_to_m.is_some() && barred) {
             self.trapped_since.get_or_insert(now);
-        } else {
+        } else if !self.evading || self.smoother.velocity().norm_squared() > ESCAPES_MPS * ESCAPES_MPS {
             self.trapped_since = None;
         }
     }

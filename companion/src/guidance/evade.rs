@@ -2,7 +2,7 @@
 //!
 //! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits within
 //! [`EVADE_MARGIN_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
-//! is exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
+//! is exchanged for the nearest one before it on the path; a vehicle that holds its place waits where it stands. Back is where this vehicle came from, so the way is free of walls;
 //! a vehicle behind is not come nearer to than [`FOLLOWER_STRAY_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
@@ -80,7 +80,10 @@ impl EvadeSearch {
         let mut budget = MAX_SEARCH_COST;
         let found = loop {
             let along_m = from_m - f32::from(self.columns_found) * PLACE_STEP_M;
-            let place = path.point_at(along_m).filter(|_| self.columns_found == 0 || along_m >= 0.0);
+            // The last one is the start of the path.
+            let on_path = self.columns_found == 0 || along_m > -PLACE_STEP_M;
+            let along_m = along_m.max(0.0);
+            let place = path.point_at(along_m).filter(|_| on_path);
             let Some(place) = place.filter(|_| self.columns_found <= MAX_PLACES) else {
                 break EvadeTarget::Nowhere;
             };
@@ -204,6 +207,10 @@ mod tests {
         assert!((5.0..7.0).contains(&to_m), "{to_m}");
         assert_eq!(search(&[column(0.0, 3.0, 2.1)]), (EvadeTarget::Here, 1));
         assert_eq!(search(&[column(6.0, 3.0, 20.0)]), (EvadeTarget::Nowhere, 2), "nowhere is better");
+        // A place to wait at that is no whole number of steps from the start of the path.
+        let mut search = EvadeSearch::default();
+        search.continue_search(&path(), 1.1, 1, |_, tell| tell(column(2.1, 0.0, 2.0)));
+        assert_eq!(search.found, EvadeTarget::Back(0.0), "its start is the last place");
     }
 
     #[test]

@@ -261,7 +261,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Blocked],          G::NoWayAround,     AT_ONCE,    Land,        A::RequestLandMode,   "No way around: landing"),
     warning_row(&[Blocked],          G::NoWayOn,         AT_ONCE,    Follow,      A::TurnBack,          "No way around, no room below: flying back"),
     warning_row(&[Blocked],          G::Stalled,         secs(300),  Land,        A::RequestLandMode,   "Path blocked for 5 min: landing"),
-    warning_row(&[Follow, Blocked],  G::Underneath,      secs(1),    Replanning,  A::RequestDetourAside, "Under one that lands: planning aside"),
+    warning_row(&[Follow, Blocked, Dividing], G::Underneath, secs(1),    Replanning,  A::RequestDetourAside, "Under one that lands: planning aside"),
     info_row(&[Blocked],             G::OurTurn,         AT_ONCE,    Replanning,  A::RequestDetour,     "All others stand: planning around"),
     info_row(&[Replanning],          G::WayHomeReady,    AT_ONCE,    Follow,      A::FlyDetour,         "Flying home"),
     info_row(&[Replanning],          G::DetourReady,     AT_ONCE,    Follow,      A::FlyDetour,         "Flying around"),

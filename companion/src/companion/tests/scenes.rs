@@ -15,6 +15,7 @@ use crate::{Config, RosterEntry};
 use planner_core::Point;
 
 mod autopilot;
+mod beneath;
 mod detours;
 mod homeward;
 mod landings;
