@@ -9,7 +9,7 @@ use super::super::limits::bounds;
 use super::super::motion::clamp_to;
 use super::super::{Guidance, GuidanceInputs};
 use super::{
-    FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER, MAX_TURNING_SETPOINT_M,
+    FilterConflict, FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER, MAX_TURNING_SETPOINT_M,
     MAX_TURNING_SETPOINT_MPS, RESUME_CLEAR_FOR, RESUME_CLEAR_M, STANDSTILL_WITHIN_M, SafetyFilter,
 };
 use crate::mission::State;
@@ -105,7 +105,13 @@ impl Guidance {
         };
         let mut legs = Legs::new();
         let own = OwnSet::new(&set, &mut legs);
-        let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
+        let mut found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
+        if found.is_none() && on_pad {
+            // Armed on the ground it has a few seconds only: it waits where one falls silent that would bar the climb soon.
+            let apart_m = self.deconflict.safety_distance_m + bounds.speed_max_mps * bounds.silent_s;
+            let missed = neighbours.missed_beside(position, apart_m, now);
+            found = missed.map(|id| FilterConflict { id, yields: true, stranger: false, rests: false });
+        }
         if whole_column {
             self.filter.note_column(found.as_ref(), now);
             self.filter.reset_stop();

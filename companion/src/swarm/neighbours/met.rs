@@ -184,6 +184,18 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
+    /// A vehicle in flight within `apart_m` of the vertical through `pad` that was missed for a moment, and may have fallen
+    /// silent: three of its positions were lost, or more.
+    pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {
+        let missed = |c: &&NeighbourEntry| {
+            let flies = !c.reports(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
+            let beside = (c.state.position - pad).xy().norm_squared() < apart_m * apart_m;
+            let lately = |at: Instant| now - at > MISSED_AFTER && now - at < MAY_LAND_AFTER;
+            flies && beside && c.position_at.is_some_and(lately)
+        };
+        self.contacts[..self.roster].iter().find(missed).map(|c| c.id)
+    }
+
     /// The first contact from number `from` on that was placed and may be within reach, its number, and whether it counts as
     /// dead.
     pub(crate) fn next_within(

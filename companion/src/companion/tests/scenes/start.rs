@@ -179,3 +179,32 @@ fn arming_held(scenes: &mut Scenes) {
     let steps = (0..40).find(is_held).unwrap();
     scenes.play(Bench::new(two_vehicles()), |b| comes_after(b, steps), Scheduled, 2.0);
 }
+
+/// One flies by and falls silent: where it may go then would bar the climb, and the autopilot disarms a vehicle that waits on the
+/// ground. So arming is requested only where it was heard just now.
+#[test]
+fn nobody_arms_where_one_beside_was_not_heard_just_now() {
+    let (mut waits, mut latest_s) = (0, 0.0_f32);
+    for steps in 0..50 {
+        let mut b = Bench::new(two_vehicles());
+        b.neighbour = flies(Point::new(13.0, 12.0, 3.0), ON_PLAN);
+        b.until(Ready, 6.0);
+        b.start();
+        b.until(Streaming, 10.0);
+        b.run(0.05 * steps as f32);
+        b.neighbour = None;
+        let asked = |b: &Bench| b.commands.iter().any(|c| c.0 == 400);
+        if asked(&b) {
+            break;
+        }
+        let silent_at = b.now;
+        while !asked(&b) && b.now - silent_at < Duration::from_secs(5) {
+            b.run(0.05);
+        }
+        match asked(&b) {
+            true => latest_s = latest_s.max((b.now - silent_at).as_secs_f32()),
+            false => waits += usize::from(b.state() == Scheduled && !b.armed),
+        }
+    }
+    assert!(latest_s < 0.75 && waits > 15, "armed up to {latest_s} s after it was heard, {waits} wait");
+}
