@@ -100,11 +100,11 @@ pub(crate) fn departure_with_handover<'a, const W: usize>(
 /// As [`departure_with_handover`]. `met` is called for each of `scheduled`, by its place among them, with the numbers of timed segments
 /// of `flight` and of that one that are in conflict with the other's: neither has more gates for the other.
 #[inline(never)]
-pub(crate) fn departure_and_conflicts<'a, const W: usize>(
+pub(crate) fn departure_and_conflicts<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
     (not_before_s, handover_s): (f32, f32),
-    scheduled: &mut dyn Iterator<Item = &'a Flight<W>>,
+    scheduled: &mut dyn Iterator<Item = &Flight<W>>,
     ws: &mut ScheduleWorkspace,
     met: &mut dyn FnMut(usize, [u32; 2]),
 ) -> Result<f32, ScheduleError> {

@@ -194,7 +194,7 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
         (away - axis * share).length() - thing.radius_m
     };
     let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
-    let mut add = |thing: KeepOutZone, things: &mut Vec<_, MAX_ZONES>| {
+    let add = |thing: KeepOutZone, things: &mut Vec<_, MAX_ZONES>| {
         _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     };
     known.iter().for_each(|thing| add(*thing, &mut things));

@@ -43,7 +43,7 @@ impl Faller {
     fn tick(&mut self, b: &mut Bench) {
         b.tick();
         self.place.z = (self.place.z - 0.05 * self.falls_mps).max(0.0);
-        if b.now.as_micros() / 50_000 % 4 == 0 {
+        if (b.now.as_micros() / 50_000).is_multiple_of(4) {
             for bytes in self.reports(b.now) {
                 let at = b.now + Duration::from_micros((self.delay_s * 1e6) as u64);
                 if self.real(0.0, 1.0) >= self.loss {
