@@ -1,9 +1,10 @@
 //! Out from under a vehicle that comes down: one that waits below it flies back along its path until it is beside the column.
 //!
-//! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits within
-//! [`EVADE_MARGIN_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
-//! is exchanged for the nearest one before it on the path; a vehicle that holds its place waits where it stands. Back is where this vehicle came from, so the way is free of walls;
-//! a vehicle behind is not come nearer to than [`FOLLOWER_STRAY_M`] beyond the safety distance.
+//! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits
+//! within [`EVADE_MARGIN_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to
+//! wait that is there is exchanged for the nearest one before it on the path; a vehicle that holds its place waits
+//! where it stands. Back is where this vehicle came from, so the way is free of walls; a vehicle behind is not come
+//! nearer to than [`FOLLOWER_STRAY_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
 //! dozen among the most columns there can be; in theory six for each place, if each is held by a column of its own.

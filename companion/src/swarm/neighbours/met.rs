@@ -186,6 +186,7 @@ impl NeighbourEntry {
 impl<const V: usize> Neighbours<V> {
     /// A vehicle in flight within `apart_m` of the vertical through `pad` that was missed for a moment, and may have fallen
     /// silent: three of its positions were lost, or more.
+    #[inline(never)]
     pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {
         let missed = |c: &&NeighbourEntry| {
             let flies = !c.reports(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
