@@ -110,7 +110,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("planner::coverage::plan_flights, 3 after two losses, zones", "the same"),
     (
         "flights::plan_flights, 3",
-        "v² pairs of flights, at most v + 6 times, each 40 × 40 blocks of 8 timed segments",
+        "v² / 2 pairs of flights, at most v + 6 times, each w parts × 40 blocks of 8 timed segments",
     ),
     ("flights::plan_flights, 32", "the same"),
     (

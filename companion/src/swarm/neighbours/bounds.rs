@@ -12,7 +12,7 @@ pub(super) const RESTART_MS: u32 = 10_000;
 /// Age within which a neighbour counts as heard: four positions and intents.
 pub(super) const HEARD_WITHIN: Duration = Duration::from_millis(800);
 /// Age of a position from which its sender may have fallen silent: no vehicle arms where that would bar its climb.
-pub(super) const MISSED_AFTER: Duration = Duration::from_millis(600);
+pub(super) const UNHEARD_BEFORE_ARMING: Duration = Duration::from_millis(600);
 /// Horizontal distance from its pad beyond which a vehicle on its plan is neither on the way up
 /// from the pad nor on the way down to it, metres.
 pub(super) const OVER_PAD_M: f32 = 10.0;

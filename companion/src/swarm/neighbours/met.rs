@@ -191,7 +191,7 @@ impl<const V: usize> Neighbours<V> {
         let missed = |c: &&NeighbourEntry| {
             let flies = !c.reports(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
             let beside = (c.state.position - pad).xy().norm_squared() < apart_m * apart_m;
-            let lately = |at: Instant| now - at > MISSED_AFTER && now - at < MAY_LAND_AFTER;
+            let lately = |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
             flies && beside && c.position_at.is_some_and(lately)
         };
         self.contacts[..self.roster].iter().find(missed).map(|c| c.id)
