@@ -115,6 +115,7 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
     for (nth, other) in scheduled.enumerate() {
         let (mut own_in_conflict, mut others_in_conflict) = ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
         for (part, near) in blocks.parts_near(cfg, other) {
+            part.check_count(other.segment_m, MAX_TIMED_SEGMENTS)?;
             let mut compare = |some: &[TimedSegment]| {
                 let (Some(first), Some(last)) = (some.first(), some.last()) else { return };
                 let short = last.to_m - first.from_m >= part.leg.length_m;

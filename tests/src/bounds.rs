@@ -110,7 +110,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("planner::coverage::plan_flights, 3 after two losses, zones", "the same"),
     (
         "flights::plan_flights, 3",
-        "v² / 2 pairs of flights, at most v + 6 times, each w parts × 40 blocks of 8 timed segments",
+        "at most v times v² / 2 pairs of flights, each w parts × 40 blocks of 8 timed segments; where gates are many 5 times v² pairs",
     ),
     ("flights::plan_flights, 32", "the same"),
     (

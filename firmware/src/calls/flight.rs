@@ -46,7 +46,7 @@ const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
 /// Least distance of a neighbour that is beside, metres.
 const MIN_BESIDE_M: f32 = 4.0;
-/// Distance of a neighbour that is far away, metres.
+/// Least distance of a neighbour that is far away, metres.
 const MIN_FAR_M: f32 = 70.0;
 /// Greatest distance of a neighbour that is far away, metres.
 const MAX_FAR_M: f32 = 120.0;

@@ -102,12 +102,12 @@ impl<'a, const N: usize> Transit<'a, N> {
         if !self.area.has_no_fly() {
             return true;
         }
+        let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
+        let (across, up) = (sorted(from.x, to.x), sorted(from.y, to.y));
         // Both ends of an edge beyond the same end of the line, on one axis.
-        let beyond = |a: f32, b: f32, from: f32, to: f32| {
-            (a > from && a > to && b > from && b > to) || (a < from && a < to && b < from && b < to)
-        };
+        let beyond = |a: f32, b: f32, (low, high): (f32, f32)| (a > high && b > high) || (a < low && b < low);
         let meets = |(a, b): (Flat, Flat)| {
-            if beyond(a.x, b.x, from.x, to.x) || beyond(a.y, b.y, from.y, to.y) {
+            if beyond(a.x, b.x, across) || beyond(a.y, b.y, up) {
                 return false;
             }
             let (along, edge) = (to - from, b - a);

@@ -2,7 +2,7 @@
 //! are compared only where those of two flights come near.
 //!
 //! What it leaves out is never in conflict, and what it gives out comes in order: schedules are, bit by bit, those of a
-//! comparison of all with all. Cost: one pass over both flights, and blocks × blocks.
+//! comparison of all with all. Cost: one pass over the own flight, and the straight parts or the blocks of the other × the own blocks.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -24,8 +24,10 @@ const MAX_GROUPS: usize = MAX_BLOCKS.div_ceil(BLOCKS_PER_GROUP);
 /// Most that rounding takes from a distance between places kilometres away, metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
-/// Most that rounding takes from the length of a block's segments, metres.
+/// Most that rounding takes from the length of a block's segments, metres, and as a share of the path up to there: eight
+/// segments, each end rounded.
 const LENGTH_ROUNDING_M: f32 = 0.01;
+const LENGTH_ROUNDING: f32 = 2e-6;
 
 /// Blocks of a flight, a bit each.
 pub(super) type Bits = u64;
@@ -52,7 +54,8 @@ impl Block {
         let (first, last) = (&pieces[0], &pieces[pieces.len() - 1]);
         let mut block = Self::around_line(first.from, last.to);
         pieces.iter().for_each(|piece| block.bounding_box.include(&piece.to, &piece.to));
-        let length_m = last.to_m - first.from_m + LENGTH_ROUNDING_M;
+        let rounding_m = fmaxf(LENGTH_ROUNDING_M, LENGTH_ROUNDING * last.to_m);
+        let length_m = last.to_m - first.from_m + rounding_m;
         let bent_sq = length_m * length_m - (last.to - first.from).norm_squared();
         block.lateral_extent_m = 0.5 * fpu::sqrtf(fmaxf(bent_sq, 0.0));
         block

@@ -85,6 +85,12 @@ pub(super) struct StraightPart {
 }
 
 impl StraightPart {
+    /// Refuses a leg of more timed segments than `most`: nobody goes through thousands of millions of them.
+    pub(super) fn check_count(&self, segment_m: f32, most: usize) -> Result<(), ScheduleError> {
+        let fits = segment_count(self.leg.length_m, segment_m) as usize <= most;
+        if fits { Ok(()) } else { Err(ScheduleError::PiecesFull) }
+    }
+
     /// Gives out its timed segments of at most `segment_m`, in order. One copy of it: a board has little room.
     #[inline(never)]
     pub(super) fn for_each_segment(&self, segment_m: f32, tell: &mut dyn FnMut(TimedSegment)) {
@@ -171,6 +177,7 @@ pub(super) fn cut_into_segments<const W: usize>(
     out.clear();
     let mut full = false;
     for part in (0..).map_while(|part| straight_part(cfg.vertical_mps, flight, part)) {
+        part.check_count(flight.segment_m, MAX_TIMED_SEGMENTS - out.len())?;
         part.for_each_segment(flight.segment_m, &mut |segment| full |= out.push(segment).is_err());
     }
     if full { Err(ScheduleError::PiecesFull) } else { Ok(()) }

@@ -67,11 +67,11 @@ proptest! {
     }
 }
 
-/// A flight over a field: many lanes at one height, or corners at any.
+/// A flight over a field: all at one height, or corners at that height and others between.
 fn field_flight(id: u8, corners: &[(f32, f32, f32)], level: bool, climb_m: f32) -> Flight<8> {
     let mut path = Path::new();
     for &(x, y, z) in corners {
-        path.push(Point::new(x, y, if level { 30.0 } else { z }), 1.0).unwrap();
+        path.push(Point::new(x, y, if level || z < 50.0 { 30.0 } else { z }), 1.0).unwrap();
     }
     path.label_times(climb_m / CFG.vertical_mps, CFG.cruise_mps);
     let mut flight = Flight { climb_m, descent_m: climb_m, path, ..flight(id, &[(0.0, 0.0)]) };

@@ -184,7 +184,7 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// A vehicle in flight within `apart_m` of the vertical through `pad` that was missed for a moment, and may have fallen
+    /// A vehicle in flight, not out of the plan, within `apart_m` of the vertical through `pad` that was missed for a moment, and may have fallen
     /// silent: three of its positions were lost, or more.
     #[inline(never)]
     pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {

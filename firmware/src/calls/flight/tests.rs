@@ -48,7 +48,7 @@ fn most_steps_of_a_flight_are_flown() {
 fn steps_of_coverage_missions_are_flown() {
     let mut meter = Counts::default();
     let mut flown = 0;
-    for seed in 0..10 {
+    for seed in 0..12 {
         let plan = random_area_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(area_config()).expect("the settings are good");
         flown += measure_flight(seed, &plan, &mut companion, &mut meter);
