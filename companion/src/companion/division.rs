@@ -8,6 +8,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
 use crate::mission::State;
+use crate::swarm::detour::beside::RejoinPlace;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, OwnReport};
 use crate::time::Duration;
 
@@ -172,10 +173,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Place where this vehicle is to hold for a division, metres along its path: while the
     /// division is under way, and until the new path of this vehicle has come.
-    fn division_hold_m(&self) -> Option<f32> {
-        // The fleet does not know yet what this vehicle was commanded since the last step.
-        let fleet =
-            self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !self.is_landing_off_plan())?;
+    pub(super) fn division_hold_m(&self) -> Option<f32> {
+        // The fleet does not know yet what this vehicle was commanded since the last step. A promise is a place of its own path.
+        let elsewhere = self.is_landing_off_plan() || self.detours.field_detour.is_flying();
+        let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
         let behind = fleet.division_count() > self.mission.division_count();
         let held_dm = behind.then(|| fleet.held_at_dm());
         held_dm.or(fleet.commitment_dm()).map(|dm| f32::from(dm) / 10.0)
@@ -207,10 +208,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Continues along its own path beyond the obstacle.
     fn resume_own_plan(&mut self, plan: &VehiclePlan<W, G>) {
-        let Some(back_m) = self.detours.field_detour.rejoin_m() else { return };
-        let ends = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
+        let Some(RejoinPlace { along_m: back_m, position }) = self.detours.field_detour.rejoin() else {
+            return;
+        };
         let back = plan.path.point_at(back_m);
-        let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).length() < AT_HOLD_M);
+        let meets = back.is_some_and(|back| (position - back).length() < AT_HOLD_M);
         if meets {
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
             if left > 0 {
@@ -243,15 +245,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Err(_) if may_take && self.detours.field_detour.is_flying() => {
                 self.detours.end_field_detour(false);
             }
-            Ok(plan) if may_take && self.detours.field_detour.is_flying() => self.resume_own_plan(plan),
             Err(_) if may_take && division > self.mission.division_count() => {
                 self.mission.keep_plan_after_division(division);
             }
             Err(_) => {}
             Ok(plan) if fleet.needs_division() => fleet.take_plan_crc(plan.plan_crc),
+            Ok(plan)
+                if may_take
+                    && division == self.mission.division_count()
+                    && self.detours.field_detour.is_flying() =>
+            {
+                self.resume_own_plan(plan);
+            }
             Ok(plan) if may_take && division > self.mission.division_count() => {
                 let in_air = self.mission.state() == State::Dividing;
-                let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
+                let own = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
+                let here = self.detours.field_detour.rejoin().map(|back| back.position).or(own);
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
                 if self.mission.accept_division(plan, &place, division, in_air) {
                     self.neighbours.forget_plan();
@@ -261,6 +270,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                         true => self.guidance.begin_path(self.now),
                         false => self.guidance.reset(),
                     }
+                } else if self.detours.field_detour.is_flying() {
+                    self.detours.end_field_detour(false);
                 } else {
                     self.links.send_text(true, "The division begins elsewhere");
                 }

@@ -20,6 +20,9 @@ const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Silence a second before the lease ends: the row `NeighboursSilent` stops a vehicle a second
 /// after this.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
+/// Time for which a vehicle over an area may be away from a setpoint that stands, beyond that elsewhere: high above the ground,
+/// in gusts, it sways further.
+const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
 /// A gate nearer ahead than this leaves no path to fly on, metres.
 const MIN_GATE_AHEAD_M: f32 = 0.2;
 /// Longest time that a climb takes beyond its height at 1 m/s, seconds.
@@ -58,7 +61,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
-        let unfollowed_for = self.guidance.unfollowed_for(now);
+        let sways_for = if self.config.division.is_some() { MAX_SWAY_OVER_AREA } else { Duration::default() };
+        let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
         // What something holds gets nowhere else.
         let can_leave = unfollowed_for < UNFOLLOWED_MOST;
         GuardInputs {
@@ -114,9 +118,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.detours.home.is_on(),
             area: self.config.division.is_some(),
             over_field,
-            may_fly_beside: standing && self.is_undivided() && self.detours.may_detour_over_field(&view),
+            may_fly_beside: standing
+                && (self.is_undivided() || self.detours.field_detour.is_flying())
+                && self.detours.may_detour_over_field(&view),
             around_flown: follow
-                && self.detours.field_detour.is_flying()
+                && self.detours.field_detour.leads_back()
                 && self.guidance.is_at_end(scene)
                 && standing,
             own_plan_ready: self.detours.field_detour.is_back(),

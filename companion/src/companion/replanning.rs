@@ -10,6 +10,7 @@ use crate::guidance::GuidanceInputs;
 use crate::mission::State;
 use crate::swarm::detour::DetourPurpose;
 use crate::swarm::detour::asking::RetryOutlook;
+use crate::swarm::detour::beside::RejoinPlace;
 use crate::swarm::view::DetourView;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -55,10 +56,48 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
     }
 
+    /// Requests a path aside, from under a vehicle that comes down; over a field another one leads back to its path from there.
+    pub(super) fn request_detour_aside(&mut self, from: State) {
+        // On its way back it was to land already.
+        if self.guidance.returning {
+            return self.request_detour(DetourPurpose::Landing);
+        }
+        let rejoin = self.rejoin_after_aside(from);
+        self.detours.field_detour.start_seeking(rejoin);
+        self.request_detour(DetourPurpose::Aside);
+    }
+
+    /// Where it comes back to its path over a field: where it holds for a division, or beyond what blocks the path. None where it
+    /// would leave out what it promised to photograph.
+    fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlace> {
+        if !self.detours.keeps_to_plan_over_field(&self.detour_view()) {
+            return None;
+        }
+        let holds = from == State::Dividing || self.is_holding_for_division();
+        match self.division_hold_m() {
+            Some(at_m) if holds => self.place_on_path(at_m),
+            Some(_) => None,
+            None => self.place_beyond_block().or_else(|| self.place_on_path(self.guidance.along_m())),
+        }
+    }
+
+    /// The first place of its path over a field beyond what blocks that.
+    // Its body in both callers would take half a kilobyte of flash.
+    #[inline(never)]
+    fn place_beyond_block(&self) -> Option<RejoinPlace> {
+        self.detours.rejoin_m(&self.detour_view()).and_then(|at_m| self.place_on_path(at_m))
+    }
+
+    #[inline(never)]
+    fn place_on_path(&self, along_m: f32) -> Option<RejoinPlace> {
+        let position = self.mission.plan()?.path.point_at(along_m)?;
+        Some(RejoinPlace { along_m, position })
+    }
+
     /// Requests a detour around the obstacle on its path over a field, and back to the path.
     pub(super) fn request_detour_back_to_path(&mut self) {
-        let back_m = self.detours.rejoin_m(&self.detour_view());
-        if self.detours.field_detour.start_seeking(back_m) {
+        let rejoin = self.place_beyond_block();
+        if self.detours.field_detour.start_seeking(rejoin) {
             self.request_detour(DetourPurpose::Beyond);
         } else {
             self.detours.field_detour.note_failure(self.now);
@@ -77,10 +116,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        // A promise made meanwhile is along the vehicle's own path.
-        let beside = self.detours.field_detour;
-        let bound = beside.rejoin_m().is_some() && !beside.is_flying() && !self.is_undivided();
-        if bound || !here.is_some_and(|here| self.mission.starts_at(detour, &here)) {
+        // A promise made meanwhile is along the vehicle's own path, where it stands: from aside it comes back there.
+        let promised = self.division_hold_m().and_then(|at_m| self.place_on_path(at_m));
+        let rejoin = self.detours.field_detour.rejoin();
+        let moved = promised.filter(|promised| rejoin.is_some_and(|back| back.along_m != promised.along_m));
+        if moved.is_some() && self.detours.is_detour_aside() {
+            self.detours.field_detour.abort();
+            self.detours.field_detour.start_seeking(moved);
+        } else if moved.is_some() || !here.is_some_and(|here| self.mission.starts_at(detour, &here)) {
             self.handle_detour_failure(PlanFailure::Invalid);
             return;
         }

@@ -189,9 +189,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::RequestDetourAside => {
                 self.guidance.begin_braking();
-                // On its way back it was to land already.
-                let lands = self.guidance.returning;
-                self.request_detour(if lands { DetourPurpose::Landing } else { DetourPurpose::Aside });
+                self.request_detour_aside(from);
             }
             Action::RequestLanding => self.request_detour(DetourPurpose::Landing),
             Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),

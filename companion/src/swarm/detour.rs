@@ -19,7 +19,7 @@
 //! ENU metres.
 
 pub(crate) mod asking;
-mod beside;
+pub(crate) mod beside;
 mod homeward;
 
 use planner_core::detour;
@@ -76,6 +76,8 @@ const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 /// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for others.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
+/// Distance from the end of a path aside at which a vehicle that was there still stands aside, metres.
+const SWAY_ASIDE_M: f32 = 1.0;
 /// Age from which a neighbour's position is vague.
 const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
 /// Greatest deviation from the path, metres: a path that much nearer to a keep-out zone is blocked.
@@ -219,23 +221,28 @@ impl Detours {
         beside::first_rejoin_m(view, self.obstacles.all())
     }
 
+    /// Whether it is on the path of its plan over a field, or beside that to come back to it.
+    pub(crate) fn keeps_to_plan_over_field<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &DetourView<'_, V, W, G>,
+    ) -> bool {
+        view.config.division.is_some()
+            && (!self.on_detour || self.field_detour.is_flying())
+            && !self.left_plan
+            && !self.home.is_on()
+            && !view.guidance.returning
+            && view.guidance.along_m() >= 0.0
+            && view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
+    }
+
     /// Whether it may fly around what is on its path over a field now: where it has not left that.
     pub(crate) fn may_detour_over_field<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        let on_path = (!self.on_detour || self.field_detour.is_flying())
-            && !self.left_plan
-            && !self.home.is_on()
-            && view.guidance.along_m() >= 0.0;
-        let over_field = view.config.division.is_some();
-        let flies = view.mission.plan().is_some_and(|plan| plan.task.leaves_pad());
         // Whatever it stopped for on its way around, it seeks another one.
         (self.obstructed || self.field_detour.is_flying() || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
-            && over_field
-            && on_path
-            && flies
-            && !view.guidance.returning
+            && self.keeps_to_plan_over_field(view)
             && self.field_detour.may_seek(view.now)
     }
 
@@ -392,8 +399,13 @@ impl Detours {
         let stuck = self.on_detour
             && view.mission.state() != State::Scheduled
             && now - view.guidance.last_progress_at() > STUCK_AFTER;
-        let aside = self.detour_aside && view.guidance.is_at_end(&view.scene);
-        let astray = self.left_plan && (!self.on_detour || aside) && !self.lands_at_end;
+        // Where it stands aside it still makes room.
+        let near_m = if view.mission.state() == State::Blocked { SWAY_ASIDE_M } else { 0.0 };
+        let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
+        let at_end = view.guidance.along_m() >= length_m - near_m;
+        let to_plan = self.field_detour.is_flying() && !self.field_detour.leads_back();
+        let off_plan = self.left_plan && (!self.on_detour || self.detour_aside && at_end);
+        let astray = (off_plan && !self.lands_at_end) || (to_plan && at_end);
         let dead_end =
             self.is_stopped_by_others(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END_AFTER);
         let free =

@@ -286,10 +286,12 @@ impl Bench {
         let rank = usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
         // Beside its path its plan is the detour.
-        let own = self.own_plan.take_if(|_| self.companion.detours.field_detour.is_flying());
-        let plan = own.clone().or_else(|| self.companion.mission.plan().cloned());
+        let beside = self.companion.detours.field_detour.is_flying();
+        let plan = if beside { self.own_plan.clone() } else { self.companion.mission.plan().cloned() };
         let Some(mut plan) = plan.filter(|_| self.answer_division) else { return };
-        if own.is_some() {
+        let fleet = self.companion.neighbours.fleet().expect("it divides an area");
+        let counted = fleet.division_count() == self.companion.mission.division_count();
+        if beside && counted && !fleet.needs_division() {
             self.companion.handle_plan(self.now, PlanKind::Division, Ok(&plan));
             return;
         }

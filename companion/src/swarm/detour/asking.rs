@@ -66,7 +66,7 @@ impl Detours {
     pub(crate) fn note_request(&mut self, aim: DetourPurpose) {
         self.detour_aside = matches!(aim, DetourPurpose::Aside | DetourPurpose::Landing);
         self.lands_at_end = aim == DetourPurpose::Landing;
-        if aim != DetourPurpose::Beyond {
+        if !matches!(aim, DetourPurpose::Aside | DetourPurpose::Beyond) {
             self.field_detour.abort();
         }
         self.obstacles.mark_requested();
@@ -103,12 +103,10 @@ impl Detours {
             view.neighbours.for_each_landing_zone(view.now, [apart_m + DETOUR_MARGIN_M, height_m], tell);
         }
         let (goal, descent_m) = match view.config.division {
-            Some(_) => match self.field_detour.rejoin_m() {
-                Some(back_m) => {
-                    // The way that it is on ends there.
-                    let at_m = if self.field_detour.is_flying() { plan.path.length_m() } else { back_m };
-                    let over = plan.path.point_at(at_m)?;
-                    (Goal::Home { over, layer_m: over.z }, (over.z - view.guidance.ground_m(plan)).max(0.0))
+            Some(_) => match self.field_detour.rejoin() {
+                Some(back) => {
+                    let (over, ground_m) = (back.position, view.guidance.ground_m(plan));
+                    (Goal::Home { over, layer_m: over.z }, (over.z - ground_m).max(0.0))
                 }
                 None => view.mission.home_goal(),
             },
@@ -141,7 +139,7 @@ impl Detours {
         self.obstacles.avoid_requested();
         let Self { detour_aside: aside, lands_at_end: lands, left_at_m, .. } = *self;
         let (home, beside) =
-            (self.home.after_detour_received(aside), self.field_detour.after_detour_received());
+            (self.home.after_detour_received(aside), self.field_detour.after_detour_received(aside));
         // The vehicle comes back to its plan.
         let left = self.left_plan || !beside.is_flying();
         let obstacles = core::mem::take(&mut self.obstacles);
@@ -165,12 +163,13 @@ impl Detours {
             self.home.note_failure(now);
             return;
         }
-        if self.field_detour.note_failure(now) {
-            return;
-        }
         // Where no path aside is found a detour may yet exist.
         if self.detour_aside {
+            self.field_detour.stop_seeking();
             self.no_way_aside_at = Some(now);
+            return;
+        }
+        if self.field_detour.note_failure(now) {
             return;
         }
         if outlook == RetryOutlook::Settles {

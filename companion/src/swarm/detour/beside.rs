@@ -2,7 +2,8 @@
 //!
 //! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
 //! plan, and then asks for its own plan again, to continue from there. It keeps its part: no division follows, its progress stays
-//! where it left its path until it is back, and others wait for it. It comes back no further than its gates are open.
+//! where it left its path until it is back, and others wait for it. It comes back no further than its gates are open. From under a
+//! vehicle that comes down it first flies aside, and seeks that way from there.
 //!
 //! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
@@ -35,17 +36,25 @@ const DETOUR_BEGINS_BEFORE_M: f32 = 1.0;
 /// very edge the same zone would block the path again.
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
+/// A place of the plan's path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RejoinPlace {
+    /// Distance along that path, metres.
+    pub along_m: f32,
+    pub position: Point,
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum FieldDetourPhase {
     /// The vehicle is on its path.
     #[default]
     Off,
-    /// The vehicle seeks the detour to this place of its path, metres.
-    Seeks(f32),
+    /// The vehicle seeks the detour to this place of its path.
+    Seeks(RejoinPlace),
     /// The vehicle flies the detour, and waits at its end for its plan.
-    Flies(f32),
+    Flies(RejoinPlace),
     /// The vehicle was stopped on the detour, and seeks another one.
-    SeeksAgain(f32),
+    SeeksAgain(RejoinPlace),
     /// The vehicle's plan has come.
     Back,
     /// The vehicle's plan will not come.
@@ -56,44 +65,51 @@ enum FieldDetourPhase {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FieldDetour {
     phase: FieldDetourPhase,
+    /// The detour that it flies leads aside only: another one leads back.
+    aside: bool,
     missed_at: Option<Instant>,
     attempts: u8,
 }
 
 impl FieldDetour {
     /// Starts to seek a path back to the plan: to the place that the vehicle was flying to if it was stopped on such a path, else to
-    /// `rejoin_m`, metres along the plan. False where there is no such place.
-    pub(crate) fn start_seeking(&mut self, back_m: Option<f32>) -> bool {
+    /// `rejoin`. False where there is no such place.
+    pub(crate) fn start_seeking(&mut self, rejoin: Option<RejoinPlace>) -> bool {
         self.phase = match self.phase {
-            FieldDetourPhase::Flies(back_m) | FieldDetourPhase::SeeksAgain(back_m) => {
-                FieldDetourPhase::SeeksAgain(back_m)
+            FieldDetourPhase::Flies(back) | FieldDetourPhase::SeeksAgain(back) => {
+                FieldDetourPhase::SeeksAgain(back)
             }
-            _ => back_m.map_or(FieldDetourPhase::Off, FieldDetourPhase::Seeks),
+            _ => rejoin.map_or(FieldDetourPhase::Off, FieldDetourPhase::Seeks),
         };
         self.is_off_plan_path()
     }
 
-    /// Notes that no path was found. Returns whether one was sought.
+    /// Notes that no path was found. Returns whether one back to the plan was sought.
     pub(crate) fn note_failure(&mut self, now: Instant) -> bool {
+        self.missed_at = Some(now);
+        self.stop_seeking()
+    }
+
+    /// It stays on the path that it is on. Returns whether it sought another one.
+    pub(super) fn stop_seeking(&mut self) -> bool {
         let before = self.phase;
         self.phase = match before {
-            FieldDetourPhase::SeeksAgain(back_m) => FieldDetourPhase::Flies(back_m),
+            FieldDetourPhase::SeeksAgain(back) => FieldDetourPhase::Flies(back),
             FieldDetourPhase::Seeks(_) => FieldDetourPhase::Off,
             other => other,
         };
-        self.missed_at = Some(now);
         matches!(before, FieldDetourPhase::Seeks(_) | FieldDetourPhase::SeeksAgain(_))
     }
 
-    /// The requested detour has come, or another one.
-    pub(super) fn after_detour_received(self) -> Self {
+    /// The requested detour has come, or another one; `aside` if it leads aside only.
+    pub(super) fn after_detour_received(self, aside: bool) -> Self {
         let phase = match self.phase {
-            FieldDetourPhase::Seeks(back_m) | FieldDetourPhase::SeeksAgain(back_m) => {
-                FieldDetourPhase::Flies(back_m)
+            FieldDetourPhase::Seeks(back) | FieldDetourPhase::SeeksAgain(back) => {
+                FieldDetourPhase::Flies(back)
             }
             _ => FieldDetourPhase::Off,
         };
-        Self { phase, attempts: self.attempts.saturating_add(1), ..self }
+        Self { phase, aside, attempts: self.attempts.saturating_add(1), ..self }
     }
 
     /// The state that remains where the vehicle turns to another task.
@@ -106,15 +122,19 @@ impl FieldDetour {
         self.phase = if came { FieldDetourPhase::Back } else { FieldDetourPhase::Lost };
     }
 
-    /// Place where the vehicle is to come back to its path, metres, while it seeks the detour or
-    /// flies it.
-    pub(crate) fn rejoin_m(&self) -> Option<f32> {
+    /// Place where the vehicle is to come back to its path, while it seeks the detour or flies it.
+    pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
         match self.phase {
-            FieldDetourPhase::Seeks(back_m)
-            | FieldDetourPhase::Flies(back_m)
-            | FieldDetourPhase::SeeksAgain(back_m) => Some(back_m),
+            FieldDetourPhase::Seeks(back)
+            | FieldDetourPhase::Flies(back)
+            | FieldDetourPhase::SeeksAgain(back) => Some(back),
             _ => None,
         }
+    }
+
+    /// Whether the detour that it flies leads back to its path.
+    pub(crate) fn leads_back(&self) -> bool {
+        self.is_flying() && !self.aside
     }
 
     /// Whether it is beside its path, to come back to it.
