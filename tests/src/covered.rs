@@ -13,14 +13,26 @@ use host_sim::{scenario, swarm};
 
 /// Reason why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the
 /// lost one hovers where it was to fly.
-pub const EXPLAINED: [&str; 6] = [
+pub const EXPLAINED: [&str; 9] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
+    "Vehicle on the path: planning the way home",
     "Yielded for 60 s: landing",
-    "planning the way home",
+    "Yielded for 60 s: planning the way home",
+    "Path blocked for 2 min: planning the way home",
+    "No progress for 10 min: planning the way home",
     "No way around: landing",
     "No progress for 10 min: landing",
 ];
+
+/// Reason why a vehicle lands beside its pad: another one may lie there, or come down.
+pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
+
+/// Whether this vehicle itself said why it lands short of its part, by [`lines`].
+pub fn says(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
+    let own = format!(" Some({vehicle}) ");
+    log.lines().filter(|line| line.contains(&own)).any(|line| reasons.iter().any(|row| line.contains(row)))
+}
 
 /// Flies a coverage mission: its result with what its pictures show, and what was said.
 ///

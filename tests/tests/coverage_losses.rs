@@ -32,7 +32,7 @@ struct Outcome {
     landed_short: usize,
     /// Contacts with walls, distances below the safety distance, deadlocks.
     broken: [u64; 3],
-    /// Another vehicle ended in a row of the table that says why.
+    /// Each other vehicle that landed short said why itself, and what is missing has a reason too.
     explained: bool,
     text: String,
 }
@@ -137,7 +137,13 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let reported: u64 = log.lines().filter_map(around).sum();
     // Of the area no more than those waypoints' share.
     let missing = (1.0 - coverage.covered_share) * coverage.photos as f64;
-    let landed_short = vehicles.iter().filter(|v| !struck.contains(&v.id) && short(&v.end)).count();
+    let fell_short = |v: &&VehicleResult| !struck.contains(&v.id) && short(&v.end);
+    let landed_short = vehicles.iter().filter(fell_short).count();
+    let whole = coverage.covered_share >= 1.0;
+    let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY);
+    // With nothing left to photograph it may land where there is room.
+    let aside = whole.then_some(covered::LANDS_ASIDE);
+    let reasons: Vec<&str> = covered::EXPLAINED.into_iter().chain(rough).chain(aside).collect();
     // None of them waits to take over: a vehicle without a part takes none.
     let had_none = |v: &VehicleResult| struck.contains(&v.id) || v.end.starts_with("no goal");
     Some(Outcome {
@@ -148,10 +154,8 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         twice: coverage.twice,
         landed_short,
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks].map(|count| count as u64),
-        explained: covered::EXPLAINED.iter().any(|row| log.contains(row))
-            || (draw.radio == Radio::Rough && log.contains(GIVEN_AWAY))
-            || (landed_short == 0 && missing <= reported as f64)
-            || vehicles.iter().all(had_none),
+        explained: vehicles.iter().filter(fell_short).all(|v| covered::says(&log, v.id, &reasons))
+            && (whole || landed_short > 0 || missing <= reported as f64 || vehicles.iter().all(had_none)),
         text: log,
     })
 }
