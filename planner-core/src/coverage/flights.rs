@@ -252,17 +252,10 @@ struct FlightPathBuilder<'a, const N: usize, const W: usize> {
 }
 
 impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
-    /// Above a pad.
-    fn start_above_pad<const L: usize>(
-        work: &Work<'a, L, N>,
-        swarm: &FlightInputs<'a>,
-        pad: &Pad,
-    ) -> Result<Self, PathError> {
+    /// Without a waypoint yet: the first is to be above the pad.
+    const fn new<const L: usize>(work: &Work<'a, L, N>, swarm: &FlightInputs<'a>, pad: &Pad) -> Self {
         let FlightInputs { clearance_m, following, .. } = *swarm;
-        let mut draft =
-            Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start };
-        draft.add_straight_leg(pad.start)?;
-        Ok(draft)
+        Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start }
     }
 
     /// Appends a straight leg to a place. Returns the index of its waypoint.
@@ -399,7 +392,8 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
-    let mut draft = FlightPathBuilder::start_above_pad(work, swarm, pad)?;
+    let mut draft = FlightPathBuilder::new(work, swarm, pad);
+    draft.add_straight_leg(pad.start)?;
     draft.add_straight_leg(point_at_height(&vehicle.place, layer_m))?;
     draft.add_legs_around_zones(&place(route.end_waypoints().0)?, layer_m)?;
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
@@ -434,7 +428,8 @@ fn flight_home<const L: usize, const N: usize, const W: usize>(
 ) -> Result<Flight<W>, PathError> {
     let CaptureSettings { waypoint_m, heading_mode: look, trigger } = swarm.capture;
     let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
-    let draft = FlightPathBuilder::start_above_pad(work, swarm, pad)?;
+    let mut draft = FlightPathBuilder::new(work, swarm, pad);
+    draft.add_straight_leg(pad.start)?;
     let photographs = PicturePlan::new(waypoint_m, look, trigger);
     finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
 }
@@ -459,17 +454,16 @@ fn finish_with_return<const N: usize, const W: usize>(
     draft.add_straight_leg(point_at_height(&draft.here.xy(), layer_m))?;
     draft.add_legs_around_zones(&vehicle.home, layer_m)?;
     draft.add_straight_leg(point_at_height(&vehicle.home, pad.end_z_m))?;
-    let mut path = draft.path;
     let seconds = |from: &Point, to: &Point| {
         let (way_m, up_m) = ((to - from).xy().length(), to.z - from.z);
         let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
         leg_duration_s(way_m, vehicle.cruise_mps) + leg_duration_s(libm::fabsf(up_m), z_mps)
     };
-    path.label_times_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
+    draft.path.label_times_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
     let mut flight = Flight {
         id: pad.id,
         task: Task::Photograph(photographs),
-        path,
+        path: draft.path,
         climb_m: pad.climb_m,
         descent_m: pad.descent_m,
         depart_s: 0.0,

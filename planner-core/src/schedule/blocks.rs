@@ -8,7 +8,7 @@ use heapless::Vec;
 use libm::fmaxf;
 
 use super::config::ScheduleConfig;
-use super::pieces::{MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, straight_part};
+use super::pieces::{MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, line_of_part, straight_part};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
@@ -134,29 +134,27 @@ impl Blocks {
         core::iter::from_fn(move || {
             loop {
                 if next >= checked_to {
-                    let run = level_run(&flight.path.waypoints()[next - 1..]);
-                    checked_to = next + run.len().saturating_sub(1).max(1);
-                    if run.len() > 2 && self.are_far_from_run(cfg, run) {
+                    let (legs, around) = level_run(flight.path.waypoints().get(next - 1..)?)?;
+                    checked_to = next + legs.max(1);
+                    if legs > 1 && self.are_far_from_box(cfg, &around) {
                         next = checked_to;
                     }
                 }
-                let part = straight_part(cfg.vertical_mps, flight, next)?;
+                let (from, to) = line_of_part(flight, next)?;
+                let near = self.blocks_near_line(cfg, from, to);
                 next += 1;
-                let near = self.blocks_near_line(cfg, part.leg.from, part.leg.to);
                 if near != 0 {
-                    return Some((part, near));
+                    return Some((straight_part(cfg.vertical_mps, flight, next - 1)?, near));
                 }
             }
         })
     }
 
-    /// Whether no leg between these waypoints comes near.
-    fn are_far_from_run(&self, cfg: &ScheduleConfig, run: &[Waypoint]) -> bool {
-        let (reach_m, first) = (conflict_distance_m(cfg), run[0].position);
-        let mut around = BoundingBox(first, first);
-        run.iter().for_each(|waypoint| around.include(&waypoint.position, &waypoint.position));
+    /// Whether no block comes near the box.
+    fn are_far_from_box(&self, cfg: &ScheduleConfig, around: &BoundingBox) -> bool {
+        let reach_m = conflict_distance_m(cfg);
         self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).all(|(group, blocks)| {
-            let is_near = |own: &BoundingBox| own.is_within(&around, reach_m);
+            let is_near = |own: &BoundingBox| own.is_within(around, reach_m);
             !is_near(group) || !blocks.iter().any(|own| is_near(&own.bounding_box))
         })
     }
@@ -193,10 +191,23 @@ impl Blocks {
     }
 }
 
-/// The first waypoints, as many as are at one height: legs between them are first compared together.
-fn level_run(waypoints: &[Waypoint]) -> &[Waypoint] {
-    let level = |waypoint: &&Waypoint| waypoint.position.z == waypoints[0].position.z;
-    &waypoints[..waypoints.iter().take_while(level).count()]
+/// The legs between the first waypoints at one height, and a box around them: they are first compared together.
+fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
+    let (first, rest) = waypoints.split_first()?;
+    let (mut low, mut high) = (first.position, first.position);
+    let mut legs = 0;
+    for waypoint in rest.iter().take_while(|waypoint| waypoint.position.z == first.position.z) {
+        for axis in 0..2 {
+            if waypoint.position[axis] < low[axis] {
+                low[axis] = waypoint.position[axis];
+            }
+            if waypoint.position[axis] > high[axis] {
+                high[axis] = waypoint.position[axis];
+            }
+        }
+        legs += 1;
+    }
+    Some((legs, BoundingBox(low, high)))
 }
 
 /// Distance from which on two segments are in no conflict, metres.

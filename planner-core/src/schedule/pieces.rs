@@ -127,6 +127,21 @@ pub(super) fn straight_part<const W: usize>(
     })
 }
 
+/// The ends of a straight part's leg, as [`straight_part`] has them.
+pub(super) fn line_of_part<const W: usize>(flight: &Flight<W>, part: usize) -> Option<(Point, Point)> {
+    let waypoints = flight.path.waypoints();
+    let below = |place: Point, m: f32| place - Point::new(0.0, 0.0, m);
+    let leaves = flight.task.leaves_pad();
+    if part == 0 {
+        let first = waypoints.first()?.position;
+        let pad = below(first, flight.climb_m);
+        return Some((pad, if leaves { first } else { pad }));
+    }
+    let begin = waypoints.get(part - 1).filter(|_| leaves)?.position;
+    let next = waypoints.get(part).map(|next| next.position);
+    Some((begin, next.unwrap_or(below(begin, flight.descent_m))))
+}
+
 /// A place that is held.
 fn stay(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
     TimedSegment { from: at, to: at, from_m: m, to_m: m, from_s, to_s, parked: true }
