@@ -110,19 +110,20 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
 ) -> Result<f32, ScheduleError> {
     cut_into_segments(cfg, flight, &mut ws.own)?;
     let ScheduleWorkspace { own, blocks, forbidden, .. } = ws;
-    blocks.rebuild(own);
+    blocks.rebuild(cfg, own);
     forbidden.clear();
+    let mut near_own = Vec::<u16, MAX_TIMED_SEGMENTS>::new();
     for (nth, other) in scheduled.enumerate() {
         let (mut own_in_conflict, mut others_in_conflict) = ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
         for (part, near) in blocks.parts_near(cfg, other) {
             part.check_count(other.segment_m, MAX_TIMED_SEGMENTS)?;
             let mut compare = |some: &[TimedSegment]| {
                 let (Some(first), Some(last)) = (some.first(), some.last()) else { return };
-                let short = last.to_m - first.from_m >= part.leg.length_m;
-                let near = if short { near } else { blocks.blocks_near_line(cfg, first.from, last.to) };
+                blocks.segments_near_line(near, own, (first.from, last.to), &mut near_own);
                 for q in some {
                     let mut meets = false;
-                    for (i, p) in segments_in_blocks(near, own).filter(|(_, p)| is_conflict(cfg, p, q)) {
+                    let near = near_own.iter().map(|&i| (usize::from(i), &own[usize::from(i)]));
+                    for (i, p) in near.filter(|(_, p)| is_conflict(cfg, p, q)) {
                         // Held together iff p.from + d < q.to and q.from < p.to + d.
                         let from_s = other.depart_s + q.from_s - handover_s - p.to_s;
                         let to_s = other.depart_s + q.to_s + handover_s - p.from_s;
@@ -241,7 +242,7 @@ pub(crate) fn gate_merge_distance_m<const W: usize>(
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
     cut_into_segments(cfg, flights.get(index).ok_or(ScheduleError::BadIndex)?, &mut ws.own)?;
-    ws.blocks.rebuild(&ws.own);
+    ws.blocks.rebuild(cfg, &ws.own);
     for merged_m in GATE_MERGE_M {
         let mut count = 0;
         for_each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;
@@ -259,11 +260,11 @@ const GATE_MERGE_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
 /// For each block of `ws.own` the blocks of `ws.other` that may come too near; `None` where none
 /// does.
 #[inline(never)]
-fn conflicting_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
+fn conflicting_blocks(ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
     let mut near = [0; MAX_BLOCKS];
     let mut some = false;
     for (bit, block) in ws.other.chunks(SEGMENTS_PER_BLOCK).enumerate() {
-        for own in set_bit_indices(ws.blocks.blocks_near(cfg, block)) {
+        for own in set_bit_indices(ws.blocks.blocks_near(block)) {
             near[own] |= 1 << bit;
             some = true;
         }
@@ -288,7 +289,7 @@ fn for_each_gate<const W: usize>(
             continue;
         }
         cut_into_segments(cfg, other, &mut ws.other)?;
-        let Some(near) = conflicting_blocks(cfg, ws) else { continue };
+        let Some(near) = conflicting_blocks(ws) else { continue };
         // The gate found last, and when it is passed.
         let mut last: Option<(Gate, f32)> = None;
         let mut highest = f32::NEG_INFINITY;

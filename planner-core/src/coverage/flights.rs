@@ -265,20 +265,20 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// The corners of the way around no-fly zones.
+    /// Puts out the corners of the way around no-fly zones.
     #[inline(never)]
-    fn corners_around_zones(&self, to: &Flat) -> Vec<Flat, N> {
-        let mut corners = Vec::new();
+    fn find_corners_around_zones(&self, to: &Flat, corners: &mut Vec<Flat, N>) {
         // The plan has a finite length, so there is a way between all that it joins.
-        if self.transit.shortest_path(&self.here.xy(), to, &mut corners).is_err() {
+        if self.transit.shortest_path(&self.here.xy(), to, corners).is_err() {
             corners.clear();
         }
-        corners
     }
 
     /// Appends legs around no-fly zones, all at one height.
     fn add_legs_around_zones(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
-        for corner in &self.corners_around_zones(to) {
+        let mut corners = Vec::new();
+        self.find_corners_around_zones(to, &mut corners);
+        for corner in &corners {
             self.add_straight_leg(point_at_height(corner, height_m))?;
         }
         self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
@@ -305,7 +305,9 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
 
     /// As `add_picture_leg`, around no-fly zones.
     fn add_picture_legs_around_zones(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
-        for corner in &self.corners_around_zones(to) {
+        let mut corners = Vec::new();
+        self.find_corners_around_zones(to, &mut corners);
+        for corner in &corners {
             self.add_picture_leg(corner, mission_m)?;
         }
         self.add_picture_leg(to, mission_m)
@@ -450,7 +452,7 @@ fn finish_with_return<const N: usize, const W: usize>(
     swarm: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let ReturnInputs { layer_m, vehicle, photographs } = *way_home;
+    let ReturnInputs { layer_m, vehicle, .. } = *way_home;
     draft.add_straight_leg(point_at_height(&draft.here.xy(), layer_m))?;
     draft.add_legs_around_zones(&vehicle.home, layer_m)?;
     draft.add_straight_leg(point_at_height(&vehicle.home, pad.end_z_m))?;
@@ -462,7 +464,7 @@ fn finish_with_return<const N: usize, const W: usize>(
     draft.path.label_times_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
     let mut flight = Flight {
         id: pad.id,
-        task: Task::Photograph(photographs),
+        task: Task::Photograph(way_home.photographs),
         path: draft.path,
         climb_m: pad.climb_m,
         descent_m: pad.descent_m,

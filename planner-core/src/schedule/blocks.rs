@@ -68,6 +68,11 @@ impl Block {
         Self { bounding_box, line: (from, to), lateral_extent_m: 0.0 }
     }
 
+    /// All of a box: what is within it meets any line.
+    fn filling(bounding_box: BoundingBox) -> Self {
+        Self { bounding_box, line: (bounding_box.0, bounding_box.1), lateral_extent_m: f32::INFINITY }
+    }
+
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
         let apart_m = reach_m + self.lateral_extent_m + other.lateral_extent_m;
         let (own, theirs) = (&self.line, &other.line);
@@ -76,10 +81,15 @@ impl Block {
 }
 
 /// A box: its lowest and its highest corner.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct BoundingBox(Point, Point);
 
 impl BoundingBox {
+    const AROUND_NOTHING: Self = {
+        let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
+        Self(Point::new(low, low, low), Point::new(high, high, high))
+    };
+
     #[inline(never)]
     fn include(&mut self, low: &Point, high: &Point) {
         // Not `fminf`: what that does about numbers that are none takes a board ten times as long.
@@ -93,32 +103,58 @@ impl BoundingBox {
         }
     }
 
-    fn is_within(&self, other: &Self, reach_m: f32) -> bool {
-        (0..3).all(|axis| self.0[axis] - other.1[axis] <= reach_m && other.0[axis] - self.1[axis] <= reach_m)
+    /// Makes it wider on each side.
+    fn widen(&mut self, reach_m: f32) {
+        (self.0, self.1) = (self.0.add_scalar(-reach_m), self.1.add_scalar(reach_m));
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|axis| self.0[axis] <= other.1[axis] && other.0[axis] <= self.1[axis])
+    }
+
+    /// Whether a line lies wholly beyond one of its sides.
+    #[inline(never)]
+    fn is_beside_line(&self, from: &Point, to: &Point) -> bool {
+        (0..3).any(|axis| {
+            let (low, high) = (self.0[axis], self.1[axis]);
+            (from[axis] > high && to[axis] > high) || (from[axis] < low && to[axis] < low)
+        })
     }
 }
 
-/// The blocks of one flight, and boxes around groups of them.
+/// The blocks of one flight, and boxes around groups of them and around all. Boxes are as much wider as another flight's line must
+/// come near.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<Block, MAX_BLOCKS>,
     groups: Vec<BoundingBox, MAX_GROUPS>,
+    whole: BoundingBox,
+    /// Distance from which on two segments are in no conflict, metres.
+    reach_m: f32,
 }
 
 impl Blocks {
     pub(super) const fn new() -> Self {
-        Self { blocks: Vec::new(), groups: Vec::new() }
+        let whole = BoundingBox(Point::new(0.0, 0.0, 0.0), Point::new(0.0, 0.0, 0.0));
+        Self { blocks: Vec::new(), groups: Vec::new(), whole, reach_m: 0.0 }
     }
 
     /// Rebuilds the blocks from the timed segments of a flight.
-    pub(super) fn rebuild(&mut self, pieces: &[TimedSegment]) {
+    pub(super) fn rebuild(&mut self, cfg: &ScheduleConfig, pieces: &[TimedSegment]) {
+        self.reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M;
         self.blocks.clear();
-        // Cannot overflow: there are no more pieces than blocks have room for.
-        pieces.chunks(SEGMENTS_PER_BLOCK).for_each(|some| _ = self.blocks.push(Block::around_segments(some)));
+        for some in pieces.chunks(SEGMENTS_PER_BLOCK) {
+            let mut block = Block::around_segments(some);
+            block.bounding_box.widen(self.reach_m);
+            // Cannot overflow: there are no more pieces than blocks have room for.
+            let _ = self.blocks.push(block);
+        }
         self.groups.clear();
+        self.whole = BoundingBox::AROUND_NOTHING;
         for blocks in self.blocks.chunks(BLOCKS_PER_GROUP) {
-            let mut around = blocks[0].bounding_box;
-            blocks[1..].iter().for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
+            let mut around = BoundingBox::AROUND_NOTHING;
+            blocks.iter().for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
+            self.whole.include(&around.0, &around.1);
             // Cannot overflow either.
             let _ = self.groups.push(around);
         }
@@ -136,12 +172,12 @@ impl Blocks {
                 if next >= checked_to {
                     let (legs, around) = level_run(flight.path.waypoints().get(next - 1..)?)?;
                     checked_to = next + legs.max(1);
-                    if legs > 1 && self.are_far_from_box(cfg, &around) {
+                    if legs > 1 && self.blocks_near_block(&Block::filling(around)) == 0 {
                         next = checked_to;
                     }
                 }
                 let (from, to) = line_of_part(flight, next)?;
-                let near = self.blocks_near_line(cfg, from, to);
+                let near = self.blocks_near_line(from, to);
                 next += 1;
                 if near != 0 {
                     return Some((straight_part(cfg.vertical_mps, flight, next - 1)?, near));
@@ -150,44 +186,60 @@ impl Blocks {
         })
     }
 
-    /// Whether no block comes near the box.
-    fn are_far_from_box(&self, cfg: &ScheduleConfig, around: &BoundingBox) -> bool {
-        let reach_m = conflict_distance_m(cfg);
-        self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).all(|(group, blocks)| {
-            let is_near = |own: &BoundingBox| own.is_within(around, reach_m);
-            !is_near(group) || !blocks.iter().any(|own| is_near(&own.bounding_box))
-        })
-    }
-
     /// The blocks that may come too near to another flight on a straight line.
-    pub(super) fn blocks_near_line(&self, cfg: &ScheduleConfig, from: Point, to: Point) -> Bits {
-        self.blocks_near_block(cfg, &Block::around_line(from, to))
+    pub(super) fn blocks_near_line(&self, from: Point, to: Point) -> Bits {
+        if self.whole.is_beside_line(&from, &to) {
+            return 0;
+        }
+        self.blocks_near_block(&Block::around_line(from, to))
     }
 
     /// The blocks that may come too near to these segments of another flight, which are at most [`SEGMENTS_PER_BLOCK`] in a row.
-    pub(super) fn blocks_near(&self, cfg: &ScheduleConfig, pieces: &[TimedSegment]) -> Bits {
-        if pieces.is_empty() { 0 } else { self.blocks_near_block(cfg, &Block::around_segments(pieces)) }
+    pub(super) fn blocks_near(&self, pieces: &[TimedSegment]) -> Bits {
+        if pieces.is_empty() { 0 } else { self.blocks_near_block(&Block::around_segments(pieces)) }
     }
 
     /// The blocks that may come too near to another block.
     #[inline(never)]
-    fn blocks_near_block(&self, cfg: &ScheduleConfig, other: &Block) -> Bits {
-        let reach_m = conflict_distance_m(cfg);
+    fn blocks_near_block(&self, other: &Block) -> Bits {
         let mut near = 0;
         for (group, (around, blocks)) in
             self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
         {
-            if !around.is_within(&other.bounding_box, reach_m) {
+            if !around.overlaps(&other.bounding_box) {
                 continue;
             }
             for (bit, own) in blocks.iter().enumerate() {
-                if own.bounding_box.is_within(&other.bounding_box, reach_m) && own.lines_meet(other, reach_m)
-                {
+                if own.bounding_box.overlaps(&other.bounding_box) && own.lines_meet(other, self.reach_m) {
                     near |= 1 << (group * BLOCKS_PER_GROUP + bit);
                 }
             }
         }
         near
+    }
+
+    /// Puts out the indices of the segments of these blocks that may come too near to another flight on a straight line, in order.
+    pub(super) fn segments_near_line(
+        &self,
+        near: Bits,
+        pieces: &[TimedSegment],
+        (from, to): (Point, Point),
+        out: &mut Vec<u16, MAX_TIMED_SEGMENTS>,
+    ) {
+        let mut line = BoundingBox(from, from);
+        line.include(&to, &to);
+        line.widen(self.reach_m);
+        out.clear();
+        for block in set_bit_indices(near) {
+            let first = block * SEGMENTS_PER_BLOCK;
+            let end = (first + SEGMENTS_PER_BLOCK).min(pieces.len());
+            for (index, piece) in (first..).zip(pieces.get(first..end).unwrap_or_default()) {
+                if !line.is_beside_line(&piece.from, &piece.to) {
+                    // Cannot overflow: there are no more segments.
+                    let _ = out.push(index as u16);
+                }
+            }
+        }
     }
 }
 
@@ -208,11 +260,6 @@ fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
         legs += 1;
     }
     Some((legs, BoundingBox(low, high)))
-}
-
-/// Distance from which on two segments are in no conflict, metres.
-fn conflict_distance_m(cfg: &ScheduleConfig) -> f32 {
-    fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M
 }
 
 /// Indices of the set bits, in rising order.
@@ -280,12 +327,12 @@ mod tests {
             other.0 = (own.0.0 + apart.0, own.0.1 + apart.1);
             let (own, other) = (flight(&own), flight(&other));
             let mut blocks = Blocks::new();
-            blocks.rebuild(&own);
+            blocks.rebuild(&CFG, &own);
             let all = |own: &mut dyn Iterator<Item = &TimedSegment>, q: &TimedSegment| -> List<f32> {
                 own.filter(|p| is_conflict(&CFG, p, q)).map(|p| p.from_m).collect()
             };
             for some in other.chunks(SEGMENTS_PER_BLOCK) {
-                let near = blocks.blocks_near(&CFG, some);
+                let near = blocks.blocks_near(some);
                 for q in some {
                     let expected = all(&mut own.iter(), q);
                     prop_assert_eq!(all(&mut segments_in_blocks(near, &own).map(|(_, p)| p), q), expected);
@@ -331,7 +378,7 @@ mod tests {
             cut_into_segments(&CFG, &own, &mut own_pieces).unwrap();
             cut_into_segments(&CFG, &other, &mut other_pieces).unwrap();
             let mut blocks = Blocks::new();
-            blocks.rebuild(&own_pieces);
+            blocks.rebuild(&CFG, &own_pieces);
             let far = blocks.parts_near(&CFG, &other).next().is_none();
             let meet = other_pieces.iter().any(|q| own_pieces.iter().any(|p| is_conflict(&CFG, p, q)));
             prop_assert!(!(far && meet));
