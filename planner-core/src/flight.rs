@@ -119,7 +119,7 @@ impl<const W: usize> Path<W> {
     }
 
     /// The point at an arc length, clamped to the path; `None` on an empty path.
-    // In its many callers the search would take flash of a board.
+    // Inlined in its many callers the search would take a board's flash.
     #[inline(never)]
     pub fn point_at(&self, along_m: f32) -> Option<Point> {
         self.point_on(self.leg_at(along_m), along_m)

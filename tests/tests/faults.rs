@@ -86,7 +86,7 @@ const CASES: &[Case] = &[
 ];
 
 const CANCELLED: &str = "Start cancelled as commanded";
-const UNFOLLOWED: &str = "Setpoint not followed for 20 s: landing";
+const UNFOLLOWED: &str = "Setpoint not followed: landing";
 /// Not solved yet: beside a vehicle whose autopilot is silent for good others may land short of their goals.
 const OTHERS_LAND_SHORT: &str = "duration_s = 600";
 /// States in which the mission of a vehicle struck may rest.

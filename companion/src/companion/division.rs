@@ -260,7 +260,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Ok(plan) if may_take && division > self.mission.division_count() => {
                 let in_air = self.mission.state() == State::Dividing;
                 let own = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-                let here = self.detours.field_detour.rejoin().map(|back| back.position).or(own);
+                let beside = self.detours.field_detour;
+                let here = beside.rejoin().filter(|_| beside.is_flying()).map(|back| back.position).or(own);
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
                 if self.mission.accept_division(plan, &place, division, in_air) {
                     self.neighbours.forget_plan();

@@ -20,9 +20,11 @@ const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Silence a second before the lease ends: the row `NeighboursSilent` stops a vehicle a second
 /// after this.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
-/// Time for which a vehicle over an area may be away from a setpoint that stands, beyond that elsewhere: high above the ground,
-/// in gusts, it sways further.
+/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may sway around a setpoint that stands: in gusts it
+/// sways further there than between walls it may.
 const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
+/// Greatest distance from its setpoint of a vehicle that sways, metres.
+const MAX_SWAY_M: f32 = 2.0;
 /// A gate nearer ahead than this leaves no path to fly on, metres.
 const MIN_GATE_AHEAD_M: f32 = 0.2;
 /// Longest time that a climb takes beyond its height at 1 m/s, seconds.
@@ -61,7 +63,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
-        let sways_for = if self.config.division.is_some() { MAX_SWAY_OVER_AREA } else { Duration::default() };
+        let sways = self.config.division.is_some() && self.guidance.lead_m(t) < MAX_SWAY_M;
+        let sways_for = if sways { MAX_SWAY_OVER_AREA } else { Duration::default() };
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
         // What something holds gets nowhere else.
         let can_leave = unfollowed_for < UNFOLLOWED_MOST;

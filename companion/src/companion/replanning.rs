@@ -1,5 +1,6 @@
 //! Ways around: what is requested of the shell, and what becomes of its answer.
 
+use planner_core::Length;
 use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::flight::VehiclePlan;
 
@@ -8,10 +9,12 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::guidance::GuidanceInputs;
 use crate::mission::State;
-use crate::swarm::detour::DetourPurpose;
-use crate::swarm::detour::asking::RetryOutlook;
+use crate::swarm::detour::asking::{DetourPurpose, RetryOutlook};
 use crate::swarm::detour::beside::RejoinPlace;
 use crate::swarm::view::DetourView;
+
+/// A detour ends at most this far from the place where the vehicle is to come back to its path, metres.
+const MAX_REJOIN_ERROR_M: f32 = 0.2;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The view that decisions about detours follow from.
@@ -67,8 +70,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.request_detour(DetourPurpose::Aside);
     }
 
-    /// Where it comes back to its path over a field: where it holds for a division, or beyond what blocks the path. None where it
-    /// would leave out what it promised to photograph.
+    /// Where it comes back to its path over a field: where it holds for a division, or where it stands if it promised to hold
+    /// further on; else beyond what blocks the path, if there is such a place.
     fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlace> {
         if !self.detours.keeps_to_plan_over_field(&self.detour_view()) {
             return None;
@@ -76,7 +79,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let holds = from == State::Dividing || self.is_holding_for_division();
         match self.division_hold_m() {
             Some(at_m) if holds => self.place_on_path(at_m),
-            Some(_) => None,
+            Some(_) => self.place_on_path(self.guidance.along_m()),
             None => self.place_beyond_block().or_else(|| self.place_on_path(self.guidance.along_m())),
         }
     }
@@ -116,16 +119,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        // A promise made meanwhile is along the vehicle's own path, where it stands: from aside it comes back there.
-        let promised = self.division_hold_m().and_then(|at_m| self.place_on_path(at_m));
-        let rejoin = self.detours.field_detour.rejoin();
-        let moved = promised.filter(|promised| rejoin.is_some_and(|back| back.along_m != promised.along_m));
-        if moved.is_some() && self.detours.is_detour_aside() {
-            self.detours.field_detour.abort();
-            self.detours.field_detour.start_seeking(moved);
-        } else if moved.is_some() || !here.is_some_and(|here| self.mission.starts_at(detour, &here)) {
+        let (aside, rejoin) = (self.detours.is_detour_aside(), self.detours.field_detour.rejoin());
+        let ends = detour.path.waypoints().last().map(|last| last.position);
+        // An answer may be late, and be for another request.
+        let leads_back = aside
+            || rejoin.is_none_or(|back| {
+                ends.is_some_and(|end| (end - back.position).length() < MAX_REJOIN_ERROR_M)
+            });
+        let begins = here.is_some_and(|here| self.mission.starts_at(detour, &here));
+        // A promise made meanwhile is along the vehicle's own path.
+        let promised_m = self.division_hold_m().filter(|_| rejoin.is_some());
+        if !begins || !leads_back || (promised_m.is_some() && !aside) {
             self.handle_detour_failure(PlanFailure::Invalid);
             return;
+        }
+        // From aside it comes back to where it holds.
+        if let Some(promised_m) = promised_m.filter(|_| self.is_holding_for_division()) {
+            let promised = self.place_on_path(promised_m);
+            self.detours.field_detour.abort();
+            self.detours.field_detour.start_seeking(promised);
         }
         let progress_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));

@@ -10,7 +10,7 @@ use crate::margins;
 use crate::mission::task::{PathProgress, PathRelation};
 use crate::mission::{self, Action, State, TransitionRow};
 use crate::storage::store::ErasePermission;
-use crate::swarm::detour::DetourPurpose;
+use crate::swarm::detour::asking::DetourPurpose;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -128,6 +128,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let now = self.now;
         let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, now);
         self.requests.state_changed(from, to);
+        if from == State::Replanning {
+            self.detours.field_detour.stop_seeking();
+        }
         self.run_action(from, to, row);
         if !row.text.is_empty() {
             self.links.send_text(row.warning, row.text);

@@ -10,7 +10,7 @@ impl Guidance {
     /// `moves` for a vehicle that is to fly on.
     pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
         let place = self.smoother.position();
-        let lead_m = (telemetry.position - place).length();
+        let lead_m = self.lead_m(telemetry);
         let advance = place - self.followed_place;
         // The speed of the vehicle says nothing: the wind may carry it away from its setpoint.
         if lead_m < ARRIVED_M || advance.norm_squared() > ARRIVED_M * ARRIVED_M {
@@ -29,5 +29,9 @@ impl Guidance {
     /// vehicle, or carries it away.
     pub(crate) fn unfollowed_for(&self, now: Instant) -> Duration {
         now - self.followed_at
+    }
+    /// Distance of the vehicle from its setpoint, metres.
+    pub(crate) fn lead_m(&self, telemetry: &Telemetry) -> f32 {
+        (telemetry.position - self.smoother.position()).length()
     }
 }

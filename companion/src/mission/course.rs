@@ -255,25 +255,24 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.division_plan_ready = false;
     }
 
-    /// Whether the shell is to be asked for this division now; true at most once within `again`.
+    /// Whether the shell is to be asked for this division now; true at most once within `again` until it answers: an answer
+    /// does not say which request it is for.
     pub(crate) fn should_request_division(
         &mut self,
         fingerprint: u32,
         now: Instant,
         again: Duration,
     ) -> bool {
-        let asked = self.division_requested.is_some_and(|(of, at)| of == fingerprint && now - at < again);
-        if !asked {
+        let waits = self.division_requested.is_some_and(|(_, at)| now - at < again);
+        if !waits {
             self.division_requested = Some((fingerprint, now));
         }
-        !asked
+        !waits
     }
 
-    /// Ends the open request for this division; false where there is none.
+    /// Ends the open request; whether it was for this division.
     pub(crate) fn take_division_request(&mut self, fingerprint: u32) -> bool {
-        let asked = self.division_requested.is_some_and(|(of, _)| of == fingerprint);
-        self.division_requested = self.division_requested.filter(|_| !asked);
-        asked
+        self.division_requested.take().is_some_and(|(of, _)| of == fingerprint)
     }
 
     /// Divisions that count for the plan.

@@ -250,7 +250,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Follow],           G::PadTaken,        secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),
     info_row(&[Follow],              G::AsideReached,    AT_ONCE,    Land,        A::RequestLandMode,   "Landing aside"),
     warning_row(&[Follow],           G::PathBlocked,     AT_ONCE,    Blocked,     A::BrakeOnPath,       "Path blocked: waiting until all others stand"),
-    warning_row(&[Follow, Blocked],  G::Unfollowed,      UNFOLLOWED_MOST, Land,   A::RequestLandMode,   "Setpoint not followed for 20 s: landing"),
+    warning_row(&[Follow, Blocked],  G::Unfollowed,      UNFOLLOWED_MOST, Land,   A::RequestLandMode,   "Setpoint not followed: landing"),
     warning_row(&[Follow],           G::StalledOverField, secs(600), Blocked,     A::TurnHome,          "No progress for 10 min: planning the way home"),
     warning_row(&[Follow],           G::Stalled,         secs(600),  Land,        A::RequestLandMode,   "No progress for 10 min: landing"),
     info_row(&[Blocked],             G::PathClear,       AT_ONCE,    Follow,      A::FollowPath,        "Path clear again"),

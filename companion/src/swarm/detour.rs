@@ -26,7 +26,7 @@ use planner_core::detour;
 use planner_core::frames::Geodetic;
 use planner_core::{Length, Point};
 
-use self::beside::{FieldDetour, LOOK_AHEAD_M};
+use self::beside::{DETOUR_MARGIN_M, FieldDetour, LOOK_AHEAD_M};
 use self::homeward::HomewardFlight;
 use crate::autopilot::telemetry::Telemetry;
 use crate::link::commands::{ACCEPTED, Command};
@@ -76,27 +76,12 @@ const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 /// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for others.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
-/// Distance from the end of a path aside at which a vehicle that was there still stands aside, metres.
-const SWAY_ASIDE_M: f32 = 1.0;
+/// Distance from the end of a path aside within which a blocked vehicle stands aside, metres.
+const SWAY_ASIDE_M: f32 = 0.5;
 /// Age from which a neighbour's position is vague.
 const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
 /// Greatest deviation from the path, metres: a path that much nearer to a keep-out zone is blocked.
 const BLOCKED_WITHIN_M: f32 = 0.25;
-
-/// Purpose of a requested detour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum DetourPurpose {
-    /// To fly to the goal.
-    Goal,
-    /// To leave the column under a vehicle that lands.
-    Aside,
-    /// To land where no vehicle lies.
-    Landing,
-    /// To fly home over a field.
-    Home,
-    /// To fly on along the own path over a field, beyond what blocks the path.
-    Beyond,
-}
 
 /// Knowledge of the path ahead, and of detours.
 #[derive(Clone, Debug, Default)]
@@ -449,7 +434,10 @@ impl Detours {
         let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
-        let apart_m = view.config.safety_distance_m + BLOCKED_WITHIN_M;
+        // One that hovers sways: what blocked the path over a field blocks it until it is as far away as a detour keeps.
+        let waits = view.config.division.is_some() && view.mission.state() == State::Blocked;
+        let beside_m = if waits { DETOUR_MARGIN_M } else { BLOCKED_WITHIN_M };
+        let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.new_ones();
         self.scan.continue_scan(

@@ -68,7 +68,7 @@ impl Block {
         Self { bounding_box, line: (from, to), lateral_extent_m: 0.0 }
     }
 
-    /// All of a box: what is within it meets any line.
+    /// All of a box: it meets every line, and only the box limits it.
     fn filling(bounding_box: BoundingBox) -> Self {
         Self { bounding_box, line: (bounding_box.0, bounding_box.1), lateral_extent_m: f32::INFINITY }
     }
@@ -76,7 +76,9 @@ impl Block {
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
         let apart_m = reach_m + self.lateral_extent_m + other.lateral_extent_m;
         let (own, theirs) = (&self.line, &other.line);
-        segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
+        // Of lines of 10^15 m the distance is no number.
+        apart_m.is_infinite()
+            || segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
     }
 }
 

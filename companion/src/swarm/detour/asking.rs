@@ -5,10 +5,7 @@
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, DETOUR_MARGIN_M};
-use super::{
-    BLOCKED_WITHIN_M, DETOUR_RETRY_S, DetourPurpose, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES,
-    STUCK_AFTER,
-};
+use super::{BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
 use crate::guidance::evade;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
@@ -19,6 +16,21 @@ const SIDESTEP_RETRY_S: u64 = 30;
 const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Two searches from places nearer than this are searches from the same place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
+
+/// Purpose of a requested detour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DetourPurpose {
+    /// To fly to the goal.
+    Goal,
+    /// To leave the column under a vehicle that lands.
+    Aside,
+    /// To land where no vehicle lies.
+    Landing,
+    /// To fly home over a field.
+    Home,
+    /// To fly on along the own path over a field, beyond what blocks the path.
+    Beyond,
+}
 
 /// Whether a detour that was not found may be found later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

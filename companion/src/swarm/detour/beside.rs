@@ -1,9 +1,9 @@
 //! Around what hovers or lies on a path over a field, and back to that path beyond it.
 //!
 //! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
-//! plan, and then asks for its own plan again, to continue from there. It keeps its part: no division follows, its progress stays
-//! where it left its path until it is back, and others wait for it. It comes back no further than its gates are open. From under a
-//! vehicle that comes down it first flies aside, and seeks that way from there.
+//! plan, and then asks for its own plan again, to continue from there. It keeps its part: its progress stays where it left its path
+//! until it is back, and others wait for it. It comes back no further than its gates are open. From under a vehicle that comes down it
+//! first flies aside, and seeks the way back from there.
 //!
 //! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
@@ -51,9 +51,9 @@ enum FieldDetourPhase {
     Off,
     /// The vehicle seeks the detour to this place of its path.
     Seeks(RejoinPlace),
-    /// The vehicle flies the detour, and waits at its end for its plan.
+    /// The vehicle flies the detour, and waits at its end for its plan, or aside for the way back.
     Flies(RejoinPlace),
-    /// The vehicle was stopped on the detour, and seeks another one.
+    /// The vehicle was stopped on the detour, or stands aside, and seeks another one.
     SeeksAgain(RejoinPlace),
     /// The vehicle's plan has come.
     Back,
@@ -72,7 +72,7 @@ pub(crate) struct FieldDetour {
 }
 
 impl FieldDetour {
-    /// Starts to seek a path back to the plan: to the place that the vehicle was flying to if it was stopped on such a path, else to
+    /// Starts to seek a path back to the plan, or aside first: to the place that the vehicle was flying to if it was stopped on such a path, else to
     /// `rejoin`. False where there is no such place.
     pub(crate) fn start_seeking(&mut self, rejoin: Option<RejoinPlace>) -> bool {
         self.phase = match self.phase {
@@ -91,7 +91,7 @@ impl FieldDetour {
     }
 
     /// It stays on the path that it is on. Returns whether it sought another one.
-    pub(super) fn stop_seeking(&mut self) -> bool {
+    pub(crate) fn stop_seeking(&mut self) -> bool {
         let before = self.phase;
         self.phase = match before {
             FieldDetourPhase::SeeksAgain(back) => FieldDetourPhase::Flies(back),

@@ -32,6 +32,8 @@ struct Faller {
     sequence: u8,
     under_way: VecDeque<(Instant, Vec<u8>)>,
     asked: Option<DetourRequest>,
+    /// Whether the vehicle below has a planner.
+    answers: bool,
     rng: Pcg32,
 }
 
@@ -69,7 +71,7 @@ impl Faller {
         };
         let asked = self.asked.filter(|asked| asked.aside == request.aside).unwrap_or(request);
         self.asked = Some(asked);
-        if self.falls_mps <= 0.0 || (!asked.aside && self.real(0.0, 60.0) > 1.0) {
+        if !self.answers || self.falls_mps <= 0.0 || (!asked.aside && self.real(0.0, 60.0) > 1.0) {
             return;
         }
         let away = (asked.here - self.place).xy();
@@ -186,9 +188,9 @@ fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
     b
 }
 
-/// The least distance to what comes down, and whether the vehicle is down in the end; over an area its part is flown by then.
-fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
-    let mut faller = Faller {
+/// One that flies far away.
+fn faller(state: State, seed: u64) -> Faller {
+    Faller {
         id: 78,
         place: Point::new(8.0, 80.0, 12.0),
         flags: FLYING | ON_PLAN | if state == Replanning { WAITING } else { 0 },
@@ -198,8 +200,14 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
         sequence: 0,
         under_way: VecDeque::new(),
         asked: None,
+        answers: true,
         rng: Pcg32::new(seed, state as u64),
-    };
+    }
+}
+
+/// The least distance to what comes down, and whether the vehicle is down in the end; over an area its part is flown by then.
+fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
+    let mut faller = faller(state, seed);
     let mut b = holding(state, over_area, &mut faller);
     let wait_s = if state == Replanning { faller.real(0.0, 2.0) } else { faller.real(2.0, 6.0) };
     faller.until(&mut b, wait_s, |_| false);
@@ -249,4 +257,39 @@ fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
         let bad: Vec<_> = falls.iter().filter(|(_, (least_m, down))| *least_m < safety_m || !down).collect();
         assert!(bad.is_empty(), "{state:?}, {over_area}, {} of {FALLS}: {bad:?}", bad.len());
     }
+}
+
+/// Its planner does not answer before it is paused: what it sought is forgotten, and it flies its part all the same.
+#[test]
+fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
+    let mut sought = 0;
+    for seed in 0..FALLS {
+        for state in [Follow, Dividing] {
+            let mut faller = faller(state, seed);
+            let mut b = holding(state, true, &mut faller);
+            let (east_m, north_m) = (faller.real(-0.8, 0.8), faller.real(-0.8, 0.8));
+            faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
+            faller.until(&mut b, 1.0, |_| false);
+            (faller.falls_mps, faller.answers) = (1.0, false);
+            // Or it steps back along its path.
+            if !faller.until(&mut b, 20.0, |b| b.state() == Replanning) {
+                continue;
+            }
+            sought += 1;
+            let wait_s = faller.real(0.0, 4.5);
+            faller.until(&mut b, wait_s, |_| false);
+            pause(&mut b);
+            faller.until(&mut b, 30.0, |_| false);
+            (faller.answers, b.answer_detour, b.answer_division) = (true, Some(Ok(())), true);
+            if state == Follow {
+                b.neighbour = Some((Point::new(8.0, 20.0, 0.0), FLYING | ON_PLAN, 7.0, 5));
+            }
+            resume(&mut b);
+            faller.until(&mut b, 5.0, |_| false);
+            assert!(!b.companion.detours.field_detour.is_off_plan_path() || b.companion.detours.is_blocked());
+            faller.until(&mut b, OVER_S, |b| matches!(b.state(), Done | Aborted));
+            assert_eq!(b.state(), Done, "{seed} {state:?} {:?}", b.texts);
+        }
+    }
+    assert!(sought > FALLS / 8, "{sought}");
 }

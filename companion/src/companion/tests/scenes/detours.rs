@@ -1,6 +1,9 @@
 //! Another vehicle is not heard, lies below the path, or flies where this one is to fly.
 
 use planner_core::flight::Gate;
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
+use std::vec::Vec;
 
 use super::State::*;
 use super::*;
@@ -134,4 +137,31 @@ pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
         b.neighbour = flies(Point::new(7.0, 12.0, 1.5), ON_PLAN);
     };
     scenes.play(accompanied(Follow, 3.0), yields, Aborted, 100.0);
+}
+
+/// One that hovers beside a lane and sways lets nobody stop and go on again and again.
+#[test]
+fn who_sways_beside_the_path_over_a_field_blocks_it_once_or_not() {
+    let safety_m = config().safety_distance_m;
+    let mut rng = Pcg32::seed_from_u64(9);
+    let mut real = |low: f32, high: f32| low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0;
+    let flights: Vec<(usize, State)> = (0..40)
+        .map(|_| {
+            let mut b = losses::over_a_field(Follow);
+            let (beside_m, along_m) = (safety_m + real(0.1, 1.5), real(12.0, 15.5));
+            let (sway_m, turns) = (real(0.02, 0.24), real(0.3, 3.0));
+            for step in 0..6000 {
+                let sways_m = sway_m * libm::sinf(turns * 0.05 * step as f32);
+                b.neighbour = flies(Point::new(along_m, 12.0 + beside_m + sways_m, 1.5), OUT_OF_PLAN);
+                b.run(0.05);
+                if matches!(b.state(), Done | Aborted) {
+                    break;
+                }
+            }
+            let stops = b.texts.iter().filter(|text| text.starts_with("Path blocked: waiting"));
+            (stops.count() / 2, b.state())
+        })
+        .collect();
+    std::println!("{flights:?}");
+    assert!(flights.iter().all(|(stops, end)| *stops <= 1 && *end == Done), "{flights:?}");
 }
