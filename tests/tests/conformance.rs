@@ -86,14 +86,23 @@ fn mavsdk_uses_the_simulated_ardupilots_parameters_and_missions() {
     mavsdk("mavsdk_services.py", &["FS_GCS_TIMEOUT", "FS_GCS_ENABLE"], ARDUPILOT);
 }
 
-/// Plans the polygon of QGroundControl's sample survey for one vehicle, as `cover` does; `None` where the sample is not there.
-fn survey(personality: &str, out: &Path) -> Option<()> {
+/// Where vehicles of a survey stand, degrees.
+const PADS: [&str; 2] = ["47.3977,8.5463", "47.3981,8.5463"];
+
+/// Plans the polygon of QGroundControl's sample survey for some vehicles, as `cover` does; `None` where the sample is not there.
+fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Option<()> {
     let sample = shared_data("plans/qgroundcontrol_sample_with_survey.plan")?;
-    let scenario = format!(
-        "[area]\nfile = {sample:?}\nheight_m = 8.0\nlayer_m = 2.0\nlane_m = 25.0\nwaypoint_m = 20.0\ntrigger = \"waypoint\"\n\
-         [mission]\ncruise_mps = 10.0\n[[vehicles]]\nid = 1\nspeed_max_mps = 10.0\npersonality = \"{personality}\"\n\
-         start = {{ lat_deg = 47.3977, lon_deg = 8.5463, alt_m = 0.0 }}\n"
+    let mut scenario = format!(
+        "[area]\nfile = {sample:?}\nheight_m = 8.0\nlayer_m = 2.0\n{camera}\n[mission]\ncruise_mps = 10.0\n"
     );
+    for (k, pad) in PADS[..vehicles].iter().enumerate() {
+        let (latitude, longitude) = pad.split_once(',').expect("two numbers");
+        scenario += &format!(
+            "[[vehicles]]\nid = {}\nspeed_max_mps = 10.0\npersonality = \"{personality}\"\n\
+             start = {{ lat_deg = {latitude}, lon_deg = {longitude}, alt_m = 0.0 }}\n",
+            k + 1
+        );
+    }
     let file = out.join("survey.toml");
     std::fs::write(&file, scenario).expect("a scenario");
     let cover = Command::new(host_sim(Profile::Debug)).arg("cover").arg(file).arg("--out").arg(out).status();
@@ -102,27 +111,45 @@ fn survey(personality: &str, out: &Path) -> Option<()> {
 }
 
 /// MAVSDK and pymavlink read what `cover` wrote; MAVSDK has it flown, and pymavlink counts the pictures on a second link.
-fn plan_flies(personality: &str, options: &[&str]) {
-    let Some(python) = python() else { return };
-    let out = tempfile::tempdir().expect("a directory");
-    let Some(()) = survey(personality, out.path()) else { return };
+fn vehicle_flies(python: &str, out: &Path, vehicle: usize, personality: &str, trigger: &str) {
     let address = format!("127.0.0.1:{}", free_port());
-    let options = [options, &["--home", "47.3977,8.5463,488"]].concat();
+    let (id, home) = (vehicle.to_string(), format!("{},488", PADS[vehicle - 1]));
+    let mut options = vec!["--home", &home, "--sysid", &id];
+    if personality == "ardupilot" {
+        options.extend(ARDUPILOT);
+    }
     let (_autopilot, at) = autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
-    let file = |name: &str| out.path().join(name).display().to_string();
-    let (plan, waypoints, csv) = (file("vehicle-1.plan"), file("vehicle-1.waypoints"), file("waypoints.csv"));
     let urls = [format!("udpin://{address}"), format!("udpout:{}", at[1])];
-    run(&python, "plan_flight.py", &[&urls[0], &urls[1], &plan, &waypoints, &csv, personality]);
+    let folder = out.display().to_string();
+    run(python, "plan_flight.py", &[&urls[0], &urls[1], &folder, &id, personality, trigger]);
+}
+
+/// One vehicle with a picture at each waypoint; and, while it flies, both of a fleet that trigger by distance.
+fn plans_fly(personality: &str) {
+    let Some(python) = python() else { return };
+    let (alone, fleet) =
+        (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
+    let by_waypoint = "lane_m = 25.0\nwaypoint_m = 20.0\ntrigger = \"waypoint\"";
+    let Some(()) = survey(personality, 1, by_waypoint, alone.path()) else { return };
+    // By distance, where a survey says nothing.
+    let Some(()) = survey(personality, 2, "lane_m = 13.0\nwaypoint_m = 9.0", fleet.path()) else { return };
+    std::thread::scope(|scope| {
+        scope.spawn(|| vehicle_flies(&python, alone.path(), 1, personality, "waypoint"));
+        for vehicle in [1, 2] {
+            let (python, fleet) = (&python, fleet.path());
+            scope.spawn(move || vehicle_flies(python, fleet, vehicle, personality, "distance"));
+        }
+    });
 }
 
 #[test]
-fn mavsdk_has_the_simulated_px4_fly_a_survey_plan() {
-    plan_flies("px4", &[]);
+fn mavsdk_has_the_simulated_px4_fly_survey_plans() {
+    plans_fly("px4");
 }
 
 #[test]
-fn mavsdk_has_the_simulated_ardupilot_fly_a_survey_plan() {
-    plan_flies("ardupilot", ARDUPILOT);
+fn mavsdk_has_the_simulated_ardupilot_fly_survey_plans() {
+    plans_fly("ardupilot");
 }
 
 /// A companion of the lobby's first vehicle beside the autopilot that sends to this port, and the two files it may be given.

@@ -1,9 +1,12 @@
 //! The plans that `cover` writes, flown without a companion: uploaded to both simulated autopilots, in memory. Pictures are
 //! counted and placed by the truth.
 
+use std::f32::consts::FRAC_PI_2;
+
 use companion::link::frame::{self, Framer, Header};
 use companion::time::Instant;
 use host_sim::coverage::CoveragePlan;
+use host_sim::coverage::check::{self, Picture};
 use host_sim::coverage::export::{self, Item};
 use host_sim::coverage::flight::{Stop, StopAction};
 use host_sim::scenario;
@@ -18,6 +21,8 @@ const PASSED_UP_M: f32 = 1.1;
 const CRUISE_MPS: f32 = 5.0;
 /// PX4's camera looks every 50 ms.
 const LATE_M: f32 = 0.05 * CRUISE_MPS;
+/// Between two pictures by distance: the look is in the first step of 4 ms after that, and gusts and estimates are none here.
+const GAP_M: f32 = LATE_M + 0.05;
 
 fn scenario(personality: &str, trigger: &str) -> String {
     format!(
@@ -161,6 +166,25 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
     (off.xy().norm(), off.z.abs())
 }
 
+/// By distance: pictures of a lane are nowhere further apart than they are planned, but for the look that they wait for.
+fn judge_gaps(photos: &[Photo], wanted: &[&Stop], label: &str) {
+    for lane in wanted.chunk_by(|a, b| a.lane == b.lane) {
+        let [first, .., last] = lane else { continue };
+        let (from, way) = (first.position.xy(), (last.position - first.position).xy());
+        let step_m = (lane[1].position - first.position).xy().norm();
+        // Of neighbouring lanes none is so near.
+        let beside = |at: &Point| ((at.xy() - from).perp(&way) / way.norm()).abs() < PASSED_M;
+        let own = photos.iter().map(|photo| photo.position).filter(beside);
+        let mut along: Vec<f32> = own.map(|at| (at.xy() - from).dot(&way) / way.norm()).collect();
+        // Lanes that a zone divides lie in one line.
+        along.retain(|at| (-PASSED_M..way.norm() + PASSED_M).contains(at));
+        along.sort_by(f32::total_cmp);
+        assert!(along[0] < PASSED_M && along[along.len() - 1] > way.norm() - PASSED_M, "{label}: {along:?}");
+        let widest_m = along.windows(2).fold(0.0, |most: f32, pair| most.max(pair[1] - pair[0]));
+        assert!(widest_m < step_m + GAP_M, "{label}: {widest_m} m without a picture, {step_m} m planned");
+    }
+}
+
 /// Flies the plans of a scenario, and judges their pictures.
 fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
     let scenario = scenario::parse(text, "plans").expect("a scenario");
@@ -186,6 +210,7 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
                 // The last before the end of a lane may be behind it, or one more.
                 let counts = wanted.len() - lanes..=wanted.len() + lanes;
                 assert!(counts.contains(&photos.len()), "{label}, {lanes} lanes");
+                judge_gaps(&photos, &wanted, &label);
                 // Both ends of a lane as they are passed; between them each is late by the looks before it.
                 for (k, stop) in wanted.iter().enumerate() {
                     let before = wanted[..k].iter().rev().take_while(|s| s.lane == stop.lane).count();
@@ -247,6 +272,33 @@ fn plans_above_terrain_are_flown_as_planned() {
             let heights: Vec<f32> = heights.map(|stop| stop.position.z).collect();
             let rise_m = heights.iter().fold(0.0, |most: f32, z| most.max(z - heights[0]));
             assert!(rise_m > 5.0, "its lanes rise over the ridge: {rise_m}");
+        }
+    }
+}
+
+/// With the overlaps that a scenario has by default, autopilots alone leave nothing out: they pass the ends of lanes within 2 m,
+/// and ArduPilot turns while it flies on.
+#[test]
+fn plans_flown_without_a_companion_photograph_the_whole_area() {
+    for (name, personality) in ALL {
+        for trigger in ["waypoint", "distance"] {
+            let camera = "camera = { fov_deg = 73.7, aspect = 1.5 }";
+            let text = scenario(name, trigger).replace("lane_m = 9.0\nwaypoint_m = 8.0", camera);
+            assert!(text.contains(camera));
+            let scenario = scenario::parse(&text, "plans").expect("a scenario");
+            let planned = CoveragePlan::new(&scenario, Method::Binpat).expect("a plan");
+            let mut pictures = Vec::new();
+            for (sortie, stops, _) in &planned.flights() {
+                let items = export::flight_items(&planned, sortie, stops);
+                pictures.extend(fly(&planned, stops, &items, personality).iter().map(|photo| Picture {
+                    vehicle: None,
+                    t_s: photo.time_us as f32 * 1e-6,
+                    position: photo.position,
+                    heading: FRAC_PI_2 - photo.heading_rad,
+                }));
+            }
+            let found = check::check_pictures(&planned, pictures);
+            assert_eq!((found.covered_share, found.missing), (1.0, None), "{personality:?}, {trigger}");
         }
     }
 }
