@@ -144,7 +144,7 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
     );
     match &result.coverage {
         Some(coverage) => say!(
-            "area       {:.2} % photographed by {} pictures of {} waypoints ({} twice, {} left)",
+            "area       {:.2} % photographed by {} pictures of {} waypoints ({} flown twice, {} left)",
             100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
             coverage.photos,
             coverage.waypoints,

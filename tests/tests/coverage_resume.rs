@@ -144,7 +144,7 @@ fn around(seed: u64) -> (bool, Option<String>) {
     let (result, then) = fly(&text, dir.path(), &mut pictures).expect("it was flown before");
     let (coverage, second) = (result.coverage.expect("it has an area"), pictures.len() - first);
     // A new start of an area that counts as whole would fly all of it.
-    let wrong = coverage.covered_share < 1.0 || second < reported || 2 * second > first;
+    let wrong = coverage.covered_share < 1.0 || coverage.left > 0 || second < reported || 2 * second > first;
     let said = || {
         let after = format!("{left} left, then {} of {:.2} %", coverage.left, 100.0 * coverage.covered_share);
         format!(

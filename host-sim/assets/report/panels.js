@@ -42,11 +42,24 @@ function row(list, name, value, { unit = "", style = "", note = "" } = {}) {
 
 const SAFETY_ORDER = ["wall_contacts", "violations", "deadlocks", "min_separation_m", "min_clearance_m"];
 
+// What comes first of a coverage mission, and by which name.
+const COVERAGE_NAMES = { covered_share: "Area photographed", photos: "Pictures", waypoints: "Waypoints", left: "Waypoints without a picture", twice: "Waypoints flown twice", lanes: "Lanes", lane_m: "Between lanes", waypoint_m: "Between waypoints", angle_deg: "Lanes from east" };
+
+// Downwards, so that 100 % is all; and in colour what a flight left out.
+function coverageRow(list, key, value) {
+  const style = !flown || !["covered_share", "left"].includes(key) ? "" : value === (key === "left" ? 0 : 1) ? "ok" : "bad";
+  const share = key === "covered_share" && isNumber(value);
+  const unit = share ? "%" : key === "angle_deg" ? "°" : nameAndUnit(key)[1];
+  row(list, COVERAGE_NAMES[key], share ? Math.floor(value * 1e4) / 100 : value, { unit, style });
+}
+
 // The figures of one section of the result, the safety figures in order and with their limits.
 function rows(list, section, figures) {
   const keys = Object.keys(figures).filter((key) => key !== "safety_distance_m" || !("min_separation_m" in figures)).filter((key) => !Array.isArray(figures[key]));
   if (section === "safety") keys.sort((a, b) => SAFETY_ORDER.indexOf(a) - SAFETY_ORDER.indexOf(b));
-  for (const key of keys) {
+  const first = section === "coverage" ? Object.keys(COVERAGE_NAMES).filter((key) => key in figures) : [];
+  for (const key of first) coverageRow(list, key, figures[key]);
+  for (const key of keys.filter((key) => !first.includes(key))) {
     const [name, unit] = nameAndUnit(key);
     const style = section === "safety" && flown ? verdict(key, figures) : "";
     const note = key === "min_separation_m" && isNumber(figures.safety_distance_m) ? `(limit ${valueText(figures.safety_distance_m)} m)` : "";

@@ -6,14 +6,14 @@
 //! all its corners. Where overlaps are less than a cell, pictures must show its middle and each corner that is in the
 //! area.
 
-use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
 pub use super::flight::TimedFlight;
 use super::flight::{Stop, StopAction};
 use super::heights::{self, HeightFindings};
-use super::{CoveragePlan, Flight};
+pub use super::taken::Picture;
+use super::{CoveragePlan, Flight, taken};
 
 /// Most cells of the area that are checked; a larger area is checked in larger cells.
 const MAX_CHECKED_CELLS: f64 = 4e7;
@@ -52,19 +52,6 @@ impl Findings {
             && self.left + self.twice + self.broken + self.forbidden == 0
             && self.heights.as_ref().is_none_or(HeightFindings::is_clean)
     }
-}
-
-/// A picture: when, where, and how.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Picture {
-    /// Vehicle that took the picture, its MAVLink system id; none in an earlier flight.
-    pub vehicle: Option<u8>,
-    /// Seconds.
-    pub t_s: f32,
-    /// Position of the camera, which looks straight down.
-    pub position: Point,
-    /// Direction of the picture's upper edge, radians from east to the left.
-    pub heading: f32,
 }
 
 /// Checks what a plan flies.
@@ -114,18 +101,10 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
     flights.iter().flat_map(taken).collect()
 }
 
-/// Judges pictures that were taken in a flight, by where the camera truly was. A waypoint is left out if no picture was
-/// taken within half a spacing of it, and photographed twice if two were.
+/// Judges pictures that were taken in a flight, by where the camera truly was. Waypoints are judged as [`taken`] says.
 pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Findings {
-    let spacing = planned.wanted.spacing;
-    let near_m = spacing.waypoint_m.min(spacing.lane_m) / 2.0;
-    let mut findings = Findings { photos: pictures.len() as u64, ..Findings::default() };
-    for number in 0..planned.tracks.waypoint_count() {
-        let Some(place) = planned.tracks.waypoint(number) else { continue };
-        let taken = pictures.iter().filter(|p| (p.position.xy() - place).norm() <= near_m).count();
-        findings.left += u64::from(taken == 0);
-        findings.twice += u64::from(taken > 1);
-    }
+    let (left, twice) = taken::count_waypoints(planned, &pictures);
+    let mut findings = Findings { photos: pictures.len() as u64, left, twice, ..Findings::default() };
     CoverageCells::finest_needed(planned).judge_coverage(planned, pictures, &mut findings);
     findings
 }

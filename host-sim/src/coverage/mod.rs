@@ -15,6 +15,7 @@ mod planned;
 pub mod result;
 pub mod separation;
 pub mod sorties;
+pub mod taken;
 
 use std::time::Instant;
 

@@ -1,0 +1,206 @@
+//! Which waypoints of a plan have their picture after a flight, and which were flown more than once.
+//!
+//! Pictures are not taken where waypoints are. By distance each waits for the autopilot's next look, so that all further ones
+//! are later: on a long lane they lie anywhere between waypoints, and are none the worse for it. So waypoints are judged by the
+//! gaps between pictures. One has its picture
+//!
+//! - if one was taken no further from it along its lane than half a spacing, or than [`Tolerance::off_m`] where that is more;
+//! - or if the pictures before it and behind it on its lane are no further apart than the spacing and `off_m`: one of them as
+//!   far off as a picture may be.
+//!
+//! A picture is on a lane within half a lane spacing of it, or [`Tolerance::beside_m`] where that is more. One that is missing
+//! leaves a gap of two spacings: its waypoint is found while a spacing is more than `off_m`.
+//!
+//! A waypoint is flown twice if vehicles came to it twice: each picture belongs to the nearest waypoint, and pictures that
+//! a vehicle takes there one after the other belong to one pass. Metres, mission frame.
+
+use planner_core::Point;
+use planner_core::coverage::Flat;
+use planner_core::coverage::tracks::Lane;
+
+use super::CoveragePlan;
+use crate::margins;
+
+/// A picture: when, where, and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Vehicle that took the picture, its MAVLink system id; none in an earlier flight.
+    pub vehicle: Option<u8>,
+    /// Seconds.
+    pub t_s: f32,
+    /// Position of the camera, which looks straight down.
+    pub position: Point,
+    /// Direction of the picture's upper edge, radians from east to the left.
+    pub heading: f32,
+}
+
+/// How far pictures may be from their waypoints in a flight that is as good as the plan supposes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Beside the path: tracking, estimate and gusts.
+    pub beside_m: f32,
+    /// Flown at cruise speed from the place where a picture is due to where it is taken.
+    pub late_m: f32,
+}
+
+impl Tolerance {
+    /// That of a plan, from the margins of its scenario.
+    pub fn of_plan(planned: &CoveragePlan<'_>) -> Self {
+        let scenario = planned.scenario;
+        let distances = margins::required_distances(&scenario.simulation, 0.0, &scenario.vehicles);
+        Self { beside_m: distances.margin_m, late_m: margins::TRIGGER_DELAY_S * scenario.mission.cruise_mps }
+    }
+
+    /// From a waypoint to its picture along the lane: the most that [`margins::usable_footprint`] counts with.
+    pub fn off_m(&self) -> f32 {
+        self.beside_m + self.late_m
+    }
+}
+
+/// Counts of waypoints without a picture, and flown more than once.
+pub fn count_waypoints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
+    let tolerance = Tolerance::of_plan(planned);
+    let lanes = planned.tracks.lanes();
+    let left: u64 = lanes.iter().map(|lane| left_on_lane(planned, lane, pictures, &tolerance)).sum();
+    (left, flown_twice(lanes, planned.tracks.waypoint_count(), pictures))
+}
+
+/// Place along a lane from its first waypoint, and how far beside it.
+fn along_and_beside(lane: &Lane, place: &Flat) -> (f32, f32) {
+    let (way, from) = (lane.to - lane.from, place - lane.from);
+    let length_m = lane.length_m();
+    if length_m > 0.0 {
+        (from.dot(&way) / length_m, from.perp(&way).abs() / length_m)
+    } else {
+        (0.0, from.norm())
+    }
+}
+
+fn left_on_lane(planned: &CoveragePlan<'_>, lane: &Lane, pictures: &[Picture], tolerance: &Tolerance) -> u64 {
+    let spacing = planned.wanted.spacing;
+    let beside_m = tolerance.beside_m.max(spacing.lane_m / 2.0);
+    let near_m = tolerance.off_m().max(spacing.waypoint_m / 2.0);
+    let widest_m = spacing.waypoint_m + tolerance.off_m();
+    let places = pictures.iter().map(|picture| along_and_beside(lane, &picture.position.xy()));
+    let mut taken: Vec<f32> =
+        places.filter(|(_, off_m)| *off_m <= beside_m).map(|(along_m, _)| along_m).collect();
+    taken.sort_by(f32::total_cmp);
+    let has_picture = |k: &u32| {
+        let at_m = along_and_beside(lane, &lane.waypoint(*k)).0;
+        let next = taken.partition_point(|along_m| *along_m < at_m);
+        let before = next.checked_sub(1).map(|index| at_m - taken[index]);
+        let behind = taken.get(next).map(|along_m| along_m - at_m);
+        before.is_some_and(|m| m <= near_m)
+            || behind.is_some_and(|m| m <= near_m)
+            || before.zip(behind).is_some_and(|(before, behind)| before + behind <= widest_m)
+    };
+    (0..lane.count).filter(|k| !has_picture(k)).count() as u64
+}
+
+/// The waypoint that a picture is nearest to.
+fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
+    let nearest = |lane: &Lane| {
+        let share = along_and_beside(lane, place).0 / lane.length_m().max(f32::MIN_POSITIVE);
+        let last = lane.count.saturating_sub(1);
+        let k = (share * last as f32).round().clamp(0.0, last as f32) as u32;
+        (lane.first + k, (lane.waypoint(k) - place).norm())
+    };
+    lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
+}
+
+fn flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
+    let mut passes = vec![0_u32; waypoints as usize];
+    let mut vehicles: Vec<Option<u8>> = pictures.iter().map(|picture| picture.vehicle).collect();
+    vehicles.sort_unstable();
+    vehicles.dedup();
+    for vehicle in vehicles {
+        let own = pictures.iter().filter(|picture| picture.vehicle == vehicle);
+        let mut flown: Vec<u32> = own.filter_map(|p| nearest_waypoint(lanes, &p.position.xy())).collect();
+        // Of earlier flights it is not known which vehicle took which.
+        if vehicle.is_none() {
+            flown.sort_unstable();
+        }
+        flown.dedup();
+        flown.iter().for_each(|number| passes[*number as usize] += 1);
+    }
+    passes.iter().filter(|passes| **passes > 1).count() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario;
+    use crate::scenario::coverage::Method;
+
+    /// Pictures of a plan of three lanes and more, 5 m apart at 5 m/s, changed by `change`: index, distance along the path.
+    fn counted(change: impl Fn(&mut Vec<Picture>)) -> (u64, u64) {
+        let text = "[area]\npolygon = [[0, 0], [60, 0], [60, 30], [0, 30]]\nheight_m = 20.0\nlane_m = 10.0\n\
+                    waypoint_m = 5.0\ncamera = { fov_deg = 73.7, aspect = 1.5 }\n[mission]\ncruise_mps = 5.0\n\
+                    [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n";
+        let scenario = scenario::parse(text, "taken").unwrap();
+        let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
+        let waypoints =
+            (0..planned.tracks.waypoint_count()).filter_map(|number| planned.tracks.waypoint(number));
+        let picture = |place: Flat| Picture {
+            vehicle: Some(1),
+            t_s: 0.0,
+            position: Point::new(place.x, place.y, 20.0),
+            heading: 0.0,
+        };
+        let mut pictures: Vec<Picture> = waypoints.map(picture).collect();
+        change(&mut pictures);
+        count_waypoints(&planned, &pictures)
+    }
+
+    #[test]
+    fn pictures_where_waypoints_are_or_late_leave_none_out() {
+        assert_eq!(counted(|_| ()), (0, 0));
+        // Later and later, as by distance: up to a whole spacing.
+        let later = |pictures: &mut Vec<Picture>| {
+            let step = pictures[1].position - pictures[0].position;
+            assert!(((pictures[12].position - pictures[0].position) - step * 12.0).norm() < 0.01, "one lane");
+            for (k, picture) in pictures[1..12].iter_mut().enumerate() {
+                picture.position += step * ((k + 1) as f32 / 12.0);
+            }
+        };
+        assert_eq!(counted(later), (0, 0));
+    }
+
+    #[test]
+    fn a_picture_that_is_missing_leaves_its_waypoint_out() {
+        for index in [0, 1, 5, 12, 13] {
+            let without = |pictures: &mut Vec<Picture>| {
+                pictures.remove(index);
+            };
+            assert_eq!(counted(without), (1, 0), "{index}");
+        }
+        assert_eq!(counted(|pictures| drop(pictures.drain(3..6))), (3, 0));
+        assert_eq!(
+            counted(|pictures| pictures[4].position += Point::new(7.0, 7.0, 0.0)).0,
+            1,
+            "beside its lane"
+        );
+        assert!(counted(Vec::clear).0 > 30);
+    }
+
+    #[test]
+    fn who_comes_back_or_after_another_flies_twice_and_who_waits_does_not() {
+        let again = |from: usize, vehicle: Option<u8>| {
+            counted(move |pictures| {
+                let more = pictures[from..from + 3].iter().map(|picture| Picture { vehicle, ..*picture });
+                pictures.extend(more.collect::<Vec<_>>());
+            })
+        };
+        assert_eq!(again(4, Some(1)), (0, 3));
+        assert_eq!(again(4, Some(2)), (0, 3));
+        assert_eq!(again(4, None), (0, 3));
+        // Two pictures of one place, one after the other.
+        assert_eq!(counted(|pictures| pictures.insert(4, pictures[4])), (0, 0));
+        // Of earlier flights the order is lost.
+        let earlier = |pictures: &mut Vec<Picture>| {
+            pictures.iter_mut().for_each(|picture| picture.vehicle = None);
+            pictures.push(pictures[3]);
+        };
+        assert_eq!(counted(earlier), (0, 0));
+    }
+}
