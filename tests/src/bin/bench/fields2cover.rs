@@ -1,13 +1,16 @@
-//! Coverage beside Fields2Cover 2.1: its two test fields, and 12 and 13 with their obstacles.
+//! Coverage beside Fields2Cover 2.1: its test fields, 12 and 13, and fields with obstacles: those of its tests, and ours in its
+//! test fields.
 //!
 //! `--fields2cover DIR` is a checkout of Fields2Cover/Fields2Cover; `tests/peers/fields2cover.cpp` is built with it, once. The same
 //! fields in metres, lane angle (ours of least width) and lane width; no headland, straight connections, one vehicle, no
-//! transit. Ours is from the vertices to all lanes in order, around obstacles; theirs lanes and the best of its orders of
-//! lanes in one cell (boustrophedon, snake, spirals; each from four corners). Its route planner on OR-tools is not built.
+//! transit. Ours is from the vertices to all lanes in order, around obstacles; theirs is the best of what it offers
+//! ([`routes`]). Its route planner on OR-tools is not built.
 //! Lengths are of all lanes and the connections between them. Ours twice: lanes in the order in which they are first laid,
 //! which has limits, and `searched` as long as the desk does, which has none.
 //!
 //! Our lanes are longer by what photographs slanted borders whole; theirs end at the border.
+
+mod routes;
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -25,6 +28,7 @@ use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 
+use self::routes::{Best, Obstacles};
 use crate::row::Row;
 
 /// Runs of each field, of which the median counts.
@@ -33,7 +37,7 @@ const VERTICES: usize = 1024;
 /// At most 3 % longer than theirs.
 const LENGTH: f64 = 0.971;
 /// What is compiled of theirs: neither its route planner, which needs OR-tools, nor what draws.
-const SOURCES: [&str; 4] = ["types", "route_planning", "swath_generator", "objectives"];
+const SOURCES: [&str; 5] = ["types", "route_planning", "swath_generator", "objectives", "decomposition"];
 const LEFT_OUT: [&str; 3] = ["route_planner_base.cpp", "Path.cpp", "pp_obj"];
 /// Fields, lane widths in metres.
 const FIELDS: [(&str, f32, &str); 4] = [
@@ -43,10 +47,121 @@ const FIELDS: [(&str, f32, &str); 4] = [
     ("13.json", 1.0, "metres"),
 ];
 
+/// Outer ring and obstacles of a field of its tests: their corners, and by how much they are scaled.
+type Rings = (&'static [&'static [[f32; 2]]], f32);
+
+/// `route_planner_base_test.cpp` and `visualizer_test.cpp`.
+const TWO_SQUARES: Rings = (
+    &[
+        &[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]],
+        &[[0.4, 0.4], [0.4, 0.6], [0.6, 0.6], [0.6, 0.4]],
+        &[[1.2, 1.2], [1.2, 1.6], [1.6, 1.6], [1.6, 1.2]],
+    ],
+    30.0,
+);
+/// `n_swath_modified_test.cpp`, in metres as large as a field.
+const TWO_SLOTS: Rings = (
+    &[
+        &[[0.0, 0.0], [4.0, 0.0], [4.0, 5.0], [0.0, 4.0]],
+        &[[0.1, 0.1], [0.1, 3.0], [0.2, 3.6], [0.2, 0.1]],
+        &[[2.1, 0.1], [2.1, 3.0], [2.2, 3.6], [2.2, 0.1]],
+    ],
+    50.0,
+);
+/// `data/test_ring.json`, likewise.
+const RING: Rings = (
+    &[
+        &[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]],
+        &[[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]],
+    ],
+    20.0,
+);
+/// Name, lane width in metres, field.
+const WITH_OBSTACLES: [(&str, f32, Rings); 4] = [
+    ("two squares, its lanes of 5 m", 5.0, TWO_SQUARES),
+    ("two squares, its lanes of 3 m", 3.0, TWO_SQUARES),
+    ("two slots", 5.0, TWO_SLOTS),
+    ("ring", 5.0, RING),
+];
+/// Side of the squares that are put into fields without obstacles, of the square root of the field's area.
+const OBSTACLE_SHARE: f32 = 0.12;
+/// Places of an edge at which it is looked whether it is inside.
+const EDGE_STEPS: u8 = 50;
+
 /// One outer ring with its obstacles.
 struct Field {
     vertices: Vec<Flat>,
     rings: Vec<Ring>,
+}
+
+impl Field {
+    fn new((rings, scale): Rings) -> Self {
+        let mut field = Self { vertices: Vec::new(), rings: Vec::new() };
+        for ring in rings {
+            field.add_ring(ring.iter().map(|[x, y]| Flat::new(scale * x, scale * y)));
+        }
+        field
+    }
+
+    fn add_ring(&mut self, corners: impl Iterator<Item = Flat>) {
+        self.vertices.extend(corners);
+        let kind = if self.rings.is_empty() { RingKind::Outer } else { RingKind::NoFly };
+        self.rings.push(Ring { end: self.vertices.len() as u16, kind });
+    }
+
+    /// The same with up to three squares, in a row through its middle across its longer side, that lie inside.
+    fn with_squares(&self) -> Self {
+        let mut field = Self { vertices: self.vertices.clone(), rings: self.rings.clone() };
+        let outer = self.vertices.clone();
+        let (mut low, mut high) = (outer[0], outer[0]);
+        outer.iter().for_each(|at| (low, high) = (low.inf(at), high.sup(at)));
+        let side = OBSTACLE_SHARE * ((high.x - low.x) * (high.y - low.y)).sqrt();
+        for [east, north] in [[0.3, 0.35], [0.5, 0.5], [0.68, 0.6]] {
+            let middle = Flat::new(low.x + east * (high.x - low.x), low.y + north * (high.y - low.y));
+            // Its surroundings too: no corridor between it and the border.
+            let square = |half: f32| {
+                [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                    .map(|[x, y]| middle + Flat::new(half * x, half * y))
+            };
+            let corners = square(side);
+            let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+            let inside = |(a, b): (&Flat, &Flat)| {
+                (0..EDGE_STEPS).all(|k| ring_holds(&outer, &(a + (b - a) * (k as f32 / EDGE_STEPS as f32))))
+            };
+            if edges.into_iter().all(inside) {
+                field.add_ring(square(side / 2.0).into_iter());
+            }
+        }
+        field
+    }
+
+    /// Share of it that lanes of theirs sweep.
+    fn swept_share(&self, best: &Best, lane_m: f32) -> f64 {
+        let outer = &self.vertices[..usize::from(self.rings[0].end)];
+        let (mut low, mut high) = (outer[0], outer[0]);
+        outer.iter().for_each(|at| (low, high) = (low.inf(at), high.sup(at)));
+        let holds = |at: &[f64; 2]| {
+            let at = Flat::new(at[0] as f32, at[1] as f32);
+            ring_holds(outer, &at) && !self.obstacles().any(|ring| ring_holds(ring, &at))
+        };
+        best.swept_share(f64::from(lane_m), holds, [low, high].map(|at| [f64::from(at.x), f64::from(at.y)]))
+    }
+
+    /// Corners of the obstacles.
+    fn obstacles(&self) -> impl Iterator<Item = &[Flat]> {
+        self.rings.windows(2).map(|pair| &self.vertices[usize::from(pair[0].end)..usize::from(pair[1].end)])
+    }
+}
+
+/// Whether a ring holds a place, by no code of the planner.
+fn ring_holds(ring: &[Flat], at: &Flat) -> bool {
+    let mut inside = false;
+    for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+        if (a.y > at.y) != (b.y > at.y) && at.x < (b.x - a.x) * (at.y - a.y) / (b.y - a.y) + a.x {
+            inside = !inside;
+        }
+    }
+    inside
 }
 
 /// A way over a field.
@@ -69,40 +184,63 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let folder = tempfile::tempdir()?;
     let program = build(checkout, folder.path())?;
     let mut rows = Vec::new();
+    for (name, lane_m, rings) in WITH_OBSTACLES {
+        rows.extend(compare(&program, name, &Field::new(rings), lane_m)?);
+    }
     for (file, lane_m, coordinates) in FIELDS {
         let Some(path) = shared_data(&format!("coverage/{file}")) else { return Ok(rows) };
         for (k, field) in fields(&path, lane_m, coordinates)?.iter().enumerate() {
-            let (first, angle) = ours(field, lane_m, 0)?;
-            let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
-            let theirs = theirs(&program, field, angle, lane_m)?;
             let name = format!("{} {}", file.trim_end_matches(".json"), k + 1);
-            println!(
-                "{name}: ours {:.1} m ({:.1} m of lanes), {} crossings; theirs {:.1} m ({:.1} m), {} crossings",
-                first.total_m,
-                first.lanes_m,
-                first.crossings,
-                theirs.total_m,
-                theirs.lanes_m,
-                theirs.crossings
-            );
-            ensure!(first.crossings + searched.crossings == 0, "{name}: our way crosses an obstacle");
-            let n = field.vertices.len();
-            let row = |what, ours: f64, theirs: f64, required, unit| Row {
-                name: format!("{name}, {what}"),
-                ours,
-                theirs,
-                ratio: theirs / ours,
-                required,
-                unit,
-                n,
-            };
-            rows.push(row("length", first.total_m, theirs.total_m, LENGTH, "m"));
-            rows.push(row("time", first.time_us, theirs.time_us, 10.0, "us"));
-            rows.push(row("searched, length", searched.total_m, theirs.total_m, 0.0, "m"));
-            rows.push(row("searched, time", searched.time_us, theirs.time_us, 0.0, "us"));
+            rows.extend(compare(&program, &name, field, lane_m)?);
+            let with = field.with_squares();
+            if with.rings.len() > 1 {
+                let name = format!("{name} with {} squares", with.rings.len() - 1);
+                rows.extend(compare(&program, &name, &with, lane_m)?);
+            }
         }
     }
     Ok(rows)
+}
+
+/// The rows of a field.
+fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec<Row>> {
+    let (first, angle) = ours(field, lane_m, 0)?;
+    let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
+    println!(
+        "{name}: ours {:.1} m ({:.1} m of lanes), {} crossings",
+        first.total_m, first.lanes_m, first.crossings
+    );
+    ensure!(first.crossings + searched.crossings == 0, "{name}: our way crosses an obstacle");
+    let theirs = theirs(program, field, angle, lane_m)?;
+    for best in &theirs {
+        println!(
+            "  theirs by {}: {:.1} m ({:.1} m of lanes), {:.0} us, {} crossings if straight, {:.2} % swept",
+            best.name,
+            best.total_m,
+            best.lanes_m,
+            best.time_us,
+            best.crossings,
+            100.0 * field.swept_share(best, lane_m)
+        );
+    }
+    let shortest =
+        theirs.iter().min_by(|a, b| a.total_m.total_cmp(&b.total_m)).context("theirs has a way")?;
+    let (total_m, time_us) = (shortest.total_m, shortest.time_us);
+    let row = |what, ours: f64, theirs: f64, required, unit| Row {
+        name: format!("{name}, {what}"),
+        ours,
+        theirs,
+        ratio: theirs / ours,
+        required,
+        unit,
+        n: field.vertices.len(),
+    };
+    Ok(vec![
+        row("length", first.total_m, total_m, LENGTH, "m"),
+        row("time", first.time_us, time_us, 10.0, "us"),
+        row("searched, length", searched.total_m, total_m, 0.0, "m"),
+        row("searched, time", searched.time_us, time_us, 0.0, "us"),
+    ])
 }
 
 fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
@@ -121,9 +259,7 @@ fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
             fields.push(Field { vertices: Vec::new(), rings: Vec::new() });
         }
         let field = fields.last_mut().context("an obstacle before its field")?;
-        field.vertices.extend_from_slice(vertices);
-        let kind = if ring.kind == RingKind::Outer { RingKind::Outer } else { RingKind::NoFly };
-        field.rings.push(Ring { end: field.vertices.len() as u16, kind });
+        field.add_ring(vertices.iter().copied());
     }
     Ok(fields)
 }
@@ -164,26 +300,16 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     Ok((way, f64::from(found.lane_direction().y).atan2(f64::from(found.lane_direction().x))))
 }
 
-/// Whether a leg comes into an obstacle: looked at every centimetre, by no code of the planner.
+/// Whether a leg comes into an obstacle: looked at every centimetre.
 fn crosses(field: &Field, from: &Flat, to: &Flat) -> bool {
     let steps = ((to - from).norm() / 0.01).ceil().max(1.0) as usize;
-    let obstacles = field.rings.windows(2).map(|pair| usize::from(pair[0].end)..usize::from(pair[1].end));
-    obstacles.into_iter().any(|range| {
-        let ring = &field.vertices[range];
-        (0..=steps).any(|k| {
-            let at = from + (to - from) * (k as f32 / steps as f32);
-            let mut inside = false;
-            for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-                if (a.y > at.y) != (b.y > at.y) && at.x < (b.x - a.x) * (at.y - a.y) / (b.y - a.y) + a.x {
-                    inside = !inside;
-                }
-            }
-            inside
-        })
-    })
+    field
+        .obstacles()
+        .any(|ring| (0..=steps).any(|k| ring_holds(ring, &(from + (to - from) * (k as f32 / steps as f32)))))
 }
 
-fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Way> {
+/// Its best ways: in one cell, and by cells.
+fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Vec<Best>> {
     let mut input = format!("{angle} {lane_m}\n");
     let mut from = 0;
     for ring in &field.rings {
@@ -201,12 +327,11 @@ fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Way>
         .context("theirs does not start")?;
     child.stdin.take().context("its input is piped")?.write_all(input.as_bytes())?;
     let output = child.wait_with_output()?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let numbers: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
-    let &[lanes_m, total_m, time_us, crossings, ..] = numbers.as_slice() else {
-        anyhow::bail!("theirs printed {text:?}");
-    };
-    Ok(Way { lanes_m, total_m, time_us, crossings: crossings as usize })
+    let wide = |ring: &[Flat]| ring.iter().map(|at| [f64::from(at.x), f64::from(at.y)]).collect();
+    let obstacles = Obstacles::new(field.obstacles().map(wide));
+    let best = routes::best(&String::from_utf8_lossy(&output.stdout), &obstacles)?;
+    ensure!(best[0].is_some(), "theirs printed nothing");
+    Ok(best.into_iter().flatten().collect())
 }
 
 /// Builds our driver with their sources.

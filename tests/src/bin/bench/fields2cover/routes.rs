@@ -1,0 +1,234 @@
+//! The best of what Fields2Cover makes of a field: the ways that its driver prints, judged here.
+//!
+//! Without obstacles all of its orders of lanes in one cell are compared, connections straight. With obstacles such a
+//! connection may cross one. So each is led around instead, by the shortest way there is; and beside its orders in one cell
+//! stand those of its boustrophedon decomposition: the cells in their best order, each in its best direction (it has only a
+//! planner on OR-tools for that). Both are gifts: nothing that it offers without OR-tools is shorter and crosses nothing.
+
+use anyhow::{Context, Result};
+
+type Place = [f64; 2];
+
+/// Obstacles are this much smaller: ways run along their borders, where its lanes end.
+const SHRUNK: f64 = 0.999;
+/// So near to an obstacle a way only touches it, metres.
+const TOUCHES_M: f64 = 1e-6;
+/// Most cells whose orders are all compared.
+const MAX_CELLS: usize = 14;
+/// Cells across a lane in which it is looked what lanes sweep.
+const CELLS_ACROSS: f64 = 10.0;
+
+/// Its best way over a field.
+#[derive(Clone, Debug)]
+pub struct Best {
+    /// Lanes, metres.
+    pub lanes_m: f64,
+    /// Lanes and connections, metres.
+    pub total_m: f64,
+    /// Microseconds.
+    pub time_us: f64,
+    /// Connections that cross an obstacle, where it flies them straight.
+    pub crossings: usize,
+    /// How: an order, or `cells`.
+    pub name: String,
+    lanes: Vec<[Place; 2]>,
+}
+
+impl Best {
+    /// Share of a field that lies no further beside a lane than half its width.
+    pub fn swept_share(&self, lane_m: f64, holds: impl Fn(&Place) -> bool, [low, high]: [Place; 2]) -> f64 {
+        let cell_m = lane_m / CELLS_ACROSS;
+        let count = |axis: usize| ((high[axis] - low[axis]) / cell_m).ceil() as usize;
+        let (mut all, mut swept) = (0_u64, 0_u64);
+        for row in 0..count(1) {
+            for column in 0..count(0) {
+                let at = [(column, low[0]), (row, low[1])].map(|(k, from)| from + (k as f64 + 0.5) * cell_m);
+                if holds(&at) {
+                    all += 1;
+                    swept += u64::from(self.lanes.iter().any(|lane| is_swept(lane, lane_m, &at)));
+                }
+            }
+        }
+        swept as f64 / all.max(1) as f64
+    }
+}
+
+fn is_swept([from, to]: &[Place; 2], lane_m: f64, at: &Place) -> bool {
+    let ([x, y], [u, v]) = ([to[0] - from[0], to[1] - from[1]], [at[0] - from[0], at[1] - from[1]]);
+    let length_m = x.hypot(y);
+    let (along_m, beside_m) = ((x * u + y * v) / length_m, (x * v - y * u).abs() / length_m);
+    (0.0..=length_m).contains(&along_m) && beside_m <= lane_m / 2.0 + 1e-3
+}
+
+/// A way over a cell as it printed it: both ends of each lane.
+struct Candidate {
+    cell: usize,
+    time_us: f64,
+    name: String,
+    lanes: Vec<[Place; 2]>,
+}
+
+impl Candidate {
+    fn parse(line: &str) -> Option<Self> {
+        let mut words = line.split_whitespace();
+        let (cell, time_us) = (words.next()?.parse().ok()?, words.next()?.parse().ok()?);
+        let name = words.next()?.to_owned();
+        let numbers: Vec<f64> = words.map(|word| word.parse().ok()).collect::<Option<_>>()?;
+        let lanes = numbers.chunks_exact(4).map(|n| [[n[0], n[1]], [n[2], n[3]]]).collect();
+        Some(Self { cell, time_us, name, lanes })
+    }
+
+    /// Lanes; lanes and connections; connections that are not straight.
+    fn measure(&self, obstacles: &Obstacles) -> (f64, f64, usize) {
+        let lanes_m = self.lanes.iter().map(|[from, to]| apart_m(from, to)).sum::<f64>();
+        let mut found = (lanes_m, lanes_m, 0);
+        for pair in self.lanes.windows(2) {
+            found.1 += obstacles.way_m(&pair[0][1], &pair[1][0]);
+            found.2 += usize::from(!obstacles.is_free(&pair[0][1], &pair[1][0]));
+        }
+        found
+    }
+}
+
+fn apart_m(a: &Place, b: &Place) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Convex obstacles, a little shrunk.
+pub struct Obstacles(Vec<Vec<Place>>);
+
+impl Obstacles {
+    /// Obstacles of these corners.
+    pub fn new(rings: impl Iterator<Item = Vec<Place>>) -> Self {
+        let shrunk = |ring: Vec<Place>| {
+            let middle = [0, 1].map(|axis| ring.iter().map(|at| at[axis]).sum::<f64>() / ring.len() as f64);
+            let corner = |at: &Place| [0, 1].map(|axis| middle[axis] + SHRUNK * (at[axis] - middle[axis]));
+            ring.iter().map(corner).collect()
+        };
+        Self(rings.map(shrunk).collect())
+    }
+
+    /// Whether a straight way crosses none: where it meets a convex ring, the middle between both crossings is inside.
+    fn is_free(&self, from: &Place, to: &Place) -> bool {
+        self.0.iter().all(|ring| {
+            let (x, y) = (to[0] - from[0], to[1] - from[1]);
+            let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
+            let turn = ring_turn(ring);
+            for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+                // Inside is to the left of an edge of a ring that turns left. Metres; a way along an edge is outside.
+                let edge = [b[0] - a[0], b[1] - a[1]];
+                let length_m = turn * edge[0].hypot(edge[1]);
+                let side = (edge[0] * (from[1] - a[1]) - edge[1] * (from[0] - a[0])) / length_m - TOUCHES_M;
+                let change = (edge[0] * y - edge[1] * x) / length_m;
+                match change {
+                    change if change > 0.0 => enters = enters.max(-side / change),
+                    change if change < 0.0 => leaves = leaves.min(-side / change),
+                    _ if side < 0.0 => return true,
+                    _ => {}
+                }
+            }
+            enters >= leaves
+        })
+    }
+
+    /// The shortest way between two places: from corner to corner.
+    fn way_m(&self, from: &Place, to: &Place) -> f64 {
+        if self.is_free(from, to) {
+            return apart_m(from, to);
+        }
+        let nodes: Vec<&Place> = [from, to].into_iter().chain(self.0.iter().flatten()).collect();
+        let mut length_m = vec![f64::INFINITY; nodes.len()];
+        let mut done = vec![false; nodes.len()];
+        length_m[0] = 0.0;
+        while let Some(here) = (0..nodes.len())
+            .filter(|k| !done[*k] && length_m[*k].is_finite())
+            .min_by(|a, b| length_m[*a].total_cmp(&length_m[*b]))
+        {
+            done[here] = true;
+            for next in 0..nodes.len() {
+                if !done[next] && self.is_free(nodes[here], nodes[next]) {
+                    length_m[next] = length_m[next].min(length_m[here] + apart_m(nodes[here], nodes[next]));
+                }
+            }
+        }
+        length_m[1]
+    }
+}
+
+/// 1 for a ring that turns left, else −1.
+fn ring_turn(ring: &[Place]) -> f64 {
+    let doubled: f64 =
+        ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum();
+    doubled.signum()
+}
+
+/// The best of what was printed, by order in one cell and by cells.
+///
+/// # Errors
+/// What was printed is no list of ways.
+pub fn best(text: &str, obstacles: &Obstacles) -> Result<[Option<Best>; 2]> {
+    let candidates: Vec<Candidate> = text
+        .lines()
+        .map(|line| Candidate::parse(line).with_context(|| format!("theirs printed {line:?}")))
+        .collect::<Result<_>>()?;
+    let whole = candidates.iter().filter(|candidate| candidate.cell == 0).map(|candidate| {
+        let (lanes_m, total_m, crossings) = candidate.measure(obstacles);
+        Best {
+            lanes_m,
+            total_m,
+            time_us: candidate.time_us,
+            crossings,
+            name: candidate.name.clone(),
+            lanes: candidate.lanes.clone(),
+        }
+    });
+    let whole = whole.min_by(|a, b| a.total_m.total_cmp(&b.total_m));
+    Ok([whole, best_by_cells(&candidates, obstacles)])
+}
+
+/// All orders of the cells, by dynamic programming over those that are done and the way by which the last one was.
+fn best_by_cells(candidates: &[Candidate], obstacles: &Obstacles) -> Option<Best> {
+    let ways: Vec<&Candidate> = candidates.iter().filter(|c| c.cell > 0 && !c.lanes.is_empty()).collect();
+    let mut cells: Vec<usize> = ways.iter().map(|way| way.cell).collect();
+    cells.dedup();
+    if cells.is_empty() || cells.len() > MAX_CELLS {
+        return None;
+    }
+    let bit = |way: &Candidate| 1_usize << cells.iter().position(|cell| *cell == way.cell).unwrap_or(0);
+    let measured: Vec<(f64, f64, usize)> = ways.iter().map(|way| way.measure(obstacles)).collect();
+    let between = |a: &Candidate, b: &Candidate| {
+        let (from, to) = (a.lanes[a.lanes.len() - 1][1], b.lanes[0][0]);
+        (obstacles.way_m(&from, &to), usize::from(!obstacles.is_free(&from, &to)))
+    };
+    let links: Vec<Vec<(f64, usize)>> =
+        ways.iter().map(|a| ways.iter().map(|b| between(a, b)).collect()).collect();
+    let none = (f64::INFINITY, 0.0, 0);
+    let mut found = vec![vec![none; ways.len()]; 1 << cells.len()];
+    for (k, way) in ways.iter().enumerate() {
+        let (lanes_m, total_m, crossings) = measured[k];
+        found[bit(way)][k] = (total_m, lanes_m, crossings);
+    }
+    for done in 1..found.len() {
+        for last in 0..ways.len() {
+            let (total_m, lanes_m, crossings) = found[done][last];
+            for (next, way) in ways.iter().enumerate() {
+                if done & bit(way) != 0 {
+                    continue;
+                }
+                let (own_m, own_total_m, own_crossings) = measured[next];
+                let (link_m, crosses) = links[last][next];
+                let whole_m = total_m + link_m + own_total_m;
+                let slot = &mut found[done | bit(way)][next];
+                if whole_m < slot.0 {
+                    *slot = (whole_m, lanes_m + own_m, crossings + crosses + own_crossings);
+                }
+            }
+        }
+    }
+    let (total_m, lanes_m, crossings) = found.last()?.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let name = format!("{} cells", cells.len());
+    // The lanes of a cell are the same in each direction and order.
+    let first = cells.iter().filter_map(|cell| ways.iter().find(|way| way.cell == *cell));
+    let lanes = first.flat_map(|way| way.lanes.iter().copied()).collect();
+    Some(Best { lanes_m, total_m, time_us: ways[0].time_us, crossings, name, lanes })
+}
