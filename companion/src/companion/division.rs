@@ -1,7 +1,7 @@
 //! A coverage mission whose vehicles are lost: what this one says of itself, where it holds, and what it asks the shell for.
 
-use planner_core::Length;
 use planner_core::flight::{Task, VehiclePlan};
+use planner_core::{Length, Point};
 
 use super::Companion;
 use crate::config::PlanFailure;
@@ -100,7 +100,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             division: self.mission.division_count(),
             progress_dm: if flies { (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16 } else { 0 },
             commitment_dm: if on_pad { Some(0) } else { self.commitment_dm().filter(|_| flies) },
-            holds: on_pad || state == Dividing,
+            // Beside its path it waits for its own plan, to fly on to where it promised to hold.
+            holds: on_pad || (state == Dividing && !beside),
             wants_division: flies && self.wants_division(),
         }
     }
@@ -212,7 +213,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return;
         };
         let back = plan.path.point_at(back_m);
-        let meets = back.is_some_and(|back| (position - back).length() < AT_HOLD_M);
+        let here = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
+        let near = |place: Point| (position - place).length() < AT_HOLD_M;
+        let meets = back.is_some_and(near) && here.is_some_and(near);
         if meets {
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
             if left > 0 {

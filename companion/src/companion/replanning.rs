@@ -119,7 +119,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        let (aside, rejoin) = (self.detours.is_detour_aside(), self.detours.field_detour.rejoin());
+        let (aside, rejoin) = (self.detours.seeks_aside(), self.detours.field_detour.rejoin());
         let ends = detour.path.waypoints().last().map(|last| last.position);
         // An answer may be late, and be for another request.
         let leads_back = aside
@@ -133,8 +133,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.handle_detour_failure(PlanFailure::Invalid);
             return;
         }
-        // From aside it comes back to where it holds.
-        if let Some(promised_m) = promised_m.filter(|_| self.is_holding_for_division()) {
+        // From aside it comes back no further than there.
+        let before = |at_m: &f32| rejoin.is_some_and(|back| back.along_m > *at_m);
+        if let Some(promised_m) = promised_m.filter(|at_m| before(at_m) || self.is_holding_for_division()) {
             let promised = self.place_on_path(promised_m);
             self.detours.field_detour.abort();
             self.detours.field_detour.start_seeking(promised);

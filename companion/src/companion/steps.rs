@@ -128,10 +128,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let now = self.now;
         let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, now);
         self.requests.state_changed(from, to);
+        self.run_action(from, to, row);
+        // Whatever interrupts a search ends it.
         if from == State::Replanning {
             self.detours.field_detour.stop_seeking();
         }
-        self.run_action(from, to, row);
         if !row.text.is_empty() {
             self.links.send_text(row.warning, row.text);
         }

@@ -30,6 +30,7 @@ impl Guidance {
     pub(crate) fn unfollowed_for(&self, now: Instant) -> Duration {
         now - self.followed_at
     }
+
     /// Distance of the vehicle from its setpoint, metres.
     pub(crate) fn lead_m(&self, telemetry: &Telemetry) -> f32 {
         (telemetry.position - self.smoother.position()).length()

@@ -193,6 +193,11 @@ impl Detours {
         self.on_detour
     }
 
+    /// Whether the detour that it flies, or the one requested, leads aside only.
+    pub(crate) fn seeks_aside(&self) -> bool {
+        self.detour_aside
+    }
+
     /// Whether that path does not lead to where it lands: aside only, or back to its own.
     pub(crate) fn is_detour_aside(&self) -> bool {
         self.detour_aside || self.field_detour.is_flying()
@@ -435,7 +440,8 @@ impl Detours {
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
         // One that hovers sways: what blocked the path over a field blocks it until it is as far away as a detour keeps.
-        let waits = view.config.division.is_some() && view.mission.state() == State::Blocked;
+        let waits =
+            view.config.division.is_some() && view.mission.state() == State::Blocked && self.obstructed;
         let beside_m = if waits { DETOUR_MARGIN_M } else { BLOCKED_WITHIN_M };
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);

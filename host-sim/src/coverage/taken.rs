@@ -9,7 +9,8 @@
 //!   far off as a picture may be.
 //!
 //! A picture is on a lane within half a lane spacing of it, or [`Tolerance::beside_m`] where that is more. One that is missing
-//! leaves a gap of two spacings: its waypoint is found while a spacing is more than `off_m`.
+//! leaves a gap of two spacings: its waypoint is found while a spacing is more than `off_m`. On a short lane whose waypoints are
+//! nearer than the spacing it may not be found; the cells judge whether the area is photographed.
 //!
 //! A waypoint is flown twice if vehicles came to it twice: each picture belongs to the nearest waypoint, and pictures that
 //! a vehicle takes there one after the other belong to one pass. Metres, mission frame.

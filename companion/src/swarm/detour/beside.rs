@@ -72,8 +72,8 @@ pub(crate) struct FieldDetour {
 }
 
 impl FieldDetour {
-    /// Starts to seek a path back to the plan, or aside first: to the place that the vehicle was flying to if it was stopped on such a path, else to
-    /// `rejoin`. False where there is no such place.
+    /// Starts to seek a path back to the plan, or aside first: to the place that the vehicle was flying to if it was stopped
+    /// on such a path, else to `rejoin`. False where there is no such place.
     pub(crate) fn start_seeking(&mut self, rejoin: Option<RejoinPlace>) -> bool {
         self.phase = match self.phase {
             FieldDetourPhase::Flies(back) | FieldDetourPhase::SeeksAgain(back) => {
