@@ -1,5 +1,7 @@
 //! What passes between the companion and its shell beside bytes.
 
+use core::sync::atomic::{AtomicU8, Ordering};
+
 use crate::mission::State;
 
 /// One of the two ports.
@@ -20,6 +22,40 @@ pub enum PlanKind {
     Detour,
     /// The mission's plan after losses: [`crate::Companion::losses`] says which.
     Division,
+}
+
+impl PlanKind {
+    /// A vehicle that asks for a detour may be below one that comes down; one without a mission is on its pad.
+    const BY_URGENCY: [Self; 3] = [Self::Detour, Self::Division, Self::Mission];
+
+    const fn bit(self) -> u8 {
+        1 << self as u8
+    }
+}
+
+/// Plans that the shell has not begun: at most one of each kind, since it reads what to plan when it begins.
+#[derive(Debug, Default)]
+pub struct PlanRequests {
+    waiting: AtomicU8,
+}
+
+impl PlanRequests {
+    /// Without a request.
+    pub const fn new() -> Self {
+        Self { waiting: AtomicU8::new(0) }
+    }
+
+    /// Notes that a plan is wanted.
+    pub fn add(&self, wanted: PlanKind) {
+        self.waiting.fetch_or(wanted.bit(), Ordering::Relaxed);
+    }
+
+    /// The most urgent plan, which is wanted no longer.
+    pub fn take(&self) -> Option<PlanKind> {
+        PlanKind::BY_URGENCY
+            .into_iter()
+            .find(|kind| self.waiting.fetch_and(!kind.bit(), Ordering::Relaxed) & kind.bit() != 0)
+    }
 }
 
 /// An event for the shell.
@@ -50,4 +86,20 @@ pub enum Event {
         /// The command's MAVLink system id.
         id: u8,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_request_of_a_plan_replaces_one_of_another_kind() {
+        for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2], [1, 2, 0]] {
+            let requests = PlanRequests::new();
+            order.into_iter().chain([1, 1]).for_each(|at: usize| requests.add(PlanKind::BY_URGENCY[at]));
+            let [detour, division, mission] = PlanKind::BY_URGENCY.map(Some);
+            let taken = [(); 4].map(|()| requests.take());
+            assert_eq!(taken, [detour, division, mission, None], "{order:?}");
+        }
+    }
 }

@@ -62,7 +62,7 @@ mod timers;
 
 pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
-pub use events::{Event, Link, PlanKind};
+pub use events::{Event, Link, PlanKind, PlanRequests};
 pub use mission::State;
 pub use mission::photographed::MAX_DONE_RANGES;
 pub use time::{Duration, Instant};

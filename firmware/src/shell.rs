@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use companion::storage::store::{FlashRequest, MAX_READ};
-use companion::{Event, Link, PlanFailure, PlanKind, State};
+use companion::{Event, Link, PlanFailure, PlanRequests, State};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -48,8 +48,8 @@ pub struct Shell {
     send_due: [TaskSignal<()>; 2],
     /// The companion's next step may be due earlier than thought.
     timer_changed: TaskSignal<()>,
-    /// The companion asks for a plan.
-    wants_plan: TaskSignal<PlanKind>,
+    /// The plans that the companion asks for.
+    plan_requests: PlanRequests,
     /// Signals that long work may be waiting.
     work_due: TaskSignal<()>,
     /// When a restart was asked for, milliseconds; 0 if none was.
@@ -158,7 +158,7 @@ impl Shell {
             companion: Mutex::new(RefCell::new(None)),
             send_due: [Signal::new(), Signal::new()],
             timer_changed: Signal::new(),
-            wants_plan: Signal::new(),
+            plan_requests: PlanRequests::new(),
             work_due: Signal::new(),
             restart_ms: AtomicU32::new(0),
             flash_busy: AtomicBool::new(false),
@@ -193,7 +193,7 @@ impl Shell {
             let result = work(companion, now());
             while let Some(event) = companion.poll_event() {
                 match event {
-                    Event::PlanRequested(wanted) => self.wants_plan.signal(wanted),
+                    Event::PlanRequested(wanted) => self.plan_requests.add(wanted),
                     Event::RestartRequested => self.request_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
                         if let Some(reported) = self.setpoints.take_setpoint_stats(now_ms()) {
@@ -312,10 +312,11 @@ impl Shell {
         flash: &mut impl Flash,
     ) -> ! {
         loop {
-            if let Some(wanted) = self.wants_plan.try_take() {
+            if let Some(wanted) = self.plan_requests.take() {
                 let detour = self.lock_companion(|companion| planner.read_inputs(wanted, companion));
                 let answer: Result<_, PlanFailure> = planner.answer(wanted, detour.as_ref());
                 self.with_companion(|companion, now| companion.handle_plan(now, wanted, answer));
+                continue;
             }
             if !self.serve_flash(flash).await {
                 self.work_due.wait().await;

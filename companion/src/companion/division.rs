@@ -8,7 +8,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
 use crate::mission::State;
-use crate::swarm::detour::beside::RejoinPlace;
+use crate::swarm::detour::flown::RejoinPlace;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, OwnReport};
 use crate::time::Duration;
 
@@ -47,7 +47,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let own = self.own_fleet_report();
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
-        let (home_m, around) = (self.last_descent_start_m(), self.detours.field_detour.is_flying());
+        let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
         // A vehicle that has left the mission is on its way to the ground.
         let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing(now, MISSED_AFTER));
         let halt_m = match self.division_hold_m() {
@@ -73,10 +73,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let off_plan = self.guidance.returning
             || self.guidance.ends_aside
             || self.detours.is_on_detour()
-            || self.detours.home.is_on()
+            || self.detours.is_homeward()
             || self.detours.has_left_plan();
         // Around something, and back: its part stays its own.
-        let beside = self.detours.field_detour.is_flying();
+        let beside = self.detours.is_beside_plan();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
             PilotControl | PilotReturned => self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER,
@@ -133,9 +133,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether it flies home, back, or aside, to land there.
     fn is_landing_off_plan(&self) -> bool {
-        let home = self.guidance.returning || self.detours.home.is_on();
-        home || (self.guidance.ends_aside && !self.detours.field_detour.is_flying())
+        let home = self.guidance.returning || self.detours.is_homeward();
+        home || (self.guidance.ends_aside && !self.detours.is_beside_plan())
             || self.detours.lands_at_end()
+            || self.detours.seeks_landing()
     }
 
     /// Whether others have divided its part, or count it as lost, while it would fly it.
@@ -176,7 +177,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// division is under way, and until the new path of this vehicle has come.
     pub(super) fn division_hold_m(&self) -> Option<f32> {
         // The fleet does not know yet what this vehicle was commanded since the last step. A promise is a place of its own path.
-        let elsewhere = self.is_landing_off_plan() || self.detours.field_detour.is_flying();
+        let elsewhere = self.is_landing_off_plan() || self.detours.is_beside_plan();
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
         let behind = fleet.division_count() > self.mission.division_count();
         let held_dm = behind.then(|| fleet.held_at_dm());
@@ -209,7 +210,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Continues along its own path beyond the obstacle.
     fn resume_own_plan(&mut self, plan: &VehiclePlan<W, G>) {
-        let Some(RejoinPlace { along_m: back_m, position }) = self.detours.field_detour.rejoin() else {
+        let Some(RejoinPlace { along_m: back_m, position }) = self.detours.rejoin() else {
             return;
         };
         let back = plan.path.point_at(back_m);
@@ -245,7 +246,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 fleet.take_plan_crc(UNDIVIDED);
                 self.links.send_text(true, "What is left cannot be divided");
             }
-            Err(_) if may_take && self.detours.field_detour.is_flying() => {
+            Err(_) if may_take && self.detours.is_beside_plan() => {
                 self.detours.end_field_detour(false);
             }
             Err(_) if may_take && division > self.mission.division_count() => {
@@ -254,17 +255,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Err(_) => {}
             Ok(plan) if fleet.needs_division() => fleet.take_plan_crc(plan.plan_crc),
             Ok(plan)
-                if may_take
-                    && division == self.mission.division_count()
-                    && self.detours.field_detour.is_flying() =>
+                if may_take && division == self.mission.division_count() && self.detours.is_beside_plan() =>
             {
                 self.resume_own_plan(plan);
             }
             Ok(plan) if may_take && division > self.mission.division_count() => {
                 let in_air = self.mission.state() == State::Dividing;
                 let own = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-                let beside = self.detours.field_detour;
-                let here = beside.rejoin().filter(|_| beside.is_flying()).map(|back| back.position).or(own);
+                let here = self.detours.rejoin().map(|back| back.position).or(own);
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
                 if self.mission.accept_division(plan, &place, division, in_air) {
                     self.neighbours.forget_plan();
@@ -274,7 +272,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                         true => self.guidance.begin_path(self.now),
                         false => self.guidance.reset(),
                     }
-                } else if self.detours.field_detour.is_flying() {
+                } else if self.detours.is_beside_plan() {
                     self.detours.end_field_detour(false);
                 } else {
                     self.links.send_text(true, "The division begins elsewhere");

@@ -88,7 +88,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
                 fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER)
             } else {
-                match self.guidance.returning || self.detours.lands_at_end() || self.is_flying_unheard() {
+                match self.guidance.returning
+                    || self.detours.lands_at_end()
+                    || self.detours.seeks_landing()
+                    || self.is_flying_unheard()
+                {
                     true => Duration::default(),
                     false => self.neighbours.silence_duration(now, self.mission.entered_at()),
                 }
@@ -101,7 +105,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.is_holding_for_division(),
             division_ready: self.mission.has_division(),
-            undivided: self.is_undivided() && !self.detours.field_detour.is_off_plan_path(),
+            undivided: self.is_undivided() && !self.detours.is_own_plan_outstanding(),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.plan_failure().is_some(),
             roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::NoRoadmap),
@@ -118,19 +122,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             land: self.mission.pending().land,
             turn_back: self.mission.pending().turn_back
                 && !self.guidance.returning
-                && !self.detours.home.is_on(),
+                && !self.detours.is_homeward(),
             area: self.config.division.is_some(),
             over_field,
             may_fly_beside: standing
-                && (self.is_undivided() || self.detours.field_detour.is_flying())
+                && (self.is_undivided() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_field(&view),
-            around_flown: follow
-                && self.detours.field_detour.leads_back()
-                && self.guidance.is_at_end(scene)
-                && standing,
-            own_plan_ready: self.detours.field_detour.is_back(),
-            own_plan_lost: self.detours.field_detour.is_lost(),
-            homeward: self.detours.home.is_on(),
+            around_flown: follow && self.detours.leads_back() && self.guidance.is_at_end(scene) && standing,
+            own_plan_ready: self.detours.is_own_plan_ready(),
+            own_plan_lost: self.detours.is_own_plan_lost(),
+            homeward: self.detours.is_homeward(),
             seeking_home_for: sought_home,
             stands_to_return: standing && self.detours.home.may_request(now),
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
@@ -162,7 +163,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // The ground may be higher than where its pad is said to be.
             path_done: follow
                 && (self.guidance.is_path_done(scene, now) || (self.guidance.is_descending() && on_ground)),
-            at_goal: self.guidance.is_at_goal(scene) && !self.detours.home.is_on(),
+            at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
                 // These interrupted states do not depend on a place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
@@ -181,15 +182,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.guidance.returning
                 && (self.config.division.is_none() || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
-            pad_blocked_for: match follow && (self.guidance.returning || self.detours.home.is_on()) {
+            pad_blocked_for: match follow && (self.guidance.returning || self.detours.is_homeward()) {
                 true if self.guidance.is_descending() => self.guidance.filter.hindered_for(now),
                 true => self.guidance.filter.blocked_for_good_for(now),
                 false => Duration::default(),
             },
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
-            lands_aside: self.detours.lands_at_end(),
+            seeks_landing: self.detours.seeks_landing(),
+            lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
             aside_reached: follow
-                && self.detours.is_on_detour()
                 && self.detours.lands_at_end()
                 && self.guidance.is_at_end(scene)
                 && standing,

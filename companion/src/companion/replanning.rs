@@ -1,16 +1,16 @@
 //! Ways around: what is requested of the shell, and what becomes of its answer.
 
-use planner_core::Length;
 use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::flight::VehiclePlan;
+use planner_core::{Length, Point};
 
 use super::Companion;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::guidance::GuidanceInputs;
 use crate::mission::State;
-use crate::swarm::detour::asking::{DetourPurpose, RetryOutlook};
-use crate::swarm::detour::beside::RejoinPlace;
+use crate::swarm::detour::asking::RetryOutlook;
+use crate::swarm::detour::flown::{DetourPurpose, RejoinPlace, RejoinPlaces};
 use crate::swarm::view::DetourView;
 
 /// A detour ends at most this far from the place where the vehicle is to come back to its path, metres.
@@ -65,23 +65,23 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.guidance.returning {
             return self.request_detour(DetourPurpose::Landing);
         }
-        let rejoin = self.rejoin_after_aside(from);
-        self.detours.field_detour.start_seeking(rejoin);
-        self.request_detour(DetourPurpose::Aside);
+        self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
     }
 
-    /// Where it comes back to its path over a field: where it holds for a division, or where it stands if it promised to hold
-    /// further on; else beyond what blocks the path, if there is such a place.
-    fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlace> {
+    /// Where it comes back to its path over a field: where it left that before, or holds for a division, or stands; and beyond
+    /// what blocks the path, if there is such a place and it did not promise to hold before.
+    fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlaces> {
         if !self.detours.keeps_to_plan_over_field(&self.detour_view()) {
             return None;
         }
-        let holds = from == State::Dividing || self.is_holding_for_division();
-        match self.division_hold_m() {
-            Some(at_m) if holds => self.place_on_path(at_m),
-            Some(_) => self.place_on_path(self.guidance.along_m()),
-            None => self.place_beyond_block().or_else(|| self.place_on_path(self.guidance.along_m())),
+        if let Some(places) = self.detours.rejoin_places() {
+            return Some(places);
         }
+        let holds = from == State::Dividing || self.is_holding_for_division();
+        let promised_m = self.division_hold_m();
+        let own = self.place_on_path(promised_m.filter(|_| holds).unwrap_or(self.guidance.along_m()))?;
+        let beyond = if promised_m.is_none() { self.place_beyond_block() } else { None };
+        Some(RejoinPlaces { own, beyond: beyond.unwrap_or(own) })
     }
 
     /// The first place of its path over a field beyond what blocks that.
@@ -99,12 +99,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Requests a detour around the obstacle on its path over a field, and back to the path.
     pub(super) fn request_detour_back_to_path(&mut self) {
-        let rejoin = self.place_beyond_block();
-        if self.detours.field_detour.start_seeking(rejoin) {
-            self.request_detour(DetourPurpose::Beyond);
-        } else {
-            self.detours.field_detour.note_failure(self.now);
-            self.mission.set_failure(PlanFailure::Unreachable);
+        let rejoin = match self.detours.is_beside_plan() {
+            true => self.detours.rejoin_from_aside(&self.detour_view()),
+            false => self.place_beyond_block(),
+        };
+        match rejoin {
+            Some(back) => self.request_detour(DetourPurpose::Back(back)),
+            None => {
+                self.detours.note_no_rejoin_place(self.now);
+                self.mission.set_failure(PlanFailure::Unreachable);
+            }
         }
     }
 
@@ -119,32 +123,41 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        let (aside, rejoin) = (self.detours.seeks_aside(), self.detours.field_detour.rejoin());
-        let ends = detour.path.waypoints().last().map(|last| last.position);
-        // An answer may be late, and be for another request.
-        let leads_back = aside
-            || rejoin.is_none_or(|back| {
-                ends.is_some_and(|end| (end - back.position).length() < MAX_REJOIN_ERROR_M)
-            });
         let begins = here.is_some_and(|here| self.mission.starts_at(detour, &here));
-        // A promise made meanwhile is along the vehicle's own path.
-        let promised_m = self.division_hold_m().filter(|_| rejoin.is_some());
-        if !begins || !leads_back || (promised_m.is_some() && !aside) {
+        let purpose = self.detours.sought().filter(|_| begins);
+        let ends = detour.path.waypoints().last().map(|last| last.position);
+        let Some(purpose) = purpose.and_then(|purpose| self.checked_purpose(purpose, ends)) else {
             self.handle_detour_failure(PlanFailure::Invalid);
             return;
-        }
-        // From aside it comes back no further than there.
-        let before = |at_m: &f32| rejoin.is_some_and(|back| back.along_m > *at_m);
-        if let Some(promised_m) = promised_m.filter(|at_m| before(at_m) || self.is_holding_for_division()) {
-            let promised = self.place_on_path(promised_m);
-            self.detours.field_detour.abort();
-            self.detours.field_detour.start_seeking(promised);
-        }
+        };
         let progress_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));
         self.mission.switch_to_detour(detour, progress_m, ground_m);
-        self.detours.begin_detour(progress_m, self.now, self.guidance.last_progress_at());
+        self.detours.begin_detour(purpose, progress_m, self.now, self.guidance.last_progress_at());
         self.neighbours.mark_avoided(self.now);
+    }
+
+    /// The purpose of a detour that has come and ends at `ends`; `None` if it may not be flown by now.
+    fn checked_purpose(&self, purpose: DetourPurpose, ends: Option<Point>) -> Option<DetourPurpose> {
+        // A promise made meanwhile is along the vehicle's own path.
+        let promised_m = self.division_hold_m();
+        match purpose {
+            DetourPurpose::Back(back) => {
+                // An answer may be late, and be for another request.
+                let leads_back = (ends? - back.position).length() < MAX_REJOIN_ERROR_M;
+                (leads_back && promised_m.is_none()).then_some(purpose)
+            }
+            // From aside it comes back no further than there.
+            DetourPurpose::Aside(Some(places)) => {
+                let allowed = |place: &RejoinPlace| promised_m.is_none_or(|at_m| place.along_m <= at_m);
+                let holds_at_m =
+                    promised_m.filter(|_| !allowed(&places.own) || self.is_holding_for_division());
+                let own = holds_at_m.and_then(|at_m| self.place_on_path(at_m)).unwrap_or(places.own);
+                let beyond = if allowed(&places.beyond) { places.beyond } else { own };
+                Some(DetourPurpose::Aside(Some(RejoinPlaces { own, beyond })))
+            }
+            _ => Some(purpose),
+        }
     }
 
     /// The requested detour does not exist.

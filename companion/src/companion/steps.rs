@@ -10,7 +10,7 @@ use crate::margins;
 use crate::mission::task::{PathProgress, PathRelation};
 use crate::mission::{self, Action, State, TransitionRow};
 use crate::storage::store::ErasePermission;
-use crate::swarm::detour::asking::DetourPurpose;
+use crate::swarm::detour::flown::DetourPurpose;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -61,9 +61,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
             // A vehicle that brakes along its path takes the pictures that it passes.
             place: match state.holds_place() {
-                true if self.detours.field_detour.is_flying() && !self.guidance.returning => {
-                    PathRelation::Beside
-                }
+                true if self.detours.is_beside_plan() && !self.guidance.returning => PathRelation::Beside,
                 true if !off_plan => PathRelation::OnPath,
                 _ => PathRelation::Elsewhere,
             },
@@ -130,8 +128,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.requests.state_changed(from, to);
         self.run_action(from, to, row);
         // Whatever interrupts a search ends it.
-        if from == State::Replanning {
-            self.detours.field_detour.stop_seeking();
+        if matches!(from, State::Replanning | State::PadReplanning) {
+            self.detours.end_search();
+        }
+        if to == State::Follow {
+            self.detours.take_up_plan();
         }
         if !row.text.is_empty() {
             self.links.send_text(row.warning, row.text);
@@ -188,7 +189,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
             Action::TurnHome => {
                 self.guidance.begin_braking();
-                self.detours.field_detour.abort();
+                self.detours.give_up_plan();
                 self.detours.home.begin(now);
             }
             Action::RequestDetourAside => {
@@ -199,18 +200,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),
             Action::FlyDetour => {
                 self.guidance.begin_path(now);
-                self.guidance.ends_aside = self.detours.is_detour_aside();
+                self.guidance.ends_aside = self.detours.ends_aside();
             }
             Action::FlyDivision => {
                 self.mission.fly_division();
-                self.detours.field_detour.abort();
+                self.detours.give_up_plan();
                 self.guidance.start_following(now);
             }
             Action::BrakeOnPath => self.guidance.begin_braking(),
             Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
                 self.detours.home.cancel();
-                self.detours.field_detour.abort();
+                self.detours.give_up_plan();
                 let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
                 let guidance = &mut self.guidance;
                 self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));

@@ -293,7 +293,7 @@ impl Guard {
             Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.pad_blocked_for >= limit && i.can_land_aside,
-            Self::NoPlaceAside => i.plan_failed && i.lands_aside,
+            Self::NoPlaceAside => i.plan_failed && i.seeks_landing,
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear_for >= limit,
             Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,

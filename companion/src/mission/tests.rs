@@ -233,7 +233,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::NoRoomToLand => (i.column_blocked_for, i.offboard, i.can_turn_back) = (long, true, true),
         G::NoRoomHere => (i.column_blocked_for, i.offboard, i.can_land_aside) = (long, true, true),
         G::PadTaken => (i.pad_blocked_for, i.can_land_aside) = (long, true),
-        G::NoPlaceAside => (i.plan_failed, i.lands_aside) = (true, true),
+        G::NoPlaceAside => (i.plan_failed, i.seeks_landing) = (true, true),
         G::AsideReached => i.aside_reached = true,
         G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),
         G::Yielded => (i.yielded_for, i.hindered_for) = (long, long),

@@ -19,14 +19,17 @@
 //! ENU metres.
 
 pub(crate) mod asking;
-pub(crate) mod beside;
+mod beside;
+pub(crate) mod flown;
 mod homeward;
+mod returning;
 
 use planner_core::detour;
 use planner_core::frames::Geodetic;
 use planner_core::{Length, Point};
 
-use self::beside::{DETOUR_MARGIN_M, FieldDetour, LOOK_AHEAD_M};
+use self::beside::{DETOUR_MARGIN_M, FieldSearches, LOOK_AHEAD_M};
+use self::flown::{DetourPurpose, FlownPath};
 use self::homeward::HomewardFlight;
 use crate::autopilot::telemetry::Telemetry;
 use crate::link::commands::{ACCEPTED, Command};
@@ -91,16 +94,13 @@ pub(crate) struct Detours {
     blocked: bool,
     /// This vehicle was out of the plan once: the others do not count on it any more.
     left_plan: bool,
-    /// The path is one around.
-    on_detour: bool,
-    /// The detour, or the one requested, leads aside only, out of the column under a vehicle that lands.
-    detour_aside: bool,
-    /// The vehicle lands at the end of that detour.
-    lands_at_end: bool,
+    flown: FlownPath,
+    /// What the shell was asked for.
+    sought: Option<DetourPurpose>,
     /// The vehicle's way home over a field.
     pub(crate) home: HomewardFlight,
-    /// The vehicle's detour beside its path over a field, and back.
-    pub(crate) field_detour: FieldDetour,
+    /// The vehicle's searches beside its path over a field.
+    field_searches: FieldSearches,
     /// Progress on the plan when it was left for a detour, metres.
     left_at_m: f32,
     /// The detour asked for has come.
@@ -188,21 +188,6 @@ impl Detours {
         self.left_plan
     }
 
-    /// Whether the current path is a detour.
-    pub(crate) fn is_on_detour(&self) -> bool {
-        self.on_detour
-    }
-
-    /// Whether the detour that it flies, or the one requested, leads aside only.
-    pub(crate) fn seeks_aside(&self) -> bool {
-        self.detour_aside
-    }
-
-    /// Whether that path does not lead to where it lands: aside only, or back to its own.
-    pub(crate) fn is_detour_aside(&self) -> bool {
-        self.detour_aside || self.field_detour.is_flying()
-    }
-
     /// Place where the vehicle could come back to its path over a field, metres, beyond what blocks the path.
     pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
@@ -217,9 +202,9 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
         view.config.division.is_some()
-            && (!self.on_detour || self.field_detour.is_flying())
+            && (!self.is_on_detour() || self.is_beside_plan())
             && !self.left_plan
-            && !self.home.is_on()
+            && !self.is_homeward()
             && !view.guidance.returning
             && view.guidance.along_m() >= 0.0
             && view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
@@ -231,24 +216,20 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
         // Whatever it stopped for on its way around, it seeks another one.
-        (self.obstructed || self.field_detour.is_flying() || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
+        (self.obstructed || self.is_beside_plan() || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
             && self.keeps_to_plan_over_field(view)
-            && self.field_detour.may_seek(view.now)
+            && self.field_searches.may_seek(view.now)
     }
 
     /// The vehicle's own plan has come, or will not: the vehicle is on its path again, or has to do without.
     pub(crate) fn end_field_detour(&mut self, came: bool) {
-        self.field_detour.handle_own_plan(came);
         if came {
-            let beside = self.field_detour;
+            let field_searches = self.field_searches;
             self.forget_plan();
-            self.field_detour = beside;
+            (self.flown, self.field_searches) = (FlownPath::PlanReturned, field_searches);
+        } else {
+            self.give_up_plan();
         }
-    }
-
-    /// Whether it lands at the end of the detour.
-    pub(crate) fn lands_at_end(&self) -> bool {
-        self.lands_at_end
     }
 
     /// Whether the requested detour has come.
@@ -386,16 +367,21 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) {
         let now = view.now;
-        let stuck = self.on_detour
+        let stuck = self.is_on_detour()
             && view.mission.state() != State::Scheduled
             && now - view.guidance.last_progress_at() > STUCK_AFTER;
         // Where it stands aside it still makes room.
-        let near_m = if view.mission.state() == State::Blocked { SWAY_ASIDE_M } else { 0.0 };
+        let stands = matches!(view.mission.state(), State::Blocked | State::Replanning);
+        let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let at_end = view.guidance.along_m() >= length_m - near_m;
-        let to_plan = self.field_detour.is_flying() && !self.field_detour.leads_back();
-        let off_plan = self.left_plan && (!self.on_detour || self.detour_aside && at_end);
-        let astray = (off_plan && !self.lands_at_end) || (to_plan && at_end);
+        let astray = match self.flown {
+            _ if self.seeks_landing() => false,
+            FlownPath::Plan | FlownPath::PlanReturned => self.left_plan,
+            FlownPath::Detour(DetourPurpose::Aside(_)) => at_end,
+            FlownPath::Detour(_) => false,
+            FlownPath::Astray => true,
+        };
         let dead_end =
             self.is_stopped_by_others(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END_AFTER);
         let free =

@@ -10,12 +10,12 @@ use planner_core::detour::KeepOutZone;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IncrementalScan {
     /// The source that is asked now, of how many.
-    source: usize,
-    sources: usize,
+    source: u16,
+    sources: u16,
     /// Sources that were asked.
-    sources_checked: usize,
+    sources_checked: u16,
     /// Things of this source that were asked about.
-    zones_checked: usize,
+    zones_checked: u16,
 }
 
 impl IncrementalScan {
@@ -30,6 +30,7 @@ impl IncrementalScan {
         tell: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
         is_in_the_way: impl Fn(&KeepOutZone) -> bool,
     ) -> Option<bool> {
+        let sources = sources as u16;
         if self.sources != sources {
             self.sources = sources;
             self.restart();
@@ -37,7 +38,7 @@ impl IncrementalScan {
         while self.sources_checked < sources {
             let (mut told, mut things, mut found) = (0, self.zones_checked, false);
             self.source %= sources;
-            tell(self.source, &mut |keep_off| {
+            tell(usize::from(self.source), &mut |keep_off| {
                 if told == things && !found && *budget >= each {
                     *budget -= each;
                     things += 1;

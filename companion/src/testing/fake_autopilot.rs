@@ -236,7 +236,7 @@ impl Bench {
             if event == Event::PlanRequested(PlanKind::Division) {
                 self.divide();
             } else if let Some((request, mut obstacles)) = self.requested() {
-                if !self.companion.detours.field_detour.is_flying() {
+                if !self.companion.detours.is_beside_plan() {
                     self.own_plan = self.companion.mission.plan().cloned();
                 }
                 let answer = self.answer_detour.map(|answer| {
@@ -286,7 +286,7 @@ impl Bench {
         let rank = usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
         // Beside its path its plan is the detour.
-        let beside = self.companion.detours.field_detour.is_flying();
+        let beside = self.companion.detours.is_beside_plan();
         let plan = if beside { self.own_plan.clone() } else { self.companion.mission.plan().cloned() };
         let Some(mut plan) = plan.filter(|_| self.answer_division) else { return };
         let fleet = self.companion.neighbours.fleet().expect("it divides an area");

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use companion::storage::store::{MAX_READ, Store};
-use companion::{Config, Event, Instant, Link, PlanKind, State};
+use companion::{Config, Event, Instant, Link, PlanKind, PlanRequests, State};
 use planner_core::Point;
 use sim_autopilot::{Autopilot, Photo};
 
@@ -44,8 +44,8 @@ pub struct SimulatedVehicle {
     board: Option<Board>,
     /// Flash of the companion.
     flash: Option<DeskFlash>,
-    /// The plan that the companion waits for.
-    pub wants_plan: Option<PlanKind>,
+    /// The plans that the companion waits for.
+    plan_requests: PlanRequests,
     /// How it is answered.
     pub planner: Planner,
     /// The last warning of a mission that did not continue since: why it left its usual course.
@@ -82,7 +82,7 @@ impl SimulatedVehicle {
             board: None,
             flash: None,
             config,
-            wants_plan: None,
+            plan_requests: PlanRequests::new(),
             planner: Planner::Sound,
             cause: None,
             took_off_s: None,
@@ -177,7 +177,7 @@ impl SimulatedVehicle {
     pub fn reset_companion(&mut self, now_us: u64) -> anyhow::Result<()> {
         self.start_companion()?;
         self.companion_us = now_us;
-        self.wants_plan = None;
+        self.plan_requests = PlanRequests::new();
         Ok(())
     }
 
@@ -295,7 +295,7 @@ impl SimulatedVehicle {
         let mut restarts = false;
         while let Some(happened) = self.companion.poll_event() {
             match happened {
-                Event::PlanRequested(wanted) => self.wants_plan = Some(wanted),
+                Event::PlanRequested(wanted) => self.plan_requests.add(wanted),
                 Event::RestartRequested => restarts = true,
                 // The companion also sends it as STATUSTEXT.
                 Event::WaitsForStart { .. } => {}
@@ -386,9 +386,18 @@ impl SimulatedVehicle {
         }
     }
 
+    /// The plan that the companion waits for, the most urgent one of several, if it is to be answered.
+    pub fn next_plan_request(&self) -> Option<PlanKind> {
+        if self.planner == Planner::Late { None } else { self.plan_requests.take() }
+    }
+
     /// Answers the companion's request for a plan.
-    pub fn answer_plan(&mut self, now_us: u64, plan: Result<&OwnPlan, companion::PlanFailure>) {
-        let Some(wanted) = self.wants_plan.take() else { return };
+    pub fn answer_plan(
+        &mut self,
+        now_us: u64,
+        wanted: PlanKind,
+        plan: Result<&OwnPlan, companion::PlanFailure>,
+    ) {
         let now = self.companion_now(now_us);
         self.companion.handle_plan(now, wanted, plan);
     }

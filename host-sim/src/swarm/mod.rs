@@ -237,7 +237,7 @@ impl<'a> SimulationRun<'a> {
         self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, mission, radio, places, log)?;
-            if let Some(wanted) = member.wants_plan.filter(|_| member.planner != Planner::Late) {
+            if let Some(wanted) = member.next_plan_request() {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
                     _ => mission.answer_plan_request(plan, i, wanted, &member.companion),
@@ -245,7 +245,7 @@ impl<'a> SimulationRun<'a> {
                 if wanted == PlanKind::Mission {
                     self.done = member.companion.excluded_waypoints().to_vec();
                 }
-                member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
+                member.answer_plan(now_us, wanted, own.as_deref().map_err(|failure| *failure));
             }
             places[i] = member.autopilot.true_state().position;
             if let (true, Some(end)) =

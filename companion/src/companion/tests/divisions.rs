@@ -139,7 +139,7 @@ impl Watch {
         let (state, fleet) = (b.state(), b.companion.neighbours.fleet().expect("an area"));
         let guidance = &b.companion.guidance;
         let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
-        let homeward = guidance.returning || b.companion.detours.home.is_on();
+        let homeward = guidance.returning || b.companion.detours.is_homeward();
         let flies = state == Follow && !homeward;
         let behind = fleet.division_count() > b.companion.mission.division_count();
         let held_m = f32::from(fleet.held_at_dm()) / 10.0;
@@ -286,7 +286,7 @@ fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
     b.until(Blocked, 5.0);
     b.neighbour = None;
     b.until(Dividing, 20.0);
-    assert!(b.companion.detours.field_detour.is_flying(), "{:?}", b.texts);
+    assert!(b.companion.detours.is_beside_plan(), "{:?}", b.texts);
     b.until(Follow, 5.0);
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }

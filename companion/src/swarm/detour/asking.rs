@@ -5,6 +5,7 @@
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, DETOUR_MARGIN_M};
+use super::flown::{DetourPurpose, FlownPath};
 use super::{BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
 use crate::guidance::evade;
 use crate::swarm::view::DetourView;
@@ -16,21 +17,6 @@ const SIDESTEP_RETRY_S: u64 = 30;
 const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Two searches from places nearer than this are searches from the same place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
-
-/// Purpose of a requested detour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum DetourPurpose {
-    /// To fly to the goal.
-    Goal,
-    /// To leave the column under a vehicle that lands.
-    Aside,
-    /// To land where no vehicle lies.
-    Landing,
-    /// To fly home over a field.
-    Home,
-    /// To fly on along the own path over a field, beyond what blocks the path.
-    Beyond,
-}
 
 /// Whether a detour that was not found may be found later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,13 +60,12 @@ impl Detours {
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
-    /// Notes that a detour, or a path aside, is requested of the shell.
-    pub(crate) fn note_request(&mut self, aim: DetourPurpose) {
-        self.detour_aside = matches!(aim, DetourPurpose::Aside | DetourPurpose::Landing);
-        self.lands_at_end = aim == DetourPurpose::Landing;
-        if !matches!(aim, DetourPurpose::Aside | DetourPurpose::Beyond) {
-            self.field_detour.abort();
+    /// Notes that a path is requested of the shell.
+    pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
+        if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Back(_)) {
+            self.flown = self.flown.without_return();
         }
+        self.sought = Some(purpose);
         self.obstacles.mark_requested();
         self.detour_ready = false;
     }
@@ -91,7 +76,7 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
         mut tell: impl FnMut(KeepOutZone),
     ) -> Option<DetourRequest> {
-        let plan = view.mission.plan()?;
+        let (sought, plan) = (self.sought?, view.mission.plan()?);
         let points = plan.path.waypoints();
         let along_m = view.guidance.along_m();
         let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
@@ -100,22 +85,22 @@ impl Detours {
         let apart_m = view.config.safety_distance_m;
         self.obstacles.all().iter().for_each(|obstacle| tell(*obstacle));
         match view.config.division {
-            Some(_) if !self.detour_aside => beside::zones_of_others(view, &mut tell),
+            Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut tell),
             _ => {
                 // No nearer than blocks the way: a goal that is planned beside one that lies can be flown to.
                 let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
                 view.neighbours.for_each_place(view.now, apart, &mut tell);
             }
         }
-        if self.detour_aside {
+        if sought.is_aside() {
             view.neighbours.for_each_landing_column(view.now, apart_m + evade::EVADE_MARGIN_M, &mut tell);
         }
-        if self.lands_at_end {
+        if sought == DetourPurpose::Landing {
             let height_m = plan.path.point_at(along_m)?.z;
             view.neighbours.for_each_landing_zone(view.now, [apart_m + DETOUR_MARGIN_M, height_m], tell);
         }
         let (goal, descent_m) = match view.config.division {
-            Some(_) => match self.field_detour.rejoin() {
+            Some(_) => match sought.rejoin() {
                 Some(back) => {
                     let (over, ground_m) = (back.position, view.guidance.ground_m(plan));
                     (Goal::Home { over, layer_m: over.z }, (over.z - ground_m).max(0.0))
@@ -130,7 +115,7 @@ impl Detours {
             },
         };
         Some(DetourRequest {
-            aside: self.detour_aside,
+            aside: sought.is_aside(),
             here: plan.path.point_at(along_m)?,
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
@@ -142,47 +127,51 @@ impl Detours {
     }
 
     /// The detour has come: it is flown from here on. `progress_m` is the progress on the plan.
-    pub(crate) fn begin_detour(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
-        if !self.on_detour {
-            self.left_at_m = progress_m;
-        }
-        let stuck = self.on_detour && now - progress_at > STUCK_AFTER;
+    pub(crate) fn begin_detour(
+        &mut self,
+        purpose: DetourPurpose,
+        progress_m: f32,
+        now: Instant,
+        progress_at: Instant,
+    ) {
+        let on_detour = self.flown.is_detour();
+        let stuck = on_detour && now - progress_at > STUCK_AFTER;
         let fruitless = if stuck { self.detours_without_progress.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
-        let Self { detour_aside: aside, lands_at_end: lands, left_at_m, .. } = *self;
-        let (home, beside) =
-            (self.home.after_detour_received(aside), self.field_detour.after_detour_received(aside));
-        // The vehicle comes back to its plan.
-        let left = self.left_plan || !beside.is_flying();
-        let obstacles = core::mem::take(&mut self.obstacles);
-        let flying =
-            Self { left_plan: left, on_detour: true, detour_ready: true, obstacles, ..Self::default() };
+        let Self { mut home, mut field_searches, .. } = *self;
+        home.cancel();
+        field_searches.note_found();
         *self = Self {
-            detour_aside: aside,
-            lands_at_end: lands,
-            left_at_m,
+            obstacles: core::mem::take(&mut self.obstacles),
+            left_plan: self.left_plan || !purpose.keeps_to_plan(),
+            left_at_m: if on_detour { self.left_at_m } else { progress_m },
+            flown: FlownPath::Detour(purpose),
+            detour_ready: true,
             detours_without_progress: fruitless,
             home,
-            field_detour: beside,
-            ..flying
+            field_searches,
+            ..Self::default()
         };
+    }
+
+    /// No path back to the plan's can be requested: there is no free place on that.
+    pub(crate) fn note_no_rejoin_place(&mut self, now: Instant) {
+        self.detour_ready = false;
+        self.field_searches.note_failure(now);
     }
 
     /// The requested detour has not come; `along_m` is the place on the path.
     pub(crate) fn note_failure(&mut self, along_m: f32, outlook: RetryOutlook, now: Instant) {
-        // The way home is sought again.
-        if self.home.is_seeking() {
-            self.home.note_failure(now);
-            return;
-        }
-        // Where no path aside is found a detour may yet exist.
-        if self.detour_aside {
-            self.field_detour.stop_seeking();
-            self.no_way_aside_at = Some(now);
-            return;
-        }
-        if self.field_detour.note_failure(now) {
-            return;
+        match self.sought {
+            // The way home is sought again.
+            Some(DetourPurpose::Home) => return self.home.note_failure(now),
+            // Where no path aside is found a detour may yet exist.
+            Some(DetourPurpose::Aside(_) | DetourPurpose::Landing) => {
+                self.no_way_aside_at = Some(now);
+                return;
+            }
+            Some(DetourPurpose::Back(_)) => return self.field_searches.note_failure(now),
+            Some(DetourPurpose::Goal) | None => {}
         }
         if outlook == RetryOutlook::Settles {
             // The vehicle requests a detour later and later, and once more when that vehicle lies.

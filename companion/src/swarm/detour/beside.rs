@@ -3,7 +3,7 @@
 //! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
 //! plan, and then asks for its own plan again, to continue from there. It keeps its part: its progress stays where it left its path
 //! until it is back, and others wait for it. It comes back no further than its gates are open. From under a vehicle that comes down it
-//! first flies aside, and seeks the way back from there.
+//! first flies aside, and seeks the way back from there: to where it left its path, or beyond that if something bars it for good.
 //!
 //! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
@@ -36,132 +36,27 @@ const DETOUR_BEGINS_BEFORE_M: f32 = 1.0;
 /// very edge the same zone would block the path again.
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
-/// A place of the plan's path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RejoinPlace {
-    /// Distance along that path, metres.
-    pub along_m: f32,
-    pub position: Point,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-enum FieldDetourPhase {
-    /// The vehicle is on its path.
-    #[default]
-    Off,
-    /// The vehicle seeks the detour to this place of its path.
-    Seeks(RejoinPlace),
-    /// The vehicle flies the detour, and waits at its end for its plan, or aside for the way back.
-    Flies(RejoinPlace),
-    /// The vehicle was stopped on the detour, or stands aside, and seeks another one.
-    SeeksAgain(RejoinPlace),
-    /// The vehicle's plan has come.
-    Back,
-    /// The vehicle's plan will not come.
-    Lost,
-}
-
-/// Progress of a vehicle on its detour.
+/// Searches of a vehicle for a path beside its own.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct FieldDetour {
-    phase: FieldDetourPhase,
-    /// The detour that it flies leads aside only: another one leads back.
-    aside: bool,
+pub(crate) struct FieldSearches {
     missed_at: Option<Instant>,
-    attempts: u8,
+    found: u8,
 }
 
-impl FieldDetour {
-    /// Starts to seek a path back to the plan, or aside first: to the place that the vehicle was flying to if it was stopped
-    /// on such a path, else to `rejoin`. False where there is no such place.
-    pub(crate) fn start_seeking(&mut self, rejoin: Option<RejoinPlace>) -> bool {
-        self.phase = match self.phase {
-            FieldDetourPhase::Flies(back) | FieldDetourPhase::SeeksAgain(back) => {
-                FieldDetourPhase::SeeksAgain(back)
-            }
-            _ => rejoin.map_or(FieldDetourPhase::Off, FieldDetourPhase::Seeks),
-        };
-        self.is_off_plan_path()
-    }
-
-    /// Notes that no path was found. Returns whether one back to the plan was sought.
-    pub(crate) fn note_failure(&mut self, now: Instant) -> bool {
+impl FieldSearches {
+    /// Notes that no path was found.
+    pub(crate) fn note_failure(&mut self, now: Instant) {
         self.missed_at = Some(now);
-        self.stop_seeking()
     }
 
-    /// It stays on the path that it is on. Returns whether it sought another one.
-    pub(crate) fn stop_seeking(&mut self) -> bool {
-        let before = self.phase;
-        self.phase = match before {
-            FieldDetourPhase::SeeksAgain(back) => FieldDetourPhase::Flies(back),
-            FieldDetourPhase::Seeks(_) => FieldDetourPhase::Off,
-            other => other,
-        };
-        matches!(before, FieldDetourPhase::Seeks(_) | FieldDetourPhase::SeeksAgain(_))
-    }
-
-    /// The requested detour has come, or another one; `aside` if it leads aside only.
-    pub(super) fn after_detour_received(self, aside: bool) -> Self {
-        let phase = match self.phase {
-            FieldDetourPhase::Seeks(back) | FieldDetourPhase::SeeksAgain(back) => {
-                FieldDetourPhase::Flies(back)
-            }
-            _ => FieldDetourPhase::Off,
-        };
-        Self { phase, aside, attempts: self.attempts.saturating_add(1), ..self }
-    }
-
-    /// The state that remains where the vehicle turns to another task.
-    pub(crate) fn abort(&mut self) {
-        self.phase = FieldDetourPhase::Off;
-    }
-
-    /// The vehicle's own plan has come, or will not.
-    pub(super) fn handle_own_plan(&mut self, came: bool) {
-        self.phase = if came { FieldDetourPhase::Back } else { FieldDetourPhase::Lost };
-    }
-
-    /// Place where the vehicle is to come back to its path, while it seeks the detour or flies it.
-    pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
-        match self.phase {
-            FieldDetourPhase::Seeks(back)
-            | FieldDetourPhase::Flies(back)
-            | FieldDetourPhase::SeeksAgain(back) => Some(back),
-            _ => None,
-        }
-    }
-
-    /// Whether the detour that it flies leads back to its path.
-    pub(crate) fn leads_back(&self) -> bool {
-        self.is_flying() && !self.aside
-    }
-
-    /// Whether it is beside its path, to come back to it.
-    pub(crate) fn is_flying(&self) -> bool {
-        matches!(self.phase, FieldDetourPhase::Flies(_) | FieldDetourPhase::SeeksAgain(_))
-    }
-
-    /// Whether its path is not that of its plan yet, or has not been taken up.
-    pub(crate) fn is_off_plan_path(&self) -> bool {
-        self.phase != FieldDetourPhase::Off
-    }
-
-    /// Whether its plan has come.
-    pub(crate) fn is_back(&self) -> bool {
-        self.phase == FieldDetourPhase::Back
-    }
-
-    /// Whether its own plan will not come.
-    pub(crate) fn is_lost(&self) -> bool {
-        self.phase == FieldDetourPhase::Lost
+    /// A path has come.
+    pub(super) fn note_found(&mut self) {
+        self.found = self.found.saturating_add(1);
     }
 
     /// Whether it may seek a way now.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
-        (!self.is_off_plan_path() || self.is_flying())
-            && self.attempts < MAX_DETOURS
-            && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
+        self.found < MAX_DETOURS && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
     }
 }
 
@@ -197,6 +92,24 @@ pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     (0..source_count(view)).for_each(|source| zones_of_source(view, source, tell));
 }
 
+/// Distance of a place from what is in a zone, metres; below zero within it.
+fn far_m(zone: &KeepOutZone, place: &Point) -> f32 {
+    let (axis, away) = (zone.to - zone.from, place - zone.from);
+    let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
+    (away - axis * share).length() - zone.radius_m
+}
+
+/// Whether another vehicle, or what is `known`, keeps a vehicle from a place.
+pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'_, V, W, G>,
+    known: &[KeepOutZone],
+    place: &Point,
+) -> bool {
+    let mut barred = known.iter().any(|zone| far_m(zone, place) <= 0.0);
+    zones_of_others(view, &mut |zone| barred |= far_m(&zone, place) <= 0.0);
+    barred
+}
+
 /// The first free place of its path behind what blocks that, metres; none before its last descent, or before the gate that is
 /// closed.
 pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
@@ -208,11 +121,6 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     let waypoints = plan.path.waypoints();
     let home_m = waypoints.iter().nth_back(1)?.along_m;
     let most_m = view.guidance.gates_open_up_to_m(&view.scene).min(home_m);
-    let far_m = |thing: &KeepOutZone, place: &Point| {
-        let (axis, away) = (thing.to - thing.from, place - thing.from);
-        let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
-        (away - axis * share).length() - thing.radius_m
-    };
     let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
     let add = |thing: KeepOutZone, things: &mut Vec<_, MAX_ZONES>| {
         _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));

@@ -20,24 +20,17 @@ pub(crate) struct HomewardFlight {
     seeks_since: Option<Instant>,
     /// When it was last not found.
     missed_at: Option<Instant>,
-    /// The vehicle flies its path home.
-    flies: bool,
     attempts: u8,
 }
 
 impl HomewardFlight {
-    /// The state that remains when a detour has come; `aside` if the detour leads aside only.
-    pub(super) fn after_detour_received(self, aside: bool) -> Self {
-        Self { flies: !aside && self.seeks_since.is_some(), attempts: self.attempts, ..Self::default() }
-    }
-
     /// The vehicle turns home.
     pub(crate) fn begin(&mut self, now: Instant) {
         let turns = self.attempts.saturating_add(1);
         *self = Self { seeks_since: Some(now), attempts: turns, ..Self::default() };
     }
 
-    /// The vehicle flies back another way.
+    /// The vehicle flies a path, or back another way.
     pub(crate) fn cancel(&mut self) {
         *self = Self { attempts: self.attempts, ..Self::default() };
     }
@@ -45,11 +38,6 @@ impl HomewardFlight {
     /// Notes that no path home was found.
     pub(crate) fn note_failure(&mut self, now: Instant) {
         self.missed_at = Some(now);
-    }
-
-    /// Whether it stops for its path home, seeks it, or flies it.
-    pub(crate) fn is_on(&self) -> bool {
-        self.is_seeking() || self.flies
     }
 
     /// Whether it stops for its path home, or seeks it.

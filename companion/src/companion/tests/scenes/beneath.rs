@@ -259,6 +259,32 @@ fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
     }
 }
 
+/// What came down lies on the ground: the place where the vehicle left its path is free again, and so no picture is left out.
+#[test]
+fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
+    let mut returns = 0;
+    for seed in 0..FALLS {
+        let mut faller = faller(Blocked, seed);
+        let mut b = holding(Blocked, true, &mut faller);
+        let (east_m, north_m) = (faller.real(-0.8, 0.8), faller.real(-0.8, 0.8));
+        faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
+        faller.until(&mut b, 1.0, |_| false);
+        faller.falls_mps = 1.0;
+        faller.until(&mut b, 20.0, |_| false);
+        (b.answer_detour, b.answer_division) = (Some(Ok(())), true);
+        // Or it stepped back along its path.
+        let aside = b.companion.detours.is_beside_plan();
+        if !aside || !faller.until(&mut b, 60.0, |b| b.companion.detours.leads_back()) {
+            continue;
+        }
+        returns += 1;
+        let back = b.companion.detours.rejoin().expect("it comes back");
+        let left_at_m = b.companion.detours.left_at_m();
+        assert!((back.along_m - left_at_m).abs() < 0.5, "{seed}: {back:?} {left_at_m}");
+    }
+    assert!(returns > FALLS / 8, "{returns}");
+}
+
 /// Its planner does not answer before it is paused: what it sought is forgotten, and it flies its part all the same.
 #[test]
 fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
@@ -286,7 +312,7 @@ fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
             }
             resume(&mut b);
             faller.until(&mut b, 5.0, |_| false);
-            assert!(!b.companion.detours.field_detour.is_off_plan_path() || b.companion.detours.is_blocked());
+            assert!(!b.companion.detours.is_on_detour() || b.companion.detours.is_blocked());
             faller.until(&mut b, OVER_S, |b| matches!(b.state(), Done | Aborted));
             assert_eq!(b.state(), Done, "{seed} {state:?} {:?}", b.texts);
         }
