@@ -83,7 +83,7 @@ pub struct Planner<'a> {
 
 impl Planner<'_> {
     /// Inputs of the plan that the companion wants: lost vehicles, or keep-out zones of its detour.
-    pub fn read_inputs(&mut self, wanted: PlanKind, companion: &BoardCompanion) -> Option<DetourRequest> {
+    pub fn read_inputs(&mut self, wanted: PlanKind, companion: &mut BoardCompanion) -> Option<DetourRequest> {
         let OwnPlanMemory { obstacles, too_many_zones: crowded, done, losses, .. } = &mut *self.memory.own;
         obstacles.clear();
         done.clear();

@@ -237,7 +237,7 @@ impl Mission {
         plan: &SwarmPlan,
         index: usize,
         wanted: PlanKind,
-        companion: &DeskCompanion,
+        companion: &mut DeskCompanion,
     ) -> Result<Box<OwnPlan>, PlanFailure> {
         let own = |plan: &SwarmPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
         match wanted {

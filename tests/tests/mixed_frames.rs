@@ -118,9 +118,9 @@ fn fly(seed: u64) -> Errors {
         let now_us = (step + 1) * STEP_US;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, &mission, &mut radio, &places, &mut log).expect("it has no board");
-            if member.wants_plan.is_some() {
+            if let Some(wanted) = member.next_plan_request() {
                 let own = mission.own_plan(&plan, i).expect("few gates");
-                member.answer_plan(now_us, Ok(&own));
+                member.answer_plan(now_us, wanted, Ok(&own));
             }
             let truth = member.autopilot.true_state().position;
             places[i] = truth;

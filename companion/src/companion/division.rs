@@ -124,7 +124,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
-            state => state == State::Dividing,
+            state => matches!(state, State::Dividing | State::Follow | State::Blocked),
         };
         resumes
             && !self.is_landing_off_plan()

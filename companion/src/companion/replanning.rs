@@ -61,8 +61,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Requests a path aside, from under a vehicle that comes down; over a field another one leads back to its path from there.
     pub(super) fn request_detour_aside(&mut self, from: State) {
-        // On its way back it was to land already.
-        if self.guidance.returning {
+        // On its way back, or to a place to land at, it was to land already.
+        if self.guidance.returning || self.detours.lands_at_end() {
             return self.request_detour(DetourPurpose::Landing);
         }
         self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
@@ -113,9 +113,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The detour that [`PlanKind::Detour`] requests of the shell; `None` if none is requested, or
-    /// none can be planned. `tell` is given all keep-out zones.
-    pub fn detour_request(&self, tell: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
+    /// none can be planned. `tell` is given all keep-out zones. The next answer counts for this request: one that comes
+    /// before the shell has read a request was to an older one, and is ignored.
+    pub fn detour_request(&mut self, tell: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
+        self.detours.note_request_read();
         if replans { self.detours.detour_request(&self.detour_view(), tell) } else { None }
     }
 
@@ -135,6 +137,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.switch_to_detour(detour, progress_m, ground_m);
         self.detours.begin_detour(purpose, progress_m, self.now, self.guidance.last_progress_at());
         self.neighbours.mark_avoided(self.now);
+        // Whatever comes next, it is on this path: on the ground it is not on any.
+        if self.mission.state() == State::Replanning {
+            self.guidance.begin_path(self.now);
+            self.guidance.ends_aside = self.detours.ends_aside();
+        }
     }
 
     /// The purpose of a detour that has come and ends at `ends`; `None` if it may not be flown by now.

@@ -124,7 +124,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
-        let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, now);
+        // A landing that sought a place goes on as one, whatever interrupts the search.
+        let lands = self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
+        let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, lands, now);
         self.requests.state_changed(from, to);
         self.run_action(from, to, row);
         // Whatever interrupts a search ends it.
@@ -198,10 +200,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::RequestLanding => self.request_detour(DetourPurpose::Landing),
             Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),
-            Action::FlyDetour => {
-                self.guidance.begin_path(now);
-                self.guidance.ends_aside = self.detours.ends_aside();
-            }
+            Action::FlyDetour => self.guidance.start_following(now),
             Action::FlyDivision => {
                 self.mission.fly_division();
                 self.detours.give_up_plan();

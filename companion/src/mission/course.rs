@@ -182,6 +182,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         &mut self,
         row: &TransitionRow,
         custom_mode: u32,
+        lands: bool,
         now: Instant,
     ) -> (State, State) {
         let from = self.state;
@@ -189,7 +190,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             TargetState::State(to) => to,
             TargetState::Interrupted => self.interrupted.target(from),
         };
-        self.interrupted.record_interruption(from, to);
+        self.interrupted.record_interruption(from, to, lands);
         (self.state, self.entered_at) = (to, now);
         if row.guard == Guard::StartCommanded {
             (self.started_at, self.mode_before) = (now, custom_mode);

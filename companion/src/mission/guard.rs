@@ -160,7 +160,7 @@ pub enum Guard {
     NoRoomHere,
     /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent there by any.
     PadTaken,
-    /// No place aside to land at exists.
+    /// No place aside to land at exists, or the answer has not come within the limit.
     NoPlaceAside,
     /// The vehicle stands at the place aside where it is to land.
     AsideReached,
@@ -293,7 +293,7 @@ impl Guard {
             Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.pad_blocked_for >= limit && i.can_land_aside,
-            Self::NoPlaceAside => i.plan_failed && i.seeks_landing,
+            Self::NoPlaceAside => i.seeks_landing && (i.plan_failed || i.in_state >= limit),
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear_for >= limit,
             Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,

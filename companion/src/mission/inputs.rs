@@ -139,9 +139,9 @@ pub struct GuardInputs {
     pub pad_blocked_for: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,
-    /// The way aside asked for leads to where it is to land.
+    /// A place aside to land at is sought.
     pub seeks_landing: bool,
-    /// That way, or the one flown, does.
+    /// Such a place is sought, or flown to.
     pub lands_aside: bool,
     /// The vehicle stands at the end of the path aside.
     pub aside_reached: bool,

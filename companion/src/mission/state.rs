@@ -171,11 +171,12 @@ impl InterruptedStates {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
 
-    /// Remembers what a change of state interrupts.
-    pub(crate) fn record_interruption(&mut self, from: State, to: State) {
+    /// Remembers what a change of state interrupts; `lands` if what it seeks is a place for a landing that was under way.
+    pub(crate) fn record_interruption(&mut self, from: State, to: State, lands: bool) {
         use State::*;
         // A request to the shell, and a disarming, begin again.
         let kept = match from {
+            Replanning if lands => Land,
             Replanning => Blocked,
             Disarm | LandingHeld => Land,
             other => other,

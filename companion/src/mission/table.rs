@@ -265,7 +265,7 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Blocked],             G::OurTurn,         AT_ONCE,    Replanning,  A::RequestDetour,     "All others stand: planning around"),
     info_row(&[Replanning],          G::WayHomeReady,    AT_ONCE,    Follow,      A::FlyDetour,         "Flying home"),
     info_row(&[Replanning],          G::DetourReady,     AT_ONCE,    Follow,      A::FlyDetour,         "Flying around"),
-    warning_row(&[Replanning],       G::NoPlaceAside,    AT_ONCE,    LandingHeld, A::HoldOver,          "No place aside either: landing waits"),
+    warning_row(&[Replanning],       G::NoPlaceAside,    secs(5),    LandingHeld, A::HoldOver,          "No place aside either: landing waits"),
     warning_row(&[Replanning],       G::DetourFailed,    AT_ONCE,    Blocked,     A::None,              "No way around yet"),
     warning_row(&[Replanning],       G::Elapsed,         secs(5),    Blocked,     A::NoteDetourFailure, "The way around is late"),
     return_row(&[Paused],            G::ResumeCommanded, AT_ONCE,    A::Rejoin,                         "Resumed"),

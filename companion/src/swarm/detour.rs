@@ -95,8 +95,9 @@ pub(crate) struct Detours {
     /// This vehicle was out of the plan once: the others do not count on it any more.
     left_plan: bool,
     flown: FlownPath,
-    /// What the shell was asked for.
+    /// What the shell is asked for, and whether it has read that.
     sought: Option<DetourPurpose>,
+    request_read: bool,
     /// The vehicle's way home over a field.
     pub(crate) home: HomewardFlight,
     /// The vehicle's searches beside its path over a field.

@@ -9,22 +9,20 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::coverage::around;
-use planner_core::coverage::transit::Transit;
-use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
-use planner_core::flight::{Path, VehiclePlan};
+use planner_core::flight::VehiclePlan;
 use planner_core::frames::{self, Geodetic};
 
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::px4;
 use crate::link::frame::{self, Frame, Framer, Header, MAX_FRAME_LEN};
 use crate::link::intent;
-use crate::{Companion, Config, Duration, Event, Instant, Link, PlanKind};
+use crate::{Companion, Config, Duration, Event, Instant, Link, PlanRequests};
 
 mod commands;
 mod flight;
 mod mission;
 mod neighbour;
+mod planner;
 mod telemetry;
 
 pub(crate) use self::mission::*;
@@ -103,6 +101,11 @@ pub struct Bench {
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
+    /// Times that the planner takes for its answers, one after the other, from the first again; none: it answers at once.
+    pub planner_takes: Vec<Duration>,
+    plan_requests: PlanRequests,
+    answer_under_way: Option<planner::Answer>,
+    answer_count: usize,
     /// The vehicle's plan before it requested a detour.
     own_plan: Option<Plan>,
     /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
@@ -165,6 +168,10 @@ impl Bench {
             step_m: 0.1,
             undividable: false,
             answer_division: true,
+            planner_takes: Vec::new(),
+            plan_requests: PlanRequests::new(),
+            answer_under_way: None,
+            answer_count: 0,
             own_plan: None,
             neighbour: None,
             neighbour_clock: None,
@@ -231,78 +238,17 @@ impl Bench {
                 self.receive(link, frame);
             }
         }
-        while let Some(event) = self.companion.poll_event() {
-            self.events.push(event);
-            if event == Event::PlanRequested(PlanKind::Division) {
-                self.divide();
-            } else if let Some((request, mut obstacles)) = self.requested() {
-                if !self.companion.detours.is_beside_plan() {
-                    self.own_plan = self.companion.mission.plan().cloned();
+        loop {
+            while let Some(event) = self.companion.poll_event() {
+                self.events.push(event);
+                if let Event::PlanRequested(wanted) = event {
+                    self.plan_requests.add(wanted);
                 }
-                let answer = self.answer_detour.map(|answer| {
-                    answer.and_then(|()| {
-                        let mut path = Path::new();
-                        if matches!(request.goal, Goal::Home { .. }) {
-                            around::plan_detour(
-                                &Transit::<1>::empty(),
-                                None,
-                                &request,
-                                &mut obstacles,
-                                &mut path,
-                            )
-                            .map_err(|_| crate::PlanFailure::Unreachable)?;
-                            return Ok(VehiclePlan { path, descent_m: request.descent_m, ..plan() });
-                        }
-                        path.push(request.here, 1.2).unwrap();
-                        path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
-                        path.push(GOAL, 1.2).unwrap();
-                        Ok(VehiclePlan { path, ..plan() })
-                    })
-                });
-                if let (Event::PlanRequested(wanted), Some(answer)) = (event, answer) {
-                    self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|e| *e));
-                }
-            } else if let Event::PlanRequested(wanted) = event
-                && let Some(answer) = self.answer_plan.clone()
-            {
-                self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|e| *e));
+            }
+            if !self.step_planner() {
+                return;
             }
         }
-    }
-
-    /// The detour that the vehicle requests.
-    fn requested(&self) -> Option<(DetourRequest, Vec<KeepOutZone>)> {
-        let mut obstacles = Vec::new();
-        let request = self.companion.detour_request(|obstacle| obstacles.push(obstacle))?;
-        Some((request, obstacles))
-    }
-
-    /// Gives it all that is left: the rest of its path from where it holds.
-    fn divide(&mut self) {
-        if self.undividable {
-            self.companion.handle_plan(self.now, PlanKind::Division, Err(crate::PlanFailure::Capacity));
-            return;
-        }
-        let rank = usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
-        let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
-        // Beside its path its plan is the detour.
-        let beside = self.companion.detours.is_beside_plan();
-        let plan = if beside { self.own_plan.clone() } else { self.companion.mission.plan().cloned() };
-        let Some(mut plan) = plan.filter(|_| self.answer_division) else { return };
-        let fleet = self.companion.neighbours.fleet().expect("it divides an area");
-        let counted = fleet.division_count() == self.companion.mission.division_count();
-        if beside && counted && !fleet.needs_division() {
-            self.companion.handle_plan(self.now, PlanKind::Division, Ok(&plan));
-            return;
-        }
-        let held_m = f32::from(held_dm) / 10.0;
-        let mut path = Path::new();
-        path.push(plan.path.point_at(held_m).expect("a path"), 1.2).unwrap();
-        for waypoint in plan.path.waypoints().iter().filter(|w| w.along_m > held_m) {
-            path.push(waypoint.position, 1.2).unwrap();
-        }
-        (plan.path, plan.climb_m, plan.plan_crc) = (path, 0.0, plan.plan_crc + 1);
-        self.companion.handle_plan(self.now, PlanKind::Division, Ok(&plan));
     }
 
     /// An ArduCopter that has just booted.

@@ -240,7 +240,7 @@ impl<'a> SimulationRun<'a> {
             if let Some(wanted) = member.next_plan_request() {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
-                    _ => mission.answer_plan_request(plan, i, wanted, &member.companion),
+                    _ => mission.answer_plan_request(plan, i, wanted, &mut member.companion),
                 };
                 if wanted == PlanKind::Mission {
                     self.done = member.companion.excluded_waypoints().to_vec();

@@ -13,9 +13,20 @@ use proptest::prelude::{ProptestConfig, any};
 use super::State::*;
 use super::*;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
-use crate::link::intent::{GROUNDED, ON_PLAN, OUT_OF_PLAN};
+use crate::link::intent::{FLYING, GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use crate::{Link, RosterEntry};
+
+/// Vehicle 77, where it is in no way.
+const FAR_AWAY: Option<(Point, u8, f32, u32)> = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
+
+/// A place ahead on the vehicle's path, at this height.
+fn ahead(b: &Bench, height_m: f32) -> Point {
+    let (plan, along_m) = (b.companion.mission.plan(), b.companion.guidance.along_m());
+    let place = plan.and_then(|plan| plan.path.point_at(along_m.max(0.0) + 2.5));
+    let place = place.unwrap_or(GOAL);
+    Point::new(place.x, place.y, height_m)
+}
 
 /// Three vehicles photograph an area, this one along the usual path; the first other one is heard.
 pub(super) fn over_a_field(px4: bool) -> Bench {
@@ -24,7 +35,7 @@ pub(super) fn over_a_field(px4: bool) -> Bench {
     config.division = Some(60.0);
     let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
     bench.answer_plan = Some(Ok(field_plan()));
-    bench.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
+    bench.neighbour = FAR_AWAY;
     bench.until(Ready, 6.0);
     bench
 }
@@ -110,16 +121,36 @@ enum Happens {
     Hears,
     NoAnswer,
     Answers,
+    LiesAhead,
+    HoversAhead,
+    GoesAway,
     Land,
     Return,
     Battery,
 }
 
-const ALL: [Happens; 16] = {
+const ALL: [Happens; 19] = {
     use Happens::*;
     [
-        Pause, Resume, Pilot, Back, NoPosition, Position, Silent, Heard, Mute, MuteLong, Hears, NoAnswer,
-        Answers, Land, Return, Battery,
+        Pause,
+        Resume,
+        Pilot,
+        Back,
+        NoPosition,
+        Position,
+        Silent,
+        Heard,
+        Mute,
+        MuteLong,
+        Hears,
+        NoAnswer,
+        Answers,
+        LiesAhead,
+        HoversAhead,
+        GoesAway,
+        Land,
+        Return,
+        Battery,
     ]
 };
 
@@ -139,7 +170,8 @@ impl Watch {
         let (state, fleet) = (b.state(), b.companion.neighbours.fleet().expect("an area"));
         let guidance = &b.companion.guidance;
         let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
-        let homeward = guidance.returning || b.companion.detours.is_homeward();
+        let detours = &b.companion.detours;
+        let homeward = guidance.returning || detours.is_homeward() || detours.lands_at_end();
         let flies = state == Follow && !homeward;
         let behind = fleet.division_count() > b.companion.mission.division_count();
         let held_m = f32::from(fleet.held_at_dm()) / 10.0;
@@ -150,7 +182,8 @@ impl Watch {
         let left = fleet.roster_message(0).entries[0].status == MemberStatus::Left;
         assert!(!left || !flies, "flies on though it left: {said}");
         // On the way back there are no gates.
-        let halted = state == Follow && homeward && guidance.advice.stop_within_m <= 0.05;
+        let far = b.neighbour.is_none() || b.neighbour == FAR_AWAY;
+        let halted = far && state == Follow && homeward && guidance.advice.stop_within_m <= 0.05;
         self.returns = if halted { self.returns + 1 } else { 0 };
         assert!(self.returns < 20, "waits on its way back: {said}");
         assert!(!self.ends || !(flies || state == Dividing), "an order is forgotten: {said}");
@@ -182,9 +215,11 @@ impl Watch {
             Heard => b.silent = false,
             Mute | MuteLong => (b.neighbour, self.other.mute) = (None, true),
             Hears => {
-                (b.neighbour, self.other.mute) =
-                    (Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5)), false);
+                (b.neighbour, self.other.mute) = (FAR_AWAY, false);
             }
+            LiesAhead => b.neighbour = Some((ahead(b, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5)),
+            HoversAhead => b.neighbour = Some((ahead(b, 4.0), FLYING | OUT_OF_PLAN, 0.0, 5)),
+            GoesAway => b.neighbour = FAR_AWAY,
             NoAnswer => b.answer_division = false,
             Answers => b.answer_division = true,
             Land => self.ends |= order(b, MavCmd::MAV_CMD_NAV_LAND, 0.0),
@@ -202,9 +237,11 @@ proptest::proptest! {
     fn whatever_interrupts_a_division_no_part_is_flown_that_is_anothers(
         px4 in any::<bool>(),
         (lead, waits, counts_after) in (0u32..160, any::<bool>(), 0u32..100),
+        planner_takes_ms in proptest::collection::vec(0u64..8000, 0..4),
         script in proptest::collection::vec((0usize..ALL.len(), 1u32..200), 1..14),
     ) {
         let mut b = over_a_field(px4);
+        b.planner_takes = planner_takes_ms.into_iter().map(Duration::from_millis).collect();
         let mut watch = Watch { other: Other { mute: true, counts_after, ..Other::default() }, ends: false, returns: 0, log: Vec::new() };
         if !waits {
             b.start();
@@ -221,6 +258,7 @@ proptest::proptest! {
         }
         // All is well again.
         (b.silent, b.no_position, b.answer_division) = (false, false, true);
+        b.planner_takes.clear();
         watch.happen(&mut b, Happens::Hears);
         for second in 0..400 {
             if b.armed && b.mode != b.kind.setpoint_mode() {
@@ -272,7 +310,7 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
         b.state(),
         b.texts
     );
-    b.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
+    b.neighbour = FAR_AWAY;
     b.until(Done, 60.0);
 }
 

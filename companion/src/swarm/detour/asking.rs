@@ -65,9 +65,19 @@ impl Detours {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Back(_)) {
             self.flown = self.flown.without_return();
         }
-        self.sought = Some(purpose);
+        (self.sought, self.request_read) = (Some(purpose), false);
         self.obstacles.mark_requested();
         self.detour_ready = false;
+    }
+
+    /// The shell reads what is sought: the next answer is to that.
+    pub(crate) fn note_request_read(&mut self) {
+        self.request_read = self.sought.is_some();
+    }
+
+    /// Whether the shell has read what is sought.
+    pub(crate) fn is_request_read(&self) -> bool {
+        self.request_read
     }
 
     /// The requested detour; `None` without a plan. `tell` is given all keep-out zones.
@@ -156,7 +166,6 @@ impl Detours {
 
     /// No path back to the plan's can be requested: there is no free place on that.
     pub(crate) fn note_no_rejoin_place(&mut self, now: Instant) {
-        self.detour_ready = false;
         self.field_searches.note_failure(now);
     }
 

@@ -3,9 +3,9 @@
 //! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
 //! plan, and then asks for its own plan again, to continue from there. It keeps its part: its progress stays where it left its path
 //! until it is back, and others wait for it. It comes back no further than its gates are open. From under a vehicle that comes down it
-//! first flies aside, and seeks the way back from there: to where it left its path, or beyond that if something bars it for good.
+//! first flies aside, and seeks the way back from there: to where it left its path, or beyond that if that place stays barred.
 //!
-//! ENU metres. Constant work but for [`first_rejoin_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
+//! ENU metres. Constant work but for [`is_barred`], which asks for the places of all others, and [`first_rejoin_m`], once an attempt each: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};

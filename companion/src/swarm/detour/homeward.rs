@@ -13,7 +13,7 @@ const RETURN_RETRY: Duration = Duration::from_secs(5);
 /// around.
 const MAX_RETURNS: u8 = 4;
 
-/// Progress of a vehicle on its path home.
+/// Progress of a vehicle that seeks its path home.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HomewardFlight {
     /// Time since which the vehicle stands and seeks its way.
@@ -30,7 +30,7 @@ impl HomewardFlight {
         *self = Self { seeks_since: Some(now), attempts: turns, ..Self::default() };
     }
 
-    /// The vehicle flies a path, or back another way.
+    /// The vehicle flies the path that it sought, or back another way.
     pub(crate) fn cancel(&mut self) {
         *self = Self { attempts: self.attempts, ..Self::default() };
     }

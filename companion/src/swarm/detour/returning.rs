@@ -5,6 +5,12 @@
 use super::flown::{DetourPurpose, FlownPath, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
 use crate::swarm::view::DetourView;
+use crate::time::Duration;
+
+/// Time for which a vehicle that made room waits for the place where it left its path, seconds: less than until it flies home.
+const BARRED_MOST_S: u64 = 60;
+/// Time for which it seeks a way to that place once that is free, seconds.
+const NO_WAY_MOST_S: u64 = 90;
 
 impl Detours {
     /// Whether the current path is a detour.
@@ -12,14 +18,14 @@ impl Detours {
         self.flown.is_detour()
     }
 
-    /// What the shell was asked for.
+    /// What the shell is asked for.
     pub(crate) fn sought(&self) -> Option<DetourPurpose> {
         self.sought
     }
 
-    /// Ends the search: the vehicle stays on the path that it is on, whichever that is by now.
+    /// Ends the search: the vehicle stays on the path that it is on.
     pub(crate) fn end_search(&mut self) {
-        (self.sought, self.detour_ready) = (None, false);
+        (self.sought, self.request_read, self.detour_ready) = (None, false, false);
     }
 
     /// Whether it flies its way home over a field, stops for it, or seeks it.
@@ -27,7 +33,7 @@ impl Detours {
         self.home.is_seeking() || self.flown == FlownPath::Detour(DetourPurpose::Home)
     }
 
-    /// Whether that path does not lead to where it lands at its goal: aside, or back to its own.
+    /// Whether the path flown ends elsewhere than over the vehicle's goal: aside, or back on its own path.
     pub(crate) fn ends_aside(&self) -> bool {
         self.flown.purpose().is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
     }
@@ -55,15 +61,18 @@ impl Detours {
         self.flown.purpose().and_then(|purpose| purpose.rejoin())
     }
 
-    /// Place where it comes back to its path from aside: to where it left that, unless something bars it from there.
+    /// Place where it comes back to its path from aside: where it left that, or beyond if that place stays barred, or no way
+    /// leads there. `None` while it waits for that place.
     pub(crate) fn rejoin_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<RejoinPlace> {
-        let places = self.rejoin_places()?;
-        match beside::is_barred(view, self.obstacles.all(), &places.own.position) {
-            true => Some(places.beyond),
-            false => Some(places.own),
+        let RejoinPlaces { own, beyond } = self.rejoin_places()?;
+        let barred = own != beyond && beside::is_barred(view, self.obstacles.all(), &own.position);
+        let most_s = if barred { BARRED_MOST_S } else { NO_WAY_MOST_S };
+        match self.blocked_for(view.now) >= Duration::from_secs(most_s) {
+            true => Some(beyond),
+            false => Some(own).filter(|_| !barred),
         }
     }
 

@@ -269,12 +269,11 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
         let (east_m, north_m) = (faller.real(-0.8, 0.8), faller.real(-0.8, 0.8));
         faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
         faller.until(&mut b, 1.0, |_| false);
-        faller.falls_mps = 1.0;
-        faller.until(&mut b, 20.0, |_| false);
-        (b.answer_detour, b.answer_division) = (Some(Ok(())), true);
+        faller.falls_mps = faller.real(0.3, 1.5);
         // Or it stepped back along its path.
-        let aside = b.companion.detours.is_beside_plan();
-        if !aside || !faller.until(&mut b, 60.0, |b| b.companion.detours.leads_back()) {
+        let aside = faller.until(&mut b, 20.0, |b| b.companion.detours.is_beside_plan());
+        (b.answer_detour, b.answer_division) = (Some(Ok(())), true);
+        if !aside || !faller.until(&mut b, 120.0, |b| b.companion.detours.leads_back()) {
             continue;
         }
         returns += 1;
