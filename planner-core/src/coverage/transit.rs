@@ -136,6 +136,10 @@ impl<'a, const N: usize> Transit<'a, N> {
         loop {
             let mut best = (f32::INFINITY, 0, 0);
             for (i, first) in first_m.iter().enumerate().filter(|(_, first)| first.is_finite()) {
+                // No way over a corner is shorter than straight on from it.
+                if first + (to - self.corners[i]).length() >= best.0 {
+                    continue;
+                }
                 for (j, last) in last_m.iter().enumerate() {
                     let whole = first + self.between_m[i][j] + last;
                     if whole < best.0 {
