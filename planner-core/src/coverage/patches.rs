@@ -69,7 +69,7 @@ fn lay_missing_lanes_of<const L: usize, const V: usize>(
 /// Lines along the middle of an eighth and beside it, half an eighth apart, the nearest first.
 fn lines_beside(strips: &Strips<'_>, span: Span) -> impl Iterator<Item = f32> {
     let (middle, half) = (strips.centre_line(span), (span[1] - span[0]) / 2.0);
-    let side = move |k: u32| if k % 2 == 0 { half } else { -half };
+    let side = move |k: u32| if k.is_multiple_of(2) { half } else { -half };
     (0..=2 * STRIP_PARTS).map(move |k| middle + side(k) * k.div_ceil(2) as f32)
 }
 
