@@ -9,6 +9,7 @@
 //! | `sweep.rs` | the direction of the lanes: least width, rotating calipers |
 //! | `tracks.rs` | back-and-forth lanes over concave areas, holes and no-fly zones: `strips.rs` lays them, `lanes.rs` holds them |
 //! | `patches.rs` | more lanes where a no-fly zone covers a lane and not what it should photograph |
+//! | `cells.rs` | lanes in cells that are flown back and forth: a first order |
 //! | `order.rs` | the order and the directions in which lanes are flown |
 //! | `transit.rs` | shortest ways around no-fly zones |
 //! | `around.rs` | the path home, or aside, of a vehicle that leaves its route |
@@ -26,6 +27,7 @@
 pub mod area;
 pub mod around;
 pub mod bound;
+mod cells;
 pub mod divide;
 pub mod exact;
 mod flat;

@@ -91,7 +91,10 @@ pub const BOUNDS: &[(&str, &str)] = &[
         "320² looks at most, each at edges of zones, all things, half nodes of a field",
     ),
     ("around::plan_vehicle_detour, 128 things", "the same"),
-    ("tracks::build, 256 vertices", "lanes · vertices, and 2000 looks at the lanes' order, each one way"),
+    (
+        "tracks::build, 256 vertices",
+        "lanes · vertices, and 2000 looks at the lanes' order, few of which take a way",
+    ),
     ("tracks::build, 512 lanes", "the same"),
     ("lanes::Tracks::waypoint", "log of the lanes"),
     ("lanes::Tracks::distance_to_waypoint_m", "log of the lanes"),

@@ -155,11 +155,12 @@ impl<'a> Area<'a> {
             .flat_map(|(_, ring)| edges_of(ring))
     }
 
-    /// Edges of the no-fly zones.
-    pub(super) fn no_fly_edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
-        self.rings_with_kind()
-            .filter(|(kind, _)| *kind == RingKind::NoFly)
-            .flat_map(|(_, ring)| edges_of(ring))
+    /// The same rings of other vertices: of the same places in another frame.
+    pub(super) fn with_vertices<'b>(&self, vertices: &'b [Flat]) -> Area<'b>
+    where
+        'a: 'b,
+    {
+        Area { vertices, rings: self.rings }
     }
 
     /// Whether a place is to be photographed: inside outer rings and holes an odd number of times. No-fly zones are not

@@ -48,6 +48,11 @@ impl<const N: usize> Intervals<N> {
         self.spans.retain(|[from, to]| to - from >= least);
     }
 
+    /// Removes the interiors of another set's intervals.
+    pub(super) fn remove_all(&mut self, other: &Self) -> Result<(), CoverageError> {
+        other.spans().iter().try_for_each(|span| self.remove(*span))
+    }
+
     /// Removes the interior of an interval from the set; the interval's end points stay.
     pub(super) fn remove(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
         let mut i = self.spans.partition_point(|span| span[1] <= from);

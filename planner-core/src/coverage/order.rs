@@ -1,23 +1,31 @@
 //! The order in which lanes are flown, and each one's direction: the shortest way from lane to lane.
 //!
 //! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1), from the end where that joins them by
-//! less. Elsewhere a first order takes the
-//! nearest end each time; then parts are turned round (2-opt) and up to three lanes moved (Or-opt) as long as that
-//! shortens the way, or until the looks are used up. Both ends of the way are free. O(n²) distances a round, bounded by
-//! `steps_left`.
+//! less. Elsewhere a first order takes one cell after the other ([`super::cells`]). Parts of it are turned round (2-opt) and up
+//! to ten cells moved (Or-opt) as long as that shortens the way. Lanes that are laid for what no strip shows
+//! ([`super::patches`]) are put where they make the way longer by least; then the same is done with lanes instead of cells,
+//! until the looks are used up. Both ends of the way are free. O(n²) sums a round, bounded by `steps_left`: ways between lanes
+//! that follow each other are kept, and a distance around zones is taken only where straight lines would be shorter.
 
 use super::Flat;
+use super::cells::{is_break, order_cells};
 use super::lanes::Lane;
 use super::transit::Transit;
 use crate::Length;
 
 /// Least shortening of the tour that counts, metres: a smaller gain is rounding.
 const MIN_GAIN_M: f32 = 1e-3;
-/// Most lanes that Or-opt moves together.
-const MAX_MOVED_LANES: usize = 3;
+/// Most cells, then lanes, that Or-opt moves together.
+const MAX_MOVED: usize = 10;
 
-/// Sorts lanes into the order and the directions in which they are flown.
-pub(super) fn order_lanes<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>, looks: u32) {
+/// Sorts lanes into the order and the directions in which they are flown. The first `strips` of them are along the middle of
+/// strips, in the strips' order and grouped into cells.
+pub(super) fn order_lanes<const N: usize>(
+    lanes: &mut [Lane],
+    strips: usize,
+    transit: &Transit<'_, N>,
+    looks: u32,
+) {
     if lanes.windows(2).all(|pair| pair[0].strip < pair[1].strip) {
         let first = usize::from(!should_reverse_first(lanes));
         for lane in lanes.iter_mut().skip(first).step_by(2) {
@@ -25,9 +33,16 @@ pub(super) fn order_lanes<const N: usize>(lanes: &mut [Lane], transit: &Transit<
         }
         return;
     }
-    order_nearest_first(lanes, transit);
     let mut search = LaneOrderSearch { transit, steps_left: looks };
-    while search.two_opt(lanes) | search.or_opt(lanes) {}
+    order_cells(&mut lanes[..strips], transit);
+    (1..=strips).for_each(|k| search.measure_links(&mut lanes[..strips], &[k]));
+    search.shorten(&mut lanes[..strips]);
+    (strips..lanes.len()).for_each(|k| search.insert_last(&mut lanes[..=k]));
+    // From here on each lane is moved by itself.
+    for (lane, k) in lanes.iter_mut().zip(0..) {
+        lane.first = k;
+    }
+    search.shorten(lanes);
 }
 
 /// Whether lanes in a row, flown back and forth, are joined by less if the first one is turned.
@@ -40,35 +55,19 @@ fn should_reverse_first(lanes: &[Lane]) -> bool {
     gain_m > MIN_GAIN_M
 }
 
-/// Order that begins with the first lane and always goes to the nearest end.
-fn order_nearest_first<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
-    for done in 1..lanes.len() {
-        let here = lanes[done - 1].to;
-        let mut best = (f32::INFINITY, done, false);
-        for (i, lane) in lanes.iter().enumerate().skip(done) {
-            for (end, turned) in [(lane.from, false), (lane.to, true)] {
-                // No way is shorter than the straight one.
-                if (end - here).length() < best.0 {
-                    let way = transit.distance_m(&here, &end);
-                    if way < best.0 {
-                        best = (way, i, turned);
-                    }
-                }
-            }
-        }
-        lanes.swap(done, best.1);
-        if best.2 {
-            lanes[done].reverse();
-        }
-    }
-}
-
+/// Changes of an order. Meanwhile `start_m` of a lane is the length of the way from it to the next one.
 struct LaneOrderSearch<'t, 'a, const N: usize> {
     transit: &'t Transit<'a, N>,
     steps_left: u32,
 }
 
 impl<const N: usize> LaneOrderSearch<'_, '_, N> {
+    /// Changes the order as long as that shortens the way.
+    #[inline(never)]
+    fn shorten(&mut self, lanes: &mut [Lane]) {
+        while self.or_opt(lanes) | self.two_opt(lanes) {}
+    }
+
     /// Uses up one search step. Returns false if none is left.
     fn take_search_step(&mut self) -> bool {
         let left = self.steps_left > 0;
@@ -84,18 +83,30 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         }
     }
 
+    /// Measures the ways to these lanes from those before them.
+    #[inline(never)]
+    fn measure_links(&self, lanes: &mut [Lane], to: &[usize]) {
+        for &k in to.iter().filter(|k| **k > 0) {
+            let next = lanes.get(k).map(|lane| lane.from);
+            lanes[k - 1].start_m = self.transit_length_m(Some(lanes[k - 1].to), next);
+        }
+    }
+
     /// 2-opt: reverses parts of the order where that shortens the path.
     fn two_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         for i in 0..lanes.len() {
             for j in i..lanes.len() {
+                if !is_break(lanes, i) || !is_break(lanes, j + 1) {
+                    continue;
+                }
                 if !self.take_search_step() {
                     return false;
                 }
+                let old = link_before_m(lanes, i) + lanes[j].start_m;
                 let before = i.checked_sub(1).map(|k| lanes[k].to);
                 let after = lanes.get(j + 1).map(|lane| lane.from);
                 let (from, to) = (lanes[i].from, lanes[j].to);
-                let old = self.transit_length_m(before, Some(from)) + self.transit_length_m(Some(to), after);
                 // No way is shorter than the straight one.
                 if straight_distance_m(before, to) + straight_distance_m(after, from) > old - MIN_GAIN_M {
                     continue;
@@ -103,6 +114,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
                 let new = self.transit_length_m(before, Some(to)) + self.transit_length_m(Some(from), after);
                 if new < old - MIN_GAIN_M {
                     reverse_lanes(&mut lanes[i..=j]);
+                    self.measure_links(lanes, &[i, j + 1]);
                     gained = true;
                 }
             }
@@ -110,57 +122,98 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// Or-opt: moves up to [`MAX_MOVED_LANES`] lanes that follow each other, as they are or turned round.
+    /// Or-opt: moves up to [`MAX_MOVED`] cells or lanes that follow each other, as they are or turned round.
     fn or_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();
-        for len in 1..=MAX_MOVED_LANES.min(count.saturating_sub(1)) {
+        for len in 1..=MAX_MOVED.min(count.saturating_sub(1)) {
             for i in 0..=count - len {
+                if !is_break(lanes, i) || !is_break(lanes, i + len) {
+                    continue;
+                }
+                if !self.take_search_step() {
+                    return false;
+                }
                 let Some((to, turned)) = self.best_insertion(lanes, i, len) else { continue };
                 if turned {
                     reverse_lanes(&mut lanes[i..i + len]);
                 }
-                if to < i {
+                let moved = if to < i {
                     lanes[to..i + len].rotate_right(len);
+                    [to, to + len, i + len]
                 } else {
                     lanes[i..to].rotate_left(len);
-                }
+                    [i, to - len, to]
+                };
+                self.measure_links(lanes, &moved);
                 gained = true;
             }
         }
-        gained && self.steps_left > 0
+        gained
     }
 
     /// The best place for `len` lanes from `i` on: they would stand before the lane that is at it now.
     fn best_insertion(&mut self, lanes: &[Lane], i: usize, len: usize) -> Option<(usize, bool)> {
-        let (from, to) = (lanes[i].from, lanes[i + len - 1].to);
         let before = i.checked_sub(1).map(|k| lanes[k].to);
         let after = lanes.get(i + len).map(|lane| lane.from);
-        let saved = self.transit_length_m(before, Some(from)) + self.transit_length_m(Some(to), after)
-            - self.transit_length_m(before, after);
-        let mut best = (MIN_GAIN_M, None);
-        for place in (0..i).chain(i + len + 1..=lanes.len()) {
+        let links_m = link_before_m(lanes, i) + lanes[i + len - 1].start_m;
+        if links_m - before.map_or(0.0, |before| straight_distance_m(after, before)) <= MIN_GAIN_M {
+            return None;
+        }
+        let mut best =
+            Insertion { more_m: links_m - self.transit_length_m(before, after) - MIN_GAIN_M, at: None };
+        for place in (0..i).chain(i + len + 1..=lanes.len()).filter(|k| is_break(lanes, *k)) {
             if !self.take_search_step() {
                 break;
             }
-            let left = place.checked_sub(1).map(|k| lanes[k].to);
-            let right = lanes.get(place).map(|lane| lane.from);
-            let gap = self.transit_length_m(left, right);
-            for (first, last, turned) in [(from, to, false), (to, from, true)] {
-                if saved + gap - straight_distance_m(left, first) - straight_distance_m(right, last) <= best.0
-                {
-                    continue;
-                }
-                let gain = saved + gap
-                    - self.transit_length_m(left, Some(first))
-                    - self.transit_length_m(Some(last), right);
-                if gain > best.0 {
-                    best = (gain, Some((place, turned)));
-                }
+            self.try_insertion(lanes, place, [lanes[i].from, lanes[i + len - 1].to], &mut best);
+        }
+        best.at
+    }
+
+    /// Puts the last lane where it makes the way longer by least.
+    fn insert_last(&self, lanes: &mut [Lane]) {
+        let Some((last, others)) = lanes.split_last_mut() else { return };
+        last.start_m = 0.0;
+        let mut best = Insertion { more_m: f32::INFINITY, at: None };
+        (0..=others.len())
+            .for_each(|place| self.try_insertion(others, place, [last.from, last.to], &mut best));
+        let Some((place, turned)) = best.at else { return };
+        if turned {
+            last.reverse();
+        }
+        lanes[place..].rotate_right(1);
+        self.measure_links(lanes, &[place, place + 1]);
+    }
+
+    /// Whether the way becomes longer by less where a part with these ends comes before a lane.
+    #[inline(never)]
+    fn try_insertion(&self, lanes: &[Lane], place: usize, [from, to]: [Flat; 2], best: &mut Insertion) {
+        let left = place.checked_sub(1).map(|k| lanes[k].to);
+        let right = lanes.get(place).map(|lane| lane.from);
+        let gap = link_before_m(lanes, place);
+        for (first, last, turned) in [(from, to, false), (to, from, true)] {
+            if straight_distance_m(left, first) + straight_distance_m(right, last) - gap >= best.more_m {
+                continue;
+            }
+            let more_m =
+                self.transit_length_m(left, Some(first)) + self.transit_length_m(Some(last), right) - gap;
+            if more_m < best.more_m {
+                *best = Insertion { more_m, at: Some((place, turned)) };
             }
         }
-        best.1
     }
+}
+
+/// Where a part of the order is put: by how much the way becomes longer; before which lane, and whether turned round.
+struct Insertion {
+    more_m: f32,
+    at: Option<(usize, bool)>,
+}
+
+/// Length of the way to a lane from the one before it.
+fn link_before_m(lanes: &[Lane], k: usize) -> f32 {
+    k.checked_sub(1).map_or(0.0, |before| lanes[before].start_m)
 }
 
 fn straight_distance_m(from: Option<Flat>, to: Flat) -> f32 {
@@ -170,9 +223,11 @@ fn straight_distance_m(from: Option<Flat>, to: Flat) -> f32 {
 /// Flies lanes the other way, the last one first.
 fn reverse_lanes(lanes: &mut [Lane]) {
     lanes.reverse();
-    for lane in lanes {
-        lane.reverse();
+    // The way that led to a lane now leads from it.
+    for k in 1..lanes.len() {
+        lanes[k - 1].start_m = lanes[k].start_m;
     }
+    lanes.iter_mut().for_each(Lane::reverse);
 }
 
 #[cfg(test)]

@@ -10,9 +10,10 @@
 
 use super::CoverageError;
 use super::area::{Area, AreaError};
+use super::cells;
 use super::order;
 use super::patches;
-use super::strips::Strips;
+use super::strips::{LaneFrame, Strips};
 use super::sweep::{LaneDirection, least_width};
 use super::transit::Transit;
 
@@ -37,25 +38,35 @@ pub fn build<const L: usize, const V: usize, const N: usize>(
     if area.vertices().len() > V {
         return Err(AreaError::AreaFull.into());
     }
+    let Workspace { vertices, sets } = ws;
     let direction = match pattern.angle_deg {
         Some(angle) if angle.is_finite() => LaneDirection::at_deg(angle),
         Some(_) => return Err(CoverageError::Setting("angle_deg")),
-        None => least_width(area, &mut ws.hull)?,
+        None => least_width(area, vertices)?,
     };
-    let strips = Strips::new(area, pattern, direction)?;
     out.lanes.clear();
     out.along = direction.along;
+    let frame = LaneFrame::new(area, direction);
+    vertices.clear();
+    vertices.extend_from_slice(area.vertices()).map_err(|_| AreaError::AreaFull)?;
+    vertices.iter_mut().for_each(|vertex| *vertex = frame.to_frame(vertex));
+    let strips = Strips::new(&area.with_vertices(vertices), pattern)?;
     for strip in 0..strips.count {
         let span = strips.strip_borders(strip);
-        strips.compute_needed(span, ws)?;
-        strips.lay_lanes(strip as u16, strips.centre_line(span), ws, out)?;
+        strips.compute_needed(span, sets)?;
+        strips.lay_lanes(strip as u16, strips.centre_line(span), sets, out)?;
     }
+    let count = out.lanes.len();
     if area.has_no_fly() {
-        patches::lay_missing_lanes(&strips, ws, out)?;
+        patches::lay_missing_lanes(&strips, sets, out)?;
+    }
+    cells::group_into_cells(&mut out.lanes[..count]);
+    for lane in &mut out.lanes {
+        (lane.from, lane.to) = (frame.to_place(&lane.from), frame.to_place(&lane.to));
     }
     if out.lanes.is_empty() {
         return Err(CoverageError::NothingToCover);
     }
-    order::order_lanes(&mut out.lanes, transit, pattern.search_steps);
+    order::order_lanes(&mut out.lanes, count, transit, pattern.search_steps);
     out.number_waypoints(&pattern.spacing, transit)
 }

@@ -98,6 +98,7 @@ impl<'a, const N: usize> Transit<'a, N> {
     }
 
     /// Whether a straight line stays outside all no-fly zones.
+    #[inline(never)]
     pub fn is_line_clear(&self, from: &Flat, to: &Flat) -> bool {
         if !self.area.has_no_fly() {
             return true;
@@ -106,16 +107,22 @@ impl<'a, const N: usize> Transit<'a, N> {
         let (across, up) = (sorted(from.x, to.x), sorted(from.y, to.y));
         // Both ends of an edge beyond the same end of the line, on one axis.
         let beyond = |a: f32, b: f32, (low, high): (f32, f32)| (a > high && b > high) || (a < low && b < low);
-        let meets = |(a, b): (Flat, Flat)| {
-            if beyond(a.x, b.x, across) || beyond(a.y, b.y, up) {
-                return false;
-            }
-            let (along, edge) = (to - from, b - a);
-            let (p, q) = (along.perp(&(a - from)), along.perp(&(b - from)));
-            let (r, s) = (edge.perp(&(from - a)), edge.perp(&(to - a)));
-            p * q <= 0.0 && r * s <= 0.0
-        };
-        !self.area.no_fly_edges().any(meets)
+        let along = to - from;
+        let zones = self.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly);
+        zones.map(|(_, ring)| ring).all(|ring| {
+            // An edge is looked at where its ends are on different sides of the line: of few edges.
+            let mut a = ring[ring.len() - 1];
+            let mut p = along.perp(&(a - from));
+            ring.iter().all(|&b| {
+                let q = along.perp(&(b - from));
+                let meets = p * q <= 0.0 && !beyond(a.x, b.x, across) && !beyond(a.y, b.y, up) && {
+                    let edge = b - a;
+                    edge.perp(&(from - a)) * edge.perp(&(to - a)) <= 0.0
+                };
+                (a, p) = (b, q);
+                !meets
+            })
+        })
     }
 
     /// Length of the shortest path; infinite where there is none.
@@ -123,23 +130,34 @@ impl<'a, const N: usize> Transit<'a, N> {
         if self.is_line_clear(from, to) {
             return (to - from).length();
         }
-        let mut ends: Vec<(usize, f32), N> = Vec::new();
-        for (i, corner) in self.corners.iter().enumerate() {
-            if self.is_line_clear(corner, to) {
-                let _ = ends.push((i, (to - corner).length()));
+        let far_m = |place: &Flat| self.corners.iter().map(|corner| (corner - place).length()).collect();
+        let (mut first_m, mut last_m): (Vec<f32, N>, Vec<f32, N>) = (far_m(from), far_m(to));
+        // The shortest way of those over corners that may be hidden: a look costs more than the sums, so only at its ends.
+        loop {
+            let mut best = (f32::INFINITY, 0, 0);
+            for (i, first) in first_m.iter().enumerate().filter(|(_, first)| first.is_finite()) {
+                // No way over a corner is shorter than straight on from it.
+                if first + (to - self.corners[i]).length() >= best.0 {
+                    continue;
+                }
+                for (j, last) in last_m.iter().enumerate() {
+                    let whole = first + self.between_m[i][j] + last;
+                    if whole < best.0 {
+                        best = (whole, i, j);
+                    }
+                }
+            }
+            let (least, i, j) = best;
+            if least.is_infinite() {
+                return least;
+            }
+            let seen = [self.is_line_clear(from, &self.corners[i]), self.is_line_clear(&self.corners[j], to)];
+            match seen {
+                [true, true] => return least,
+                [false, _] => first_m[i] = f32::INFINITY,
+                [true, false] => last_m[j] = f32::INFINITY,
             }
         }
-        let mut least = f32::INFINITY;
-        for (i, corner) in self.corners.iter().enumerate() {
-            let first = (corner - from).length();
-            let rest = ends.iter().map(|&(j, last)| self.between_m[i][j] + last);
-            let whole = first + rest.fold(f32::INFINITY, fminf);
-            // A look costs more than the sums: only at what would be shorter.
-            if whole < least && self.is_line_clear(from, corner) {
-                least = whole;
-            }
-        }
-        least
     }
 
     /// The corners of the shortest way between two places, in order, without the places themselves.
@@ -180,3 +198,6 @@ impl<const N: usize> Default for Transit<'_, N> {
 fn cos_from_sin(sine: f32) -> f32 {
     fpu::sqrtf(libm::fmaxf(1.0 - sine * sine, 0.0))
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,8 +5,9 @@
 //! fields in metres, lane angle (ours of least width) and lane width; no headland, straight connections, one vehicle, no
 //! transit. Ours is from the vertices to all lanes in order, around obstacles; theirs is the best of what it offers
 //! ([`routes`]). Its route planner on OR-tools is not built.
-//! Lengths are of all lanes and the connections between them. Ours twice: lanes in the order in which they are first laid,
-//! which has limits, and `searched` as long as the desk does, which has none.
+//! Lengths are of all lanes and the connections between them. Ours twice: as boards plan, which look at few changes of the
+//! lanes' order, and `searched` as long as the desk does. `length for what is swept` is theirs divided by the share of the field
+//! that its lanes sweep: ours show all of it, by the test `coverage`.
 //!
 //! Our lanes are longer by what photographs slanted borders whole; theirs end at the border.
 
@@ -19,6 +20,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
+use companion::planner::coverage::MAX_ORDER_CHANGES as MAX_ORDER_CHANGES_ON_BOARD;
 use flockmate_tests::{shared_data, workspace};
 use host_sim::coverage::{MAX_CORNERS, MAX_LANES, MAX_ORDER_CHANGES};
 use host_sim::scenario;
@@ -204,7 +206,7 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
 
 /// The rows of a field.
 fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec<Row>> {
-    let (first, angle) = ours(field, lane_m, 0)?;
+    let (first, angle) = ours(field, lane_m, MAX_ORDER_CHANGES_ON_BOARD)?;
     let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
     println!(
         "{name}: ours {:.1} m ({:.1} m of lanes), {} crossings",
@@ -226,6 +228,7 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
     let shortest =
         theirs.iter().min_by(|a, b| a.total_m.total_cmp(&b.total_m)).context("theirs has a way")?;
     let (total_m, time_us) = (shortest.total_m, shortest.time_us);
+    let swept_share = field.swept_share(shortest, lane_m);
     let row = |what, ours: f64, theirs: f64, required, unit| Row {
         name: format!("{name}, {what}"),
         ours,
@@ -237,6 +240,7 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
     };
     Ok(vec![
         row("length", first.total_m, total_m, LENGTH, "m"),
+        row("length for what is swept", first.total_m, total_m / swept_share, 0.0, "m"),
         row("time", first.time_us, time_us, 10.0, "us"),
         row("searched, length", searched.total_m, total_m, 0.0, "m"),
         row("searched, time", searched.time_us, time_us, 0.0, "us"),
