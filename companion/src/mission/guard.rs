@@ -158,7 +158,8 @@ pub enum Guard {
     Hindered,
     /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be sought.
     NoRoomHere,
-    /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent there by any.
+    /// The way back to its pad, or the end of a path over an area, has been barred for the limit by a vehicle that rests, or the descent
+    /// of one that flies back by any.
     PadTaken,
     /// No place aside to land at exists.
     NoPlaceAside,
