@@ -174,6 +174,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             battery_critical: t.charge_below(self.config.battery_low_percent / 2),
             column_blocked_for: self.guidance.filter.column_blocked_for(now),
             column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
+            start_barred_for: self.mission.start_barred_for(now),
+            others_fly: self.neighbours.does_another_fly_its_part(),
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave

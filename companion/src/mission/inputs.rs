@@ -131,6 +131,10 @@ pub struct GuardInputs {
     pub column_blocked_for: Duration,
     /// Time for which a vehicle that stands for good, or is lost, has been in that column.
     pub column_blocked_for_good_for: Duration,
+    /// Time for which the column, or the path, has kept the vehicle on its pad.
+    pub start_barred_for: Duration,
+    /// Over an area another vehicle is in flight that takes part.
+    pub others_fly: bool,
     /// Time for which that column has been free.
     pub column_clear_for: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
