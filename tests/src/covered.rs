@@ -13,7 +13,7 @@ use host_sim::{scenario, swarm};
 
 /// Reason why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the
 /// lost one hovers where it was to fly.
-pub const EXPLAINED: [&str; 9] = [
+pub const EXPLAINED: [&str; 10] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
     "Vehicle on the path: planning the way home",
@@ -23,10 +23,24 @@ pub const EXPLAINED: [&str; 9] = [
     "No progress for 10 min: planning the way home",
     "No way around: landing",
     "No progress for 10 min: landing",
+    "Start barred for 3 min: others take its part",
 ];
 
 /// Reason why a vehicle lands beside its pad: another one may lie there, or come down.
 pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
+
+/// When the last of the other vehicles began to land, or to fly home, by [`lines`]: nobody takes over what this vehicle leaves later.
+pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
+    let mut ended: Vec<(&str, f64)> = Vec::new();
+    for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home")) {
+        let mut words = line.split_whitespace();
+        let (Some(Ok(at_s)), Some(who)) = (words.next().map(str::parse), words.next()) else { continue };
+        if who != format!("Some({vehicle})") && ended.iter().all(|(first, _)| *first != who) {
+            ended.push((who, at_s));
+        }
+    }
+    ended.iter().fold(0.0, |last, (_, at_s)| last.max(*at_s))
+}
 
 /// Whether this vehicle itself said why it lands short of its part, by [`lines`].
 pub fn says(log: &str, vehicle: u8, reasons: &[&str]) -> bool {

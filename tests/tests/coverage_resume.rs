@@ -76,6 +76,9 @@ fn outcome(seed: u64) -> Option<Outcome> {
     let mut outcome = Outcome { seed, starts: None, twice: 0, broken: false, said: String::new() };
     for start in 0..STARTS {
         let struck = format!("{text}{}", faults.get(start).map_or("", |lines| lines));
+        if std::env::var("FLOCKMATE_RESUMED").is_ok_and(|n| n == "1") {
+            println!("{struck}");
+        }
         let (result, log) = match fly(&struck, dir.path(), &mut pictures) {
             Ok(flown) => flown,
             Err(error) => {

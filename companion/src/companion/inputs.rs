@@ -175,6 +175,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             battery_critical: t.charge_below(self.config.battery_low_percent / 2),
             column_blocked_for: self.guidance.filter.column_blocked_for(now),
             column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
+            start_barred_for: self.mission.start_barred_for(now),
+            others_fly: self.neighbours.does_another_fly_its_part(),
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave
@@ -182,11 +184,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.guidance.returning
                 && (self.config.division.is_none() || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
-            pad_blocked_for: match follow && (self.guidance.returning || self.detours.is_homeward()) {
-                true if self.guidance.is_descending() => self.guidance.filter.hindered_for(now),
-                true => self.guidance.filter.blocked_for_good_for(now),
-                false => Duration::default(),
-            },
+            pad_blocked_for: self.pad_blocked_for(),
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
             lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
@@ -205,6 +203,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             no_way_around: self.detours.has_given_up(),
             time_below_landing: self.detours.time_below_landing(&view),
             standing,
+        }
+    }
+
+    /// Time for which the descent to its pad, or the way there, has been barred.
+    fn pad_blocked_for(&self) -> Duration {
+        let follow = self.mission.state() == State::Follow;
+        let homeward = self.guidance.returning || self.detours.is_homeward();
+        let descends = self.guidance.is_descending();
+        match follow && (homeward || (descends && self.config.division.is_some())) {
+            true if homeward && descends => self.guidance.filter.hindered_for(self.now),
+            // At the end of its path over an area there is no other way to its pad either.
+            true => self.guidance.filter.blocked_for_good_for(self.now),
+            false => Duration::default(),
         }
     }
 

@@ -40,6 +40,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.step_division();
         self.report_unstarted_vehicle();
         self.scan_for_obstacles();
+        self.note_barred_start();
         self.run_mission_table();
         self.step_task();
         let situation = self.request_context();
@@ -67,6 +68,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
         };
         self.mission.step_task(along, self.now, &mut self.links);
+    }
+
+    /// Notes whether something keeps it on its pad: a vehicle in its column, or what is on its path.
+    fn note_barred_start(&mut self) {
+        let waits = self.mission.state() == State::Scheduled && !self.mission.pending().pause;
+        let barred = waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked());
+        self.mission.note_start_barred(barred, self.now);
     }
 
     /// Reports a vehicle that has not started while this one waits for it.

@@ -10,7 +10,7 @@ use crate::link::Links;
 use crate::link::commands::{self, Command, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
 use crate::mission::task::{PathProgress, Tasks};
-use crate::mission::waits::WaitReport;
+use crate::mission::waits::Waits;
 use crate::mission::{Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
 
@@ -46,7 +46,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     failure: Option<PlanFailure>,
     /// Since when the estimate is worse than the margin leaves at a crawl.
     imprecise_since: Option<Instant>,
-    wait_report: WaitReport,
+    waits: Waits,
     tasks: Tasks,
     photographed: PhotographedWaypoints,
     /// Divisions that count for the plan.
@@ -75,7 +75,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             home: (start, start.z, 0.0),
             failure: None,
             imprecise_since: None,
-            wait_report: WaitReport::default(),
+            waits: Waits::default(),
             tasks: Tasks::default(),
             photographed: PhotographedWaypoints::default(),
             division: 0,
@@ -169,7 +169,17 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// The vehicle waits for the vehicle `id`, which has not started, or for none (0). Returns
     /// whether `id` is to be reported.
     pub(crate) fn should_report_wait(&mut self, id: u8, now: Instant) -> bool {
-        self.wait_report.update(id, now)
+        self.waits.report.update(id, now)
+    }
+
+    /// Notes whether something bars the start of the vehicle.
+    pub(crate) fn note_start_barred(&mut self, barred: bool, now: Instant) {
+        self.waits.barred_start.update(barred, now);
+    }
+
+    /// Time for which the start has been barred.
+    pub(crate) fn start_barred_for(&self, now: Instant) -> Duration {
+        self.waits.barred_start.lasts_for(now)
     }
 
     /// Takes a command in and says the result; `None` for one that is not the mission's.

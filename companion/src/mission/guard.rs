@@ -152,13 +152,16 @@ pub enum Guard {
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
+    /// Over an area, on the pad: another vehicle has been above it, or something on the path, for the limit, and others fly on.
+    StartBarred,
     /// The safety filter has made this vehicle yield for the limit, and it does not seek its path home.
     Yielded,
     /// The safety filter has kept this vehicle from continuing for the limit, and it does not seek its path home.
     Hindered,
     /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be sought.
     NoRoomHere,
-    /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent there by any.
+    /// The way back to its pad, or the end of a path over an area, has been barred for the limit by a vehicle that rests, or the descent
+    /// of one that flies back by any.
     PadTaken,
     /// No place aside to land at exists, or the answer has not come within the limit.
     NoPlaceAside,
@@ -297,6 +300,7 @@ impl Guard {
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear_for >= limit,
             Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,
+            Self::StartBarred => i.start_barred_for >= limit && i.others_fly,
             Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
             Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,

@@ -131,11 +131,16 @@ pub struct GuardInputs {
     pub column_blocked_for: Duration,
     /// Time for which a vehicle that stands for good, or is lost, has been in that column.
     pub column_blocked_for_good_for: Duration,
+    /// Time for which the column, or the path, has kept the vehicle on its pad.
+    pub start_barred_for: Duration,
+    /// Over an area another vehicle is in flight that takes part.
+    pub others_fly: bool,
     /// Time for which that column has been free.
     pub column_clear_for: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
-    /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way by a vehicle that stands for good.
+    /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way, and at the end of a
+    /// path over an area the descent, by one that stands for good.
     pub pad_blocked_for: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,

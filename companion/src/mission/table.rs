@@ -77,6 +77,9 @@ const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
 /// A vehicle that does not come to its setpoint for this long is held by something, or carried away.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
+/// A vehicle over an area that cannot start for this long leaves its part to those that fly: a lost vehicle that may come down above
+/// its pad takes less to be down.
+const START_BARRED_MOST: Duration = secs(180);
 
 use Action as A;
 use Guard as G;
@@ -216,6 +219,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Scheduled],        G::NeighboursSilent, secs(10),  Scheduled,   A::None,              "No neighbour hears us: start waits"),
     warning_row(&[Scheduled],        G::PlansDiffer,     secs(10),   Scheduled,   A::None,              "Another plan is heard: start waits"),
     info_row(&[Scheduled],           G::GatesOpen,       AT_ONCE,    Streaming,   A::HoldHere,          ""),
+    warning_row(&[Scheduled],        G::StartBarred,     START_BARRED_MOST, Aborted, A::ForgetStart,    "Start barred for 3 min: others take its part"),
     warning_row(&[Streaming, Engaging], G::ColumnBlocked, COLUMN_BLOCKED_MOST, Scheduled, A::None,      "Vehicle above the pad: start waits"),
     info_row(&[Streaming],           G::Elapsed,         secs(1),    Engaging,    A::RequestOffboard,   ""),
     info_row(&[Engaging],            G::Offboard,        AT_ONCE,    Arming,      A::RequestArming,     "Setpoints followed: arming"),

@@ -225,6 +225,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::StartAgain => i.start = true,
         G::StartOverField => (i.start, i.area) = (true, true),
         G::StalledOverField => (i.stalled_for, i.over_field) = (long, true),
+        G::StartBarred => (i.start_barred_for, i.others_fly) = (long, true),
         G::StandsToReturn => i.stands_to_return = true,
         G::WayHomeReady => (i.detour_ready, i.homeward) = (true, true),
         G::NoWayHome => (i.seeking_home_for, i.can_turn_back) = (Some(long), true),

@@ -205,7 +205,8 @@ impl<const V: usize> Fleet<V> {
         self.is_alive(self.own) && !self.divisions.is_full() && asked
     }
 
-    fn is_alive(&self, rank: usize) -> bool {
+    /// Whether this vehicle of the roster takes part.
+    pub(crate) fn is_alive(&self, rank: usize) -> bool {
         let member = &self.members[rank];
         member.in_roster && member.entry.status == MemberStatus::Alive
     }

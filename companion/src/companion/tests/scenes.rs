@@ -75,6 +75,7 @@ fn every_row_has_its_scene() {
         landings::end_aside,
         losses::another_leaves,
         losses::the_others_give_it_up,
+        losses::another_bars_the_start,
         homeward::is_ordered,
         homeward::flies_around,
         homeward::is_blocked,

@@ -149,7 +149,9 @@ impl Guidance {
             } else {
                 safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m())
             };
-            let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m);
+            // Where there is no other place what may have fallen beside it keeps nobody in the air.
+            let fallen = Some(now).filter(|_| !lands_late);
+            let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
             let below = || {
                 floor_m.is_some_and(may_lie_below)
                     || (comes_down && contact.comes_home(now, &place, safety_m))

@@ -61,6 +61,12 @@ pub(super) const STRETCH_PLACES: f32 = 8.0;
 pub(super) const MAX_COLUMN_M: f32 = 60.0;
 /// Silence after which an airborne vehicle may land before it is heard again.
 pub(super) const MAY_LAND_AFTER: Duration = Duration::from_secs(3);
+/// How far the wind takes a vehicle aside that falls with its motors off, for each metre of height: it falls at 10 m/s, and gusts of
+/// 3 m/s push it at half of that.
+pub(super) const FALL_DRIFT_SHARE: f32 = 0.15;
+/// Time for which such a vehicle goes on as fast as it was when it was last heard, seconds: a second until it falls, and what its fall
+/// leaves of its speed.
+pub(super) const FALL_CARRY_S: f32 = 2.0;
 /// Height difference, metres: this vehicle has time while a vehicle of known height is further
 /// above it.
 pub(super) const FAR_BELOW_M: f32 = 15.0;

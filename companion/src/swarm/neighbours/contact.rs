@@ -315,6 +315,24 @@ impl NeighbourEntry {
             && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
+    /// Where it may have fallen, its motors off, if it is silent over an area: from its place as far as its speed took it, and so much
+    /// aside, metres.
+    #[inline(never)]
+    pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
+        let silent = self.is_leased() && self.is_under_way() && !self.heard_within(now, MAY_LAND_AFTER);
+        let (here, velocity) = (self.state.position, self.state.velocity);
+        let carried = Point::new(velocity.x, velocity.y, 0.0) * FALL_CARRY_S;
+        silent.then(|| ([here, here + carried], self.fall_aside_m()))
+    }
+
+    /// How far aside from where its speed takes it it may fall, metres.
+    #[inline(always)]
+    pub(super) fn fall_aside_m(&self) -> f32 {
+        let high_m = self.state.position.z - self.ground_m;
+        // NaN counts as none.
+        if high_m > 0.0 { FALL_DRIFT_SHARE * high_m } else { 0.0 }
+    }
+
     /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a place. No pads are as near to each other.
     pub(crate) fn comes_home(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;

@@ -55,6 +55,13 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
+    /// Whether another vehicle that takes part is in flight.
+    pub(crate) fn does_another_fly_its_part(&self) -> bool {
+        let flies = |c: &&NeighbourEntry| c.heard_at.is_some() && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
+        let mut others = self.contacts[..self.roster].iter().filter(flies);
+        self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
+    }
+
     /// Handles what another vehicle reports of all. `waits`: this one has not been started.
     pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, waits: bool) {
         let rank = self.roster_index(id).map(|at| usize::from(self.contacts[at].rank));

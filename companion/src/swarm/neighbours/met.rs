@@ -107,6 +107,9 @@ impl NeighbourEntry {
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
         let flies_on = self.is_leased() && !(reach.on_plan && self.on_plan());
+        if reach.lands && self.is_leased() {
+            reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
+        }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
             reaches(self.unheard_distance_m() + self.place_on_points.flown_beyond_m() + OFF_REPORTED_PATH_M);
         }

@@ -108,13 +108,17 @@ impl<const V: usize> Neighbours<V> {
             };
             let from = contact.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
+            // A place to land at is sought at one height, and as far away as the landing keeps.
+            let level = |at: Point| Point::new(at.x, at.y, height_m);
+            let mut bar = |[a, b]: [Point; 2], wider_m: f32| {
+                zone(level(a), level(b), apart_m + self.pair_position_error_m + wider_m);
+            };
             if contact.may_fly_on(now) {
-                // A place to land at is sought at one height, and as far away as the landing keeps.
-                let level = |at: Point| Point::new(at.x, at.y, height_m);
-                let mut bar =
-                    |a: Point, b: Point| zone(level(a), level(b), apart_m + self.pair_position_error_m);
-                contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], _| bar(at, next));
-                contact.pad.into_iter().for_each(|pad| bar(pad, pad));
+                contact.for_each_leg(contact.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
+                contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
+            }
+            if let Some((leg, aside_m)) = contact.fall(now) {
+                bar(leg, aside_m);
             }
         }
     }
@@ -130,19 +134,30 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column from `place` down to the
-    /// ground at `floor_m`: from where it may have come along its path it comes down, never up.
-    pub(crate) fn may_lie_below(&self, i: usize, place: &Point, floor_m: f32, apart_m: f32) -> bool {
+    /// ground at `floor_m`: from where it may have come along its path it comes down, never up. At the time `fallen`, if that is given,
+    /// it may have fallen too, and not straight down.
+    pub(crate) fn may_lie_below(
+        &self,
+        i: usize,
+        place: &Point,
+        floor_m: f32,
+        apart_m: f32,
+        fallen: Option<Instant>,
+    ) -> bool {
         let Some(contact) = self.contacts.get(i).filter(|c| c.is_under_way()) else { return false };
         let (mut below, low_m) = (false, floor_m - apart_m);
-        let mut near = |a: Point, b: Point| {
+        let mut near = |a: Point, b: Point, apart_m: f32| {
             let (leg, away) = ((b - a).xy(), (place - a).xy());
             let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
             let high = a.z > low_m || b.z > low_m;
             below |= high && (away - leg * share).norm_squared() < apart_m * apart_m;
         };
         contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
-            near(at, if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next });
+            near(at, if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next }, apart_m);
         });
+        if let Some(([from, to], aside_m)) = fallen.and_then(|now| contact.fall(now)) {
+            near(from, to, apart_m + aside_m);
+        }
         below
     }
 

@@ -369,7 +369,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let away = reach.own.away_from_box(&met.motion.position);
         let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
-        let below = lands && silent && table.may_lie_below(1, &place, -MAX_COLUMN_M, reach.within_m);
+        let below =
+            lands && silent && table.may_lie_below(1, &place, -MAX_COLUMN_M, reach.within_m, Some(now));
         if table.next_within(1, now, &reach).is_none() {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
@@ -399,9 +400,9 @@ fn nobody_falls_up() {
         let mut place = Point::from_fn(|_, _| uniform(&mut rng, -6.0, 6.0));
         place.z = uniform(&mut rng, 0.0, 30.0);
         let floor_m = place.z - uniform(&mut rng, 0.5, 20.0);
-        let says = table.may_lie_below(1, &place, floor_m, apart_m);
+        let says = table.may_lie_below(1, &place, floor_m, apart_m, None);
         let highest_m = points.iter().fold(from.z, |most, p| most.max(p.z));
-        let near = table.may_lie_below(1, &place, -1e6, apart_m);
+        let near = table.may_lie_below(1, &place, -1e6, apart_m, None);
         assert!(near || !says);
         if says {
             below += 1;

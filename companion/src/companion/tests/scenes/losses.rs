@@ -94,6 +94,35 @@ pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
     }
 }
 
+/// What bars the start for long leaves this one's part to others, unless none of them is in flight.
+pub(super) fn another_bars_the_start(scenes: &mut Scenes) {
+    let over_the_pad = |flags| flies(Point::new(8.0, 12.0, 3.0), flags);
+    let started_below = |b: &mut Bench, flags| {
+        b.neighbour = over_the_pad(flags);
+        b.start();
+        b.run(170.0);
+        assert_eq!(b.state(), Scheduled);
+    };
+    scenes.play(over_a_field(Ready), |b| started_below(b, ON_PLAN), Aborted, 15.0);
+    // A pause counts not.
+    let paused = |b: &mut Bench| {
+        started_below(b, ON_PLAN);
+        pause(b);
+        b.run(60.0);
+        resume(b);
+        b.run(170.0);
+        assert_eq!(b.state(), Scheduled);
+    };
+    scenes.play(over_a_field(Ready), paused, Aborted, 15.0);
+    let with_its_pilot = |b: &mut Bench| {
+        started_below(b, OUT_OF_PLAN);
+        b.run(60.0);
+        assert_eq!(b.state(), Scheduled);
+        b.neighbour = on_pad(ON_PLAN);
+    };
+    scenes.play(over_a_field(Ready), with_its_pilot, Follow, 30.0);
+}
+
 /// What the others know of a flight before does not keep a vehicle from a new one.
 #[test]
 fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {

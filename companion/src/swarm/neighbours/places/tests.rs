@@ -42,7 +42,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         table.handle_intent(now, 1, &heard, 1, Some(2));
         let beside = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0);
         let here = truly + beside.normalize() * (0.95 * apart_m);
-        assert!(table.may_lie_below(1, &here, 0.0, apart_m), "{points:?}, {here:?}");
+        assert!(table.may_lie_below(1, &here, 0.0, apart_m, None), "{points:?}, {here:?}");
         for up_m in [-10.0, 10.0] {
             let (mut ends, mut columns) = (false, false);
             let place = here + Point::new(0.0, 0.0, up_m);
@@ -62,11 +62,57 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
             let share = ((aside - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
             least.min((a + (b - a) * share - aside).norm())
         });
-        let free = !table.may_lie_below(1, &aside, 0.0, apart_m);
+        let free = !table.may_lie_below(1, &aside, 0.0, apart_m, None);
         assert_eq!(free, away_m >= apart_m, "{away_m}");
         *(if free { &mut far } else { &mut near }) += 1;
     }
     assert!(far > 1000 && near > 10, "{far} {near}");
+}
+
+/// Wherever a vehicle whose motors stop falls, from any height and in any wind up to 3 m/s, however long before that it was last heard:
+/// nobody lands beside it, and no place beside it is taken for free.
+#[test]
+fn where_a_vehicle_may_have_fallen_nobody_lands() {
+    let mut rng = Pcg32::seed_from_u64(16);
+    let apart_m = 2.0;
+    let (mut off_its_way, mut free) = (0, 0);
+    for case in 0..2000 {
+        let mut table = joined(0);
+        table.form_fleet(90.0, None, 1.0);
+        let from = Point::new(0.0, 0.0, uniform(&mut rng, 5.0, 120.0));
+        let mut velocity = Point::from_fn(|_, _| uniform(&mut rng, -6.0, 6.0));
+        velocity.z = uniform(&mut rng, -1.0, 0.0);
+        let points = [from, Point::new(0.0, 0.0, 0.0)].into_iter().collect();
+        let told = Intent { points, ground_m: 0.0, ..intent(0, 1, 2) };
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 0));
+        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        let contact = &mut table.contacts[1];
+        (contact.state.position, contact.state.velocity) = (from, velocity);
+        if case % 4 == 0 {
+            contact.flags |= OUT_OF_PLAN;
+        }
+        // As it is simulated: air holds it back, and half of the wind carries it.
+        let wind = 0.5 * 3.0 * Point::new(uniform(&mut rng, -0.7, 0.7), uniform(&mut rng, -0.7, 0.7), 0.0);
+        let mut at = from + velocity * uniform(&mut rng, 0.0, 1.0);
+        while at.z > 0.0 {
+            velocity += (wind - velocity - Point::new(0.0, 0.0, 9.81)) * 0.01;
+            at += velocity * 0.01;
+        }
+        let beside = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0);
+        let here = at + beside.normalize() * (0.9 * apart_m);
+        let now = Instant::from_millis(3100 + u64::from(rng.next_u32() % 200_000));
+        assert!(table.may_lie_below(1, &here, 0.0, apart_m, Some(now)), "{case}: {from:?}, {here:?}");
+        let mut ends = false;
+        table.for_each_landing_zone(now, [apart_m, here.z], |off| ends |= off.contains(&here));
+        assert!(ends, "{case}: {from:?}, {here:?}");
+        off_its_way += usize::from(!table.may_lie_below(1, &here, 0.0, apart_m, None));
+        // While it is heard it has not fallen, and it has not fallen far away.
+        let heard = Instant::from_millis(2900);
+        assert!(here.xy().norm() < apart_m || !table.may_lie_below(1, &here, 0.0, apart_m, Some(heard)));
+        let far = here.normalize() * 60.0;
+        free += usize::from(!table.may_lie_below(1, &far, 0.0, apart_m, Some(now)));
+    }
+    assert!(off_its_way > 1000 && free == 2000, "{off_its_way} {free}");
 }
 
 /// Wherever on the stretch a vehicle is that fell silent, a place that is kept off is half a spacing away at most: to its end, and
