@@ -115,7 +115,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     say!("{:9.3} s  flown around: {left} waypoints are left", began.elapsed().as_secs_f32());
                 }
                 Event::PlanRequested(wanted) => {
-                    let mut own = mission.answer_plan_request(&plan, index, wanted, &companion);
+                    let mut own = mission.answer_plan_request(&plan, index, wanted, &mut companion);
                     if let (Ok(own), None) = (&mut own, &args.swarm) {
                         own.gates.clear();
                         own.depart_s = 0.0;
