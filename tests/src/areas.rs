@@ -125,6 +125,16 @@ pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     text + &format!("radio_loss = {loss}\n")
 }
 
+/// The same without a camera: lanes as wide as a picture, and pictures that overlap along them, little or not at all.
+pub fn without_overlap(random: &mut impl Rng, text: &str) -> String {
+    let lane_m = between(random, 4.0, 20.0);
+    let share = if random.next_u32().is_multiple_of(2) { 1.0 } else { between(random, 0.4, 1.0) };
+    let drawn = |line: &&str| !["camera", "overlap_"].iter().any(|key| line.starts_with(key));
+    let rest: String = text.lines().filter(drawn).map(|line| format!("{line}\n")).collect();
+    let spacing = format!("lane_m = {lane_m:.2}\nwaypoint_m = {:.2}\nheight_m", lane_m * share);
+    rest.replacen("height_m", &spacing, 1)
+}
+
 /// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a hole outside.
 pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let radius = between(random, 40.0, 250.0);

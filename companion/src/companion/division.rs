@@ -18,7 +18,7 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 const AT_HOLD_M: f32 = 0.2;
 /// Silence of another vehicle after which a vehicle waits above its own pad: the silent vehicle's
 /// share may yet be given to it.
-const MISSED_AFTER: Duration = Duration::from_secs(3);
+pub(super) const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which a vehicle has left the mission.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Reported in place of a plan CRC where the rest of the area cannot be divided.

@@ -2,6 +2,7 @@
 
 use planner_core::{Length, Point};
 
+use super::division::MISSED_AFTER;
 use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::is_battery_known;
 use crate::config::{PlanFailure, REACHES_ALL_M};
@@ -125,6 +126,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.detours.is_homeward(),
             area: self.config.division.is_some(),
             over_field,
+            descends: self.guidance.is_descending(),
             may_fly_beside: standing
                 && (self.is_undivided() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_field(&view),
@@ -176,7 +178,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column_blocked_for: self.guidance.filter.column_blocked_for(now),
             column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
             start_barred_for: self.mission.start_barred_for(now),
-            others_fly: self.neighbours.does_another_fly_its_part(),
+            others_fly: self.neighbours.does_another_fly_its_part(now, MISSED_AFTER),
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave

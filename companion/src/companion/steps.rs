@@ -72,7 +72,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Notes whether something keeps it on its pad: a vehicle in its column, or what is on its path.
     fn note_barred_start(&mut self) {
-        let waits = self.mission.state() == State::Scheduled && !self.mission.pending().pause;
+        let due = self.mission.departure_due(self.now) && self.guidance.advice.stop_within_m > 0.05;
+        let waits = due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         let barred = waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked());
         self.mission.note_start_barred(barred, self.now);
     }
@@ -174,6 +175,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.mission.photographed_mut().begin_plan(self.config.resumes);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
                     fleet.begin_flight(now);
+                    self.detours.begin_flight();
                 }
                 let _ = self.events.push_back(Event::PlanRequested(PlanKind::Mission));
             }

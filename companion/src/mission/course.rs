@@ -10,7 +10,7 @@ use crate::link::Links;
 use crate::link::commands::{self, Command, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
 use crate::mission::task::{PathProgress, Tasks};
-use crate::mission::waits::Waits;
+use crate::mission::waits::{BarredStart, Waits};
 use crate::mission::{Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
 
@@ -223,6 +223,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     pub(crate) fn forget_plan(&mut self) {
         (self.plan, self.failure, self.division, self.left_with_all_pictures) = (None, None, 0, None);
         (self.division_plan_ready, self.division_requested) = (false, None);
+        self.waits.barred_start = BarredStart::default();
         self.tasks.reset();
     }
 

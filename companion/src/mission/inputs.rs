@@ -71,6 +71,8 @@ pub struct GuardInputs {
     pub area: bool,
     /// In a coverage mission: the path home can be planned from here.
     pub over_field: bool,
+    /// It is on the last descent of its path, above its pad.
+    pub descends: bool,
     /// The vehicle may fly around what blocks its path, and back to its path.
     pub may_fly_beside: bool,
     /// The vehicle stands where its detour comes back to its path.

@@ -148,6 +148,11 @@ impl Detours {
         self.obstacles.forget_avoided();
     }
 
+    /// A new flight over an area begins: the others count this vehicle as a new one.
+    pub(crate) fn begin_flight(&mut self) {
+        self.left_plan = false;
+    }
+
     /// Treats the path as blocked until the next scan has checked it.
     pub(crate) fn assume_blocked(&mut self) {
         (self.blocked, self.obstructed) = (true, true);

@@ -80,7 +80,7 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
     let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
     let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
     // Strips as wide as a footprint have no spare: a rounding is none.
-    let most = reach + strips.strip_width_m * 1e-4;
+    let most = reach + strips.strip_width_m * 6e-4;
     v - low <= most && high - v <= most
 }
 
@@ -107,7 +107,8 @@ fn compute_uncovered<const L: usize, const V: usize>(
     for lane in tracks.lanes().iter().filter(|lane| covers_band(strips, lane.from.y, span)) {
         ws.needed.remove([lane.from.x - along, lane.to.x + along])?;
     }
-    // Intervals that rounding left over are dropped.
-    ws.needed.drop_shorter(strips.strip_width_m / 100.0);
+    // Intervals that rounding left over are dropped: shorter than what two pictures that meet keep back.
+    let kept_back_m = strips.pattern.spacing.footprint.along_m / 2.0 - along;
+    ws.needed.drop_shorter(fminf(strips.strip_width_m / 100.0, kept_back_m));
     Ok(())
 }

@@ -244,8 +244,8 @@ impl<'a> Strips<'a> {
         inside.fold([need[0] + reach, need[1] - reach], |[from, to], u| [fminf(from, *u), fmaxf(to, *u)])
     }
 
-    /// Distance beyond its middle to which a picture shows the lane: half its side, less a rounding. Where pictures overlap by a
-    /// cell of a tenth of the spacing, one of them is to show all of a cell that a border cuts: a cell less.
+    /// Distance beyond its middle to which a picture shows the lane: half its side, less a rounding. Where pictures overlap, one of
+    /// them is to show all of a cell, a tenth of the spacing, that a border cuts: two of them that meet overlap by more than that.
     pub(super) fn picture_half_width(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
@@ -254,10 +254,10 @@ impl<'a> Strips<'a> {
             spacing.footprint.across_m - spacing.lane_m,
             spacing.footprint.along_m - spacing.waypoint_m,
         );
-        if overlap_m < 0.99 * cell_m {
+        if overlap_m < cell_m / 100.0 {
             half - cell_m / 100.0
         } else {
-            half - fminf(self.strip_width_m / 10.0, half / 2.0)
+            half - fminf(0.56 * cell_m, half / 2.0)
         }
     }
 }

@@ -134,7 +134,9 @@ impl Guidance {
             // there is another place.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
-            let rests = lies && last_place && held >= LANDING_WAITED_LONG;
+            // A place aside was sought by then, and over an area the end of its path is above its pad.
+            let at_end = || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
+            let rests = lies && held >= LANDING_WAITED_LONG && (last_place || at_end());
             let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M

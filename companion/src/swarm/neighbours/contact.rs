@@ -321,7 +321,9 @@ impl NeighbourEntry {
     pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
         let silent = self.is_leased() && self.is_under_way() && !self.heard_within(now, MAY_LAND_AFTER);
         let (here, velocity) = (self.state.position, self.state.velocity);
-        let carried = Point::new(velocity.x, velocity.y, 0.0) * FALL_CARRY_S;
+        let fast_mps = velocity.xy().norm().max(MAX_FALL_CARRY_MPS);
+        let carried =
+            Point::new(velocity.x, velocity.y, 0.0) * (FALL_CARRY_S * MAX_FALL_CARRY_MPS / fast_mps);
         silent.then(|| ([here, here + carried], self.fall_aside_m()))
     }
 
@@ -330,7 +332,7 @@ impl NeighbourEntry {
     pub(super) fn fall_aside_m(&self) -> f32 {
         let high_m = self.state.position.z - self.ground_m;
         // NaN counts as none.
-        if high_m > 0.0 { FALL_DRIFT_SHARE * high_m } else { 0.0 }
+        if high_m > 0.0 { FALL_DRIFT_SHARE * high_m.min(MAX_FALL_M) } else { 0.0 }
     }
 
     /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a place. No pads are as near to each other.

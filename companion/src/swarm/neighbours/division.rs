@@ -55,11 +55,16 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
-    /// Whether another vehicle that takes part is in flight.
-    pub(crate) fn does_another_fly_its_part(&self) -> bool {
-        let flies = |c: &&NeighbourEntry| c.heard_at.is_some() && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
+    /// Whether another vehicle that takes part is in flight, and none of them is missed: while one may be lost, each that lives
+    /// counts for a majority.
+    pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
+        let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
+        let flies = |c: &&NeighbourEntry| heard(c) && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
         let mut others = self.contacts[..self.roster].iter().filter(flies);
-        self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
+        self.fleet.as_ref().is_some_and(|fleet| {
+            let whole = !fleet.is_dividing() && !fleet.is_any_missing(now, missed_after);
+            whole && others.any(|c| fleet.is_alive(usize::from(c.rank)))
+        })
     }
 
     /// Handles what another vehicle reports of all. `waits`: this one has not been started.
