@@ -4,7 +4,7 @@ use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
 
 use super::contact::{AreaGround, NeighbourEntry};
-use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, VAGUE_POSITION_M};
+use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN, VAGUE_POSITION_M};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
@@ -115,7 +115,14 @@ impl<const V: usize> Neighbours<V> {
             };
             if contact.may_fly_on(now) {
                 contact.for_each_leg(contact.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
+            }
+            // Whoever is in the air comes down at its pad, or off its plan below where it is, or at the end of its way.
+            if contact.is_leased() && contact.is_under_way() {
                 contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
+                if !contact.reports(ON_PLAN) {
+                    bar([from; 2], 0.0);
+                    contact.points.last().into_iter().for_each(|end| bar([*end; 2], 0.0));
+                }
             }
             if let Some((leg, aside_m)) = contact.fall(now) {
                 bar(leg, aside_m);
