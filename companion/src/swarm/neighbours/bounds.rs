@@ -67,8 +67,9 @@ pub(super) const FALL_DRIFT_SHARE: f32 = 0.15;
 /// Time for which such a vehicle goes on as fast as it was when it was last heard, seconds: a second until it falls, and what its fall
 /// leaves of its speed.
 pub(super) const FALL_CARRY_S: f32 = 2.0;
-/// Greatest speed with which one that falls is carried on, m/s, and greatest height that it falls from: whatever was reported.
+/// Greatest speed with which one that falls is carried on, m/s: whatever was reported.
 pub(super) const MAX_FALL_CARRY_MPS: f32 = 20.0;
+/// Greatest height that one falls from, metres, whatever was reported: none flies higher.
 pub(super) const MAX_FALL_M: f32 = 150.0;
 /// Height difference, metres: this vehicle has time while a vehicle of known height is further
 /// above it.
