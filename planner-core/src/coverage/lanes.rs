@@ -20,7 +20,7 @@ pub struct LanePattern {
     pub angle_deg: Option<f32>,
     /// Distance beyond the area's edge at which lanes begin and end, metres.
     pub margin_m: f32,
-    /// Most changes of the lanes' order whose length is compared; each costs a few distances.
+    /// Most changes of the lanes' order that are looked at; few of them cost distances around zones.
     pub search_steps: u32,
 }
 
@@ -31,11 +31,11 @@ pub struct Lane {
     pub from: Flat,
     /// End of the lane.
     pub to: Flat,
-    /// Number of its first waypoint, counted along the whole path.
+    /// Number of its first waypoint, counted along the whole path; while lanes are ordered, that of its cell.
     pub first: u32,
     /// Waypoints on it, at least 1.
     pub count: u32,
-    /// Length of the whole path before its first waypoint, metres.
+    /// Length of the whole path before its first waypoint, metres; while lanes are ordered, of the way to the next one.
     pub start_m: f32,
     /// The strip it lies in.
     pub strip: u16,

@@ -1,11 +1,12 @@
 //! The order in which lanes are flown, and each one's direction: the shortest way from lane to lane.
 //!
 //! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1), from the end where that joins them by
-//! less. Elsewhere a first order takes one cell after the other ([`super::cells`]). Parts of it are turned round (2-opt) and up
-//! to ten cells moved (Or-opt) as long as that shortens the way. Lanes that are laid for what no strip shows
-//! ([`super::patches`]) are put where they make the way longer by least; then the same is done with lanes instead of cells,
-//! until the looks are used up. Both ends of the way are free. O(n²) sums a round, bounded by `steps_left`: ways between lanes
-//! that follow each other are kept, and a distance around zones is taken only where straight lines would be shorter.
+//! less. Elsewhere a first order takes one cell after the other (`cells`). Parts of it are turned round (2-opt) and
+//! cells of up to ten lanes moved (Or-opt) as long as that shortens the way. Lanes that are laid for what no strip shows
+//! (`patches`) are put where they make the way longer by least; then the same is done with lanes instead of cells,
+//! until the looks are used up. Both ends of the way are free. O(n²) sums a round, rounds bounded by `steps_left`, and O(n²) for
+//! the first order: ways between lanes that follow each other are kept, and a distance around zones is taken only where straight
+//! lines would be shorter.
 
 use super::Flat;
 use super::cells::{is_break, order_cells};
@@ -15,7 +16,7 @@ use crate::Length;
 
 /// Least shortening of the tour that counts, metres: a smaller gain is rounding.
 const MIN_GAIN_M: f32 = 1e-3;
-/// Most cells, then lanes, that Or-opt moves together.
+/// Most lanes that Or-opt moves together: whole cells at first.
 const MAX_MOVED: usize = 10;
 
 /// Sorts lanes into the order and the directions in which they are flown. The first `strips` of them are along the middle of
@@ -122,7 +123,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// Or-opt: moves up to [`MAX_MOVED`] cells or lanes that follow each other, as they are or turned round.
+    /// Or-opt: moves up to [`MAX_MOVED`] lanes that follow each other, at first whole cells, as they are or turned round.
     fn or_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();

@@ -1,8 +1,9 @@
 //! Shortest ways around no-fly zones: straight where nothing is between, else over corners of the zones.
 //!
 //! Method: a visibility graph over the zones' outward corners, each pushed out by [`ZONE_CLEARANCE_M`]; shortest ways between
-//! all pairs of corners once (Floyd and Warshall, n³), then a way between two places over the corners that both see
-//! (n² and 2 n segment checks of one comparison an edge). All in metres.
+//! all pairs of corners once (Floyd and Warshall, n³), then a way between two places over the least pair of corners that they
+//! see: n² sums a round, and a round more for each corner that proves hidden, at most 2 n; each corner is checked once. All in
+//! metres.
 
 use crate::Length;
 use heapless::Vec;
@@ -11,8 +12,8 @@ use libm::fminf;
 use super::area::{Area, RingKind, doubled_signed_area};
 use super::{CoverageError, Flat};
 
-/// Distance that paths and lanes keep from no-fly zones, metres: more than rounding, less than any
-/// vehicle's margin. A margin for the vehicle belongs into the zone.
+/// Distance that lanes keep from no-fly zones, and ways from the corners that they turn at, metres: more than rounding, less than
+/// any vehicle's margin. A straight way only does not touch a zone: a margin for the vehicle belongs into the zone.
 pub const ZONE_CLEARANCE_M: f32 = 0.25;
 
 /// The visibility graph of shortest transits: corners and the lines between them, of at most `N`
