@@ -1,6 +1,20 @@
 //! The mission against a scripted PX4: the way it should go, and every way it should not.
 
 extern crate std;
+
+/// Declares what can happen, and the list of all of it.
+macro_rules! happens {
+    ($($name:ident),* $(,)?) => {
+        /// One thing that happens.
+        #[derive(Clone, Copy, Debug)]
+        enum Happens {
+            $($name),*
+        }
+
+        const ALL: &[Happens] = &[$(Happens::$name),*];
+    };
+}
+
 mod ardupilot;
 mod divisions;
 mod estimate;

@@ -105,54 +105,10 @@ impl Other {
     }
 }
 
-/// What can happen.
-#[derive(Clone, Copy, Debug)]
-enum Happens {
-    Pause,
-    Resume,
-    Pilot,
-    Back,
-    NoPosition,
-    Position,
-    Silent,
-    Heard,
-    Mute,
-    MuteLong,
-    Hears,
-    NoAnswer,
-    Answers,
-    LiesAhead,
-    HoversAhead,
-    GoesAway,
-    Land,
-    Return,
-    Battery,
+happens! {
+    Pause, Resume, Pilot, Back, NoPosition, Position, Silent, Heard, Mute, MuteLong, Hears, NoAnswer,
+    Answers, LiesAhead, HoversAhead, GoesAway, Land, Return, Battery
 }
-
-const ALL: [Happens; 19] = {
-    use Happens::*;
-    [
-        Pause,
-        Resume,
-        Pilot,
-        Back,
-        NoPosition,
-        Position,
-        Silent,
-        Heard,
-        Mute,
-        MuteLong,
-        Hears,
-        NoAnswer,
-        Answers,
-        LiesAhead,
-        HoversAhead,
-        GoesAway,
-        Land,
-        Return,
-        Battery,
-    ]
-};
 
 struct Watch {
     other: Other,

@@ -5,19 +5,6 @@ use std::string::String;
 
 use super::*;
 
-/// Declares what can happen, and the list of all of it.
-macro_rules! happens {
-    ($($name:ident),*) => {
-        /// One thing that happens.
-        #[derive(Clone, Copy, Debug)]
-        enum Happens {
-            $($name),*
-        }
-
-        const ALL: &[Happens] = &[$(Happens::$name),*];
-    };
-}
-
 happens! {
     Pause, Resume, Land, Return, Start, Pilot, Back, Failsafe, NoPosition, Position, Jump,
     Silent, Heard, Disarm, Battery, FalseGround, TrueGround, Refuses, Obeys, Mute, Wait

@@ -162,3 +162,17 @@ fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
     b.until(Follow, 5.0);
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }
+
+/// Ordered home, it was out of the plan. A new start is another flight: it flies its part.
+#[test]
+fn a_vehicle_that_came_home_early_takes_part_again_after_a_new_start() {
+    let mut b = over_a_field(Follow);
+    b.run(2.0);
+    back(&mut b);
+    is_home(&mut b);
+    b.run(2.0);
+    b.start();
+    b.until(Ready, 30.0);
+    b.start();
+    b.until(Done, 120.0);
+}
