@@ -19,7 +19,8 @@ pub fn unit(random: &mut impl Rng) -> f64 {
     f64::from(random.next_u32()) / (f64::from(u32::MAX) + 1.0)
 }
 
-fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
+/// A number between two, drawn evenly.
+pub fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * unit(random)
 }
 

@@ -56,6 +56,41 @@ fn random_areas_are_covered() {
     assert!(wrong.is_empty() && planned >= areas(), "{planned} planned, {} wrong", wrong.len());
 }
 
+/// A field is a whole number of lanes wide and a little more, whose pictures do not overlap; with and without a zone in it.
+#[test]
+fn fields_a_little_wider_than_their_lanes_are_covered() {
+    let mut random = Pcg32::seed_from_u64(0x51DE);
+    let mut wrong = Vec::new();
+    for case in 0..600 {
+        let (lane_m, lanes) = (areas::between(&mut random, 2.0, 20.0), 1 + case % 4);
+        // From less than a rounding to a twentieth of a lane.
+        let more_m = lane_m * 10f64.powf(areas::between(&mut random, -7.0, -1.3));
+        let (width_m, long_m) = (lane_m * f64::from(lanes) + more_m, lane_m * 12.0);
+        let [east_m, north_m] = [0, 1].map(|_| areas::between(&mut random, -200.0, 200.0));
+        let box_of = |low: [f64; 2], high: [f64; 2]| {
+            let [l, b, r, t] = [east_m + low[0], north_m + low[1], east_m + high[0], north_m + high[1]];
+            format!("[[{l:.7}, {b:.7}], [{r:.7}, {b:.7}], [{r:.7}, {t:.7}], [{l:.7}, {t:.7}]]")
+        };
+        let at = [0.3 * long_m, areas::between(&mut random, 0.0, 0.8) * width_m];
+        let zone = box_of(at, [at[0] + 0.1 * long_m, at[1] + 0.2 * lane_m]);
+        let no_fly = if case % 2 == 0 { format!("no_fly = [{zone}]\n") } else { String::new() };
+        let text = format!(
+            "[area]\ncoordinates = \"metres\"\norigin = {{ lat_deg = 40.3, lon_deg = -3.7, alt_m = 700.0 }}\n\
+             polygon = {}\n{no_fly}height_m = 20.0\nlane_m = {lane_m:.7}\nwaypoint_m = {lane_m:.7}\n\
+             [[vehicles]]\nid = 1\nspeed_max_mps = 20.0\nstart = [{east_m:.2}, {:.2}, 0.0]\n",
+            box_of([0.0; 2], [long_m, width_m]),
+            north_m - 20.0
+        );
+        let scenario = scenario::parse(&text, "field").unwrap_or_else(|error| panic!("{error:#}\n{text}"));
+        let findings =
+            findings(&scenario, Method::PowellBinpat).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        if !findings.is_clean() {
+            wrong.push((case, more_m / lane_m, findings.covered_share));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of 600: {:?}", wrong.len(), &wrong[..wrong.len().min(8)]);
+}
+
 /// `FLOCKMATE_AREAS=1000` takes minutes in a debug build: `exact` looks at 2²⁰ states for ten vehicles.
 #[test]
 fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {

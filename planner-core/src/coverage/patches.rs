@@ -12,7 +12,7 @@ use super::CoverageError;
 use super::area::RingKind;
 use super::intervals::Span;
 use super::lanes::Tracks;
-use super::strips::{Sets, Strips};
+use super::strips::{Sets, Strips, WIDTH_ROUNDING};
 use super::transit::ZONE_CLEARANCE_M;
 
 /// Parts into which a strip is cut.
@@ -80,7 +80,7 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
     let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
     let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
     // Strips as wide as a footprint have no spare: a rounding is none.
-    let most = reach + strips.strip_width_m * 6e-4;
+    let most = reach + strips.strip_width_m * WIDTH_ROUNDING;
     v - low <= most && high - v <= most
 }
 

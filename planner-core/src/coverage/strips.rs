@@ -12,6 +12,9 @@ use super::{CoverageError, Flat};
 use crate::geometry::{Length as _, clamp_to};
 use crate::sort;
 
+/// A width that is a whole number of lanes is often a rounding above it: up to this share of a lane. More is not in their pictures.
+pub(super) const WIDTH_ROUNDING: f32 = 1e-4;
+
 /// Memory lent: `V` is at least the number of the area's vertices.
 pub struct Workspace<const V: usize> {
     /// The convex hull; then the vertices in the lanes' frame.
@@ -86,8 +89,7 @@ impl<'a> Strips<'a> {
         let (low, high) = outer
             .map(|vertex| vertex.y)
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (fminf(low, v), fmaxf(high, v)));
-        // A width that is a whole number of lanes is often a rounding above it.
-        let count = fmaxf(ceilf((high - low) / pattern.spacing.lane_m - 1e-3), 1.0);
+        let count = fmaxf(ceilf((high - low) / pattern.spacing.lane_m - WIDTH_ROUNDING), 1.0);
         if count > f32::from(u16::MAX) {
             return Err(CoverageError::LanesFull);
         }
