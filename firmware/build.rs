@@ -1,5 +1,5 @@
-//! Gives the linker the memory map of the chosen board: `memory.x` at the top of the checkout for the default board,
-//! `memory.x` beside the board's code for the others.
+//! Gives the linker the memory map of the chosen board: `memory.x` at the top of the checkout for
+//! the default board, `memory.x` beside the board's code for the others.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};

@@ -1,5 +1,6 @@
-//! Tells the crate whether the compiler lets assembly name the FPU's registers. `rustc` knows them by `vfp2`, which a stable
-//! compiler shows to no `cfg`, and which it does not count to the FPU of an Armv8-M.
+//! Tells the crate whether the compiler lets assembly name the FPU's registers. `rustc` knows them
+//! by `vfp2`, which a stable compiler shows to no `cfg`, and which it does not count to the FPU of
+//! an Armv8-M.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -1,7 +1,8 @@
 //! The drain contract as a run loop: bytes and time in, bytes and events out.
 //!
-//! The clock counts steps of 10 ms, and of the autopilot there is a HEARTBEAT each second. A shell in its place reads a
-//! clock, reads and writes two ports, and plans elsewhere (`planner_core::plan`).
+//! The clock counts steps of 10 ms, and of the autopilot there is a HEARTBEAT each second. A shell
+//! in its place reads a clock, reads and writes two ports, and plans elsewhere
+//! (`planner_core::plan`).
 //!
 //! `cargo run -p companion --example run_loop`
 
@@ -37,7 +38,8 @@ fn main() {
     println!("{sent} bytes sent");
 }
 
-/// 3. All that the companion has to say: events until `None`, frames for both links until 0. The bytes sent.
+/// 3. All that the companion has to say: events until `None`, frames for both links until 0. The
+///    bytes sent.
 ///
 /// A shell with a flash also drains `poll_flash`, and answers by `handle_flash`.
 fn drain(companion: &mut Small, now: Instant) -> usize {
@@ -60,7 +62,8 @@ fn drain(companion: &mut Small, now: Instant) -> usize {
 
 /// What the autopilot's port has received by this step: once a second the HEARTBEAT of a PX4.
 fn received(step: u64) -> Option<Vec<u8>> {
-    let heartbeat = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
+    let heartbeat =
+        HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
     let header = Header { system: 1, component: AUTOPILOT_COMPONENT, sequence: (step / 100) as u8 };
     let mut bytes = vec![0; MAX_FRAME_LEN];
     let length = frame::encode(header, &heartbeat, &mut bytes);

@@ -53,7 +53,8 @@ const MAX_ROWS_PER_STEP: usize = 4;
 /// Most events that wait for the shell.
 const MAX_EVENTS: usize = 16;
 
-/// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
+/// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its
+/// plan.
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
@@ -89,10 +90,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     #[inline(always)]
     fn from_checked(CheckedConfig { config, start }: CheckedConfig<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
-        let mut neighbours =
-            Neighbours::new(&config.roster, config.system_id, config.cruise_mps.max(config.climb_mps));
+        let mut neighbours = Neighbours::new(
+            &config.roster,
+            config.system_id,
+            config.cruise_mps.max(config.climb_mps),
+        );
         if let Some(down_s) = config.division {
-            let stray_m = margins::pair_position_error_m(config.required_clearance_m, config.radius_m);
+            let stray_m =
+                margins::pair_position_error_m(config.required_clearance_m, config.radius_m);
             neighbours.form_fleet(down_s, config.ground, stray_m);
         }
         Self {
@@ -213,7 +218,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let every = Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
         if self.timers.take_due(Timer::Swarm, now, every) {
-            self.links.set_due(Link::Swarm, OnDemandMessage::Position, self.telemetry.position_at.is_some());
+            self.links.set_due(
+                Link::Swarm,
+                OnDemandMessage::Position,
+                self.telemetry.position_at.is_some(),
+            );
             self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
             if let Some(fleet) = self.neighbours.fleet() {
                 let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
@@ -235,7 +244,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (PlanKind::Mission, State::Planning, Ok(plan)) => self.mission.set_plan(plan),
             (PlanKind::Mission, State::Planning, Err(failure)) => self.mission.set_failure(failure),
             (PlanKind::Detour, ..) if !self.detours.is_request_read() => return,
-            (PlanKind::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => self.begin_detour(plan),
+            (PlanKind::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => {
+                self.begin_detour(plan)
+            }
             (PlanKind::Detour, State::Replanning | State::PadReplanning, Err(failure)) => {
                 self.handle_detour_failure(failure);
             }
@@ -268,9 +279,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn request_context(&self) -> RequestContext {
         let in_state = self.mission.time_in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
-        let timeout_s =
-            (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_RANGE_S.0, GUID_TIMEOUT_RANGE_S.1);
-        let column_clear = self.guidance.filter.column_clear() && !self.guidance.is_guiding_landing();
+        let timeout_s = (margin_m / self.config.cruise_mps)
+            .clamp(GUID_TIMEOUT_RANGE_S.0, GUID_TIMEOUT_RANGE_S.1);
+        let column_clear =
+            self.guidance.filter.column_clear() && !self.guidance.is_guiding_landing();
         RequestContext {
             now: self.now,
             state: self.mission.state(),
@@ -285,7 +297,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Requests the streams, and on the ground the limits.
     fn request_streams(&mut self) {
         let situation = self.request_context();
-        if self.requests.start_on_connect(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
+        if self.requests.start_on_connect(
+            &self.telemetry,
+            &situation,
+            &mut self.timers,
+            &mut self.links,
+        ) {
             self.guidance.set_limits(&self.config, self.requests.limits());
         }
     }

@@ -1,4 +1,5 @@
-//! What a companion is given before it starts: its id, the vehicles that fly with it, and how fast and how close.
+//! What a companion is given before it starts: its id, the vehicles that fly with it, and how fast
+//! and how close.
 
 mod check;
 
@@ -11,10 +12,12 @@ use crate::margins;
 
 /// Most ground stations a mission names.
 pub const GROUND_STATIONS: usize = 4;
-/// The ground stations of a mission that names none: the id that QGroundControl, MAVProxy and pymavlink use.
+/// The ground stations of a mission that names none: the id that QGroundControl, MAVProxy and
+/// pymavlink use.
 pub const USUAL_GROUND_STATIONS: [u8; GROUND_STATIONS] = [255, 0, 0, 0];
 
-/// Default safety distance between the centres of two vehicles, metres: two airframes of 0.3 m radius, and 0.9 m of air.
+/// Default safety distance between the centres of two vehicles, metres: two airframes of 0.3 m
+/// radius, and 0.9 m of air.
 pub const SAFETY_DISTANCE_M: f32 = 1.5;
 
 /// One vehicle of the mission.
@@ -53,7 +56,8 @@ pub struct Config<const V: usize> {
     pub safety_distance_m: f32,
     /// How vehicles keep apart.
     pub method: Method,
-    /// The least error of the position estimate that is reckoned with, by which the operator vouches for the receiver, metres.
+    /// The least error of the position estimate that is reckoned with, by which the operator
+    /// vouches for the receiver, metres.
     pub estimate_m: f32,
     /// Range of the swarm's radio for sure, metres: a vehicle that falls silent further away than
     /// most of that is out of range. With [`REACHES_ALL_M`] the radio reaches every vehicle, so any
@@ -61,15 +65,15 @@ pub struct Config<const V: usize> {
     pub radio_range_m: f32,
     /// A vehicle further than this from its start, horizontally, does not take off, metres.
     pub start_tolerance_m: f32,
-    /// Battery charge below which it lands where no neighbour is below, and below half of which it lands anywhere,
-    /// percent; 0 never.
+    /// Battery charge below which it lands where no neighbour is below, and below half of which it
+    /// lands anywhere, percent; 0 never.
     pub battery_low_percent: i8,
     /// Rate at which position and intent go to the swarm, Hz.
     pub swarm_hz: u8,
     /// Minimum and maximum corner of the volume it may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
-    /// Whether its mission is an area, which is divided again where a vehicle is lost: how long a lost vehicle may take until
-    /// it is down, seconds.
+    /// Whether its mission is an area, which is divided again where a vehicle is lost: how long a
+    /// lost vehicle may take until it is down, seconds.
     pub division: Option<f32>,
     /// The ground of an area that is not level: between pads nobody knows more.
     pub ground: Option<Ground>,
@@ -104,7 +108,8 @@ pub enum ConfigError {
     Geofence,
     /// The vehicle with this system id starts outside the geofence.
     StartOutside(u8),
-    /// The planner's setting of this name that follows from the numbers above is not what it may be.
+    /// The planner's setting of this name that follows from the numbers above is not what it may
+    /// be.
     Setting(&'static str),
 }
 

@@ -25,7 +25,8 @@ pub enum PlanKind {
 }
 
 impl PlanKind {
-    /// A vehicle that asks for a detour may be below one that comes down; one without a mission is on its pad.
+    /// A vehicle that asks for a detour may be below one that comes down; one without a mission is
+    /// on its pad.
     const BY_URGENCY: [Self; 3] = [Self::Detour, Self::Division, Self::Mission];
 
     const fn bit(self) -> u8 {
@@ -33,7 +34,8 @@ impl PlanKind {
     }
 }
 
-/// Plans that the shell has not begun: at most one of each kind, since it reads what to plan when it begins.
+/// Plans that the shell has not begun: at most one of each kind, since it reads what to plan when
+/// it begins.
 #[derive(Debug, Default)]
 pub struct PlanRequests {
     waiting: AtomicU8,
@@ -63,7 +65,8 @@ impl PlanRequests {
 pub enum Event {
     /// Plan this, and answer with [`crate::Companion::handle_plan`].
     PlanRequested(PlanKind),
-    /// Send what waits, then start the companion again, from the newest roadmap, mission and parameters.
+    /// Send what waits, then start the companion again, from the newest roadmap, mission and
+    /// parameters.
     RestartRequested,
     /// The mission moved on.
     StateChanged {
@@ -76,7 +79,8 @@ pub enum Event {
         /// Whether the row is a warning: the mission leaves its usual course.
         warning: bool,
     },
-    /// It is back on its path over a field, and leaves out so many waypoints that it flew around: the next start flies them.
+    /// It is back on its path over a field, and leaves out so many waypoints that it flew around:
+    /// the next start flies them.
     FlownAround {
         /// Number of waypoints.
         left: u32,
@@ -96,7 +100,10 @@ mod tests {
     fn no_request_of_a_plan_replaces_one_of_another_kind() {
         for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2], [1, 2, 0]] {
             let requests = PlanRequests::new();
-            order.into_iter().chain([1, 1]).for_each(|at: usize| requests.add(PlanKind::BY_URGENCY[at]));
+            order
+                .into_iter()
+                .chain([1, 1])
+                .for_each(|at: usize| requests.add(PlanKind::BY_URGENCY[at]));
             let [detour, division, mission] = PlanKind::BY_URGENCY.map(Some);
             let taken = [(); 4].map(|()| requests.take());
             assert_eq!(taken, [detour, division, mission, None], "{order:?}");

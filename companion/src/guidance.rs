@@ -1,10 +1,11 @@
-//! Guidance makes the setpoint: from the path, the neighbours and the autopilot's position it makes the raw point of each state,
-//! and its smoother makes the setpoint of the raw point.
+//! Guidance makes the setpoint: from the path, the neighbours and the autopilot's position it makes
+//! the raw point of each state, and its smoother makes the setpoint of the raw point.
 //!
-//! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's start, the path, the
-//! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it continues
-//! where it was. A stop slows the smoother's clock, so the raw point stays where it is. Once the setpoint stands, the raw point
-//! is taken back to it, and continuing begins with a straight way back to where the phase was left.
+//! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's
+//! start, the path, the descent. The phase is guidance's own state. A pause, a lost position or a
+//! pilot interrupts it; afterwards it continues where it was. A stop slows the smoother's clock, so
+//! the raw point stays where it is. Once the setpoint stands, the raw point is taken back to it,
+//! and continuing begins with a straight way back to where the phase was left.
 
 mod brakes;
 pub(crate) mod evade;
@@ -65,10 +66,11 @@ const STANDING_SETPOINT_MPS: f32 = 0.05;
 const CLIMBED_M: f32 = 0.12;
 /// A guided descent is done within this distance of its lower end, metres.
 const DESCENDED_M: f32 = 0.2;
-/// Time after which a guided descent that has reached its end hands over to the autopilot's landing,
-/// wherever the vehicle is.
+/// Time after which a guided descent that has reached its end hands over to the autopilot's
+/// landing, wherever the vehicle is.
 const LAND_AFTER: Duration = Duration::from_secs(2);
-/// Time without progress after which the autopilot takes over a landing that guidance leads from the path.
+/// Time without progress after which the autopilot takes over a landing that guidance leads from
+/// the path.
 const LEADS_FOR: Duration = Duration::from_secs(4);
 /// Greatest lead of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
@@ -88,8 +90,8 @@ const SETTLE_WINDOW_M: f32 = 3.0;
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Least movement along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
-/// Distance that the raw point keeps from the geofence, metres: the setpoint may deviate by this much
-/// from the path.
+/// Distance that the raw point keeps from the geofence, metres: the setpoint may deviate by this
+/// much from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Greatest height over the ground, however wide the margin, at which a guided descent becomes
 /// slow, or at which an autopilot that is not led to the ground takes over the landing, metres.
@@ -115,7 +117,8 @@ pub struct Guidance {
     pub smoother: SetpointSmoother,
     phase: Phase,
     tracker: Tracker,
-    /// The straight way of a climb, a join or a descent; none while it is to be made from where the setpoint stands.
+    /// The straight way of a climb, a join or a descent; none while it is to be made from where the
+    /// setpoint stands.
     leg: Option<Path<2>>,
     leg_tracker: Tracker,
     /// Which waypoint it flies to, by Algorithm 2.
@@ -136,7 +139,8 @@ pub struct Guidance {
     lead_m: f32,
     /// Place of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
-    /// Place along the path where the vehicle will stop for now, whatever the safety filter does, metres.
+    /// Place along the path where the vehicle will stop for now, whatever the safety filter does,
+    /// metres.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
     pub(crate) filter: SafetyFilter,
@@ -175,7 +179,8 @@ pub struct Guidance {
     trapped_since: Option<Instant>,
     /// Whether its path leads aside only: it does not land at its end.
     pub ends_aside: bool,
-    /// Height over the ground from which a descent is slow, or an autopilot that is not led to the ground lands by itself, metres.
+    /// Height over the ground from which a descent is slow, or an autopilot that is not led to the
+    /// ground lands by itself, metres.
     low_height_m: f32,
     /// The lowest ground between pads, metres; infinite where those say how low.
     lowest_ground_m: f32,
@@ -230,7 +235,10 @@ impl Guidance {
             trapped_since: None,
             ends_aside: false,
             lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
-            low_height_m: libm::fminf(config.required_clearance_m - config.radius_m, MAX_LAND_HANDOVER_M),
+            low_height_m: libm::fminf(
+                config.required_clearance_m - config.radius_m,
+                MAX_LAND_HANDOVER_M,
+            ),
             sent_acceleration: Point::zeros(),
         }
     }
@@ -256,7 +264,8 @@ impl Guidance {
         self.filter.reset();
     }
 
-    /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was sent.
+    /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was
+    /// sent.
     pub fn hold_at(&mut self, point: Point) {
         // A vehicle whose position is known again brakes from its last place.
         let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
@@ -266,13 +275,15 @@ impl Guidance {
         }
     }
 
-    /// Holds at the place to which the pilot flew, until the mission resumes; the place of interruption is kept.
+    /// Holds at the place to which the pilot flew, until the mission resumes; the place of
+    /// interruption is kept.
     pub fn hold_after_pilot(&mut self, point: Point) {
         self.hold_at(point);
         self.forget_leg();
     }
 
-    /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing was sent.
+    /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing
+    /// was sent.
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
         self.phase = Phase::Climb;
@@ -309,14 +320,22 @@ impl Guidance {
         let position = scene.telemetry.position;
         self.unsent_s += dt_s;
         let advised_at_m = self.tracker.along_m;
-        let asks = matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
+        let asks =
+            matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
         if let Some(plan) = scene.plan.filter(|_| asks) {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
-            let own =
-                OwnVehicle { rank: scene.rank, position, along_m, path: &plan.path, detours: scene.detours };
-            self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.states_at(now));
+            let own = OwnVehicle {
+                rank: scene.rank,
+                position,
+                along_m,
+                path: &plan.path,
+                detours: scene.detours,
+            };
+            self.advice =
+                deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.states_at(now));
             if self.on_path {
-                self.advice.stop_within_m = self.advice.stop_within_m.min((self.halt_m - along_m).max(0.0));
+                self.advice.stop_within_m =
+                    self.advice.stop_within_m.min((self.halt_m - along_m).max(0.0));
             }
         }
         if let Some(plan) = scene.plan {
@@ -344,13 +363,15 @@ impl Guidance {
             return true;
         }
         let kind = scene.telemetry.kind();
-        let taken = matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
-            && scene.telemetry.custom_mode != kind.setpoint_mode();
+        let taken =
+            matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
+                && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.position_unknown |= !known || state == State::PositionLost;
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
         if known && (taken || taken_before || !self.smoother.has_setpoint()) {
-            // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
+            // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and
+            // as it moves.
             if taken {
                 self.smoother.follow_vehicle(position, self.unsent_s);
             } else if !self.smoother.has_setpoint() {
@@ -368,11 +389,14 @@ impl Guidance {
             self.finish_step(sends);
             return true;
         }
-        let up = state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
+        let up =
+            state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
         let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.climbing_back;
         let leads = self.update_guided_landing(state, scene, now);
-        let goes =
-            known && !turns && (leads || matches!(state, State::Climb | State::Follow)) && (!urgent || up);
+        let goes = known
+            && !turns
+            && (leads || matches!(state, State::Climb | State::Follow))
+            && (!urgent || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_scale(now));
         let path = scene.plan.map(|plan| &plan.path);
@@ -417,13 +441,17 @@ impl Guidance {
                 Some(plan) if moves => {
                     self.next_raw_point(state, scene, plan, &advice, neighbours, now, &mut blocked)
                 }
-                _ if matches!(state, State::Streaming | State::Engaging | State::Arming) && known => {
+                _ if matches!(state, State::Streaming | State::Engaging | State::Arming)
+                    && known =>
+                {
                     let away = position - self.smoother.raw_point();
                     let most = MAX_PAD_DRIFT_MPS * TICK_S;
                     let share = most / away.length().max(most);
                     self.smoother.raw_point() + away * share
                 }
-                Some(plan) if sends && !self.raw_point_at_rest => self.next_braked_raw_point(&plan.path),
+                Some(plan) if sends && !self.raw_point_at_rest => {
+                    self.next_braked_raw_point(&plan.path)
+                }
                 _ => self.smoother.raw_point(),
             };
             self.smoother.push_raw_point(raw);
@@ -431,7 +459,11 @@ impl Guidance {
         self.mark_trapped(blocked, now);
         let sound = self.smoother.make_setpoint();
         let correction = if flies && state != State::PilotControl && known {
-            position_correction(&self.smoother.position(), &self.smoother.velocity(), scene.telemetry)
+            position_correction(
+                &self.smoother.position(),
+                &self.smoother.velocity(),
+                scene.telemetry,
+            )
         } else {
             Point::zeros()
         };

@@ -1,4 +1,5 @@
-//! The two links, to the autopilot and to the swarm: incoming frames, outgoing queues, and rate limits of answers.
+//! The two links, to the autopilot and to the swarm: incoming frames, outgoing queues, and rate
+//! limits of answers.
 
 pub(crate) mod answer_limits;
 pub mod commands;
@@ -105,9 +106,16 @@ impl Links {
     }
 
     /// As `send_text`, with numbers: each `#` of the text stands for one.
-    pub(crate) fn send_text_with_numbers(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+    pub(crate) fn send_text_with_numbers(
+        &mut self,
+        warning: bool,
+        text: &'static str,
+        numbers: [u32; 2],
+    ) {
         let numbers = [numbers[0], numbers[1], 0];
-        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
+        self.outboxes
+            .iter_mut()
+            .for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
     }
 
     /// Whether an answer may be queued now; if so, it is counted.
@@ -122,7 +130,8 @@ impl Links {
             SenderKind::GroundStation => KEPT_FREE,
             SenderKind::Autopilot | SenderKind::Other => KEPT_FREE + KEPT_FOR_GROUND,
         };
-        self.outboxes[link as usize].free_entries() > kept && self.rates.take_token(now, link, sender, kind)
+        self.outboxes[link as usize].free_entries() > kept
+            && self.rates.take_token(now, link, sender, kind)
     }
 
     /// Queues an answer, unless its rate or the queue is used up.
@@ -139,7 +148,8 @@ impl Links {
         }
     }
 
-    /// Sends on both links a text about a sender's action; each `#` of the text stands for a number.
+    /// Sends on both links a text about a sender's action; each `#` of the text stands for a
+    /// number.
     pub(crate) fn send_sender_text(
         &mut self,
         now: Instant,
@@ -206,8 +216,8 @@ impl Links {
         self.outboxes[link as usize].next_header(system)
     }
 
-    /// The header of an intent whose points lead to `ends_m` along the path: its number is remembered, so that an echo of it
-    /// shows how late messages are, and what others know.
+    /// The header of an intent whose points lead to `ends_m` along the path: its number is
+    /// remembered, so that an echo of it shows how late messages are, and what others know.
     pub(crate) fn intent_header(&mut self, system: u8, ends_m: f32, now: Instant) -> Header {
         let header = self.next_header(Link::Swarm, system);
         self.sent.note_sent(header.sequence, ends_m, now);

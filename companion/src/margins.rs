@@ -1,4 +1,5 @@
-//! The margins to walls, added up in one place: hull + tracking + estimate + announced gust ≤ clearance.
+//! The margins to walls, added up in one place: hull + tracking + estimate + announced gust ≤
+//! clearance.
 //!
 //! | what | value | unit | reason |
 //! |---|---|---|---|
@@ -10,15 +11,17 @@
 //! | accuracy's age | [`MAX_ACCURACY_AGE`] | s | three reports of a stream at 1 Hz |
 //! | gust | scenario | m | the desk adds what a gust is announced to push ([`estimate_margin_m`]'s caller); on board it is part of the margin |
 //!
-//! What is left for the estimate is compared with its bound. A bound worse than what is left at cruise refuses the start and
-//! slows the vehicle in flight; one worse than what is left at a crawl stops it. A bound of at most [`MIN_ESTIMATE_ERROR_M`] refuses
-//! nothing: no receiver does better, and the operator chose the margin. A margin below that flies at the operator's risk.
+//! What is left for the estimate is compared with its bound. A bound worse than what is left at
+//! cruise refuses the start and slows the vehicle in flight; one worse than what is left at a crawl
+//! stops it. A bound of at most [`MIN_ESTIMATE_ERROR_M`] refuses nothing: no receiver does better,
+//! and the operator chose the margin. A margin below that flies at the operator's risk.
 //!
-//! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights PX4's SIH reported 0.25 m while
-//! the estimate was 0.7 m off: a receiver's bias and a barometer's drift look to the filter like the truth. Three times
-//! the reported accuracy covers that case, and no proof says that it covers the next. ArduCopter reports ratios and no metres: a
-//! consistent estimate with a constant error looks sound. An operator who flies near walls vouches for the receiver by
-//! `FLK_EST_M`.
+//! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights
+//! PX4's SIH reported 0.25 m while the estimate was 0.7 m off: a receiver's bias and a barometer's
+//! drift look to the filter like the truth. Three times the reported accuracy covers that case, and
+//! no proof says that it covers the next. ArduCopter reports ratios and no metres: a consistent
+//! estimate with a constant error looks sound. An operator who flies near walls vouches for the
+//! receiver by `FLK_EST_M`.
 
 use crate::time::Duration;
 
@@ -52,8 +55,8 @@ pub fn is_bound_within(bound_m: f32, room_m: f32) -> bool {
     bound_m <= room_m + 1e-4
 }
 
-/// Share of the cruise speed at which the estimate's bound fits beside the tracking error: 1 where it fits at cruise, 0 where it
-/// does not even fit at a crawl.
+/// Share of the cruise speed at which the estimate's bound fits beside the tracking error: 1 where
+/// it fits at cruise, 0 where it does not even fit at a crawl.
 pub fn speed_share_for_bound(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
     let (cruise_m, crawl_m) = (
         estimate_margin_m(clearance_m, radius_m, TRACKING_M),
@@ -80,7 +83,10 @@ mod tests {
     #[test]
     fn a_vehicle_slows_as_its_estimate_gets_worse_and_stops() {
         let of = |bound_m| speed_share_for_bound(bound_m, 0.8, 0.3);
-        assert_eq!((of(0.1), of(0.25), of(0.41), of(f32::INFINITY), of(f32::NAN)), (1.0, 1.0, 0.0, 0.0, 0.0));
+        assert_eq!(
+            (of(0.1), of(0.25), of(0.41), of(f32::INFINITY), of(f32::NAN)),
+            (1.0, 1.0, 0.0, 0.0, 0.0)
+        );
         assert!(of(0.3) < 1.0 && of(0.35) < of(0.3) && of(0.4) >= MIN_SPEED_SHARE);
     }
 

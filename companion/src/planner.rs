@@ -1,6 +1,8 @@
-//! The plan that a mission file asks for, on a desk and on a board alike: the desk only lends more memory.
+//! The plan that a mission file asks for, on a desk and on a board alike: the desk only lends more
+//! memory.
 //!
-//! Every companion plans the whole swarm from the same file, so all agree; the CRC of the plan is what they compare.
+//! Every companion plans the whole swarm from the same file, so all agree; the CRC of the plan is
+//! what they compare.
 
 pub mod coverage;
 
@@ -24,11 +26,12 @@ pub enum PlanStep {
     Schedule,
 }
 
-/// Plans a mission with goals on its roadmap, for vehicles with room for `gates_most`. `done` is called after each step: the
-/// desk measures their times.
+/// Plans a mission with goals on its roadmap, for vehicles with room for `gates_most`. `done` is
+/// called after each step: the desk measures their times.
 ///
 /// # Errors
-/// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or goals.
+/// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or
+/// goals.
 pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize>(
     mission: &MissionView<'_>,
     roadmap: &RoadmapView<'_>,
@@ -38,8 +41,9 @@ pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize
     mut done: impl FnMut(PlanStep),
 ) -> Result<(), PlanError> {
     let (mut tasks, mut descents_m) = (Vec::<_, V>::new(), Vec::<_, V>::new());
-    let request =
-        mission.plan_request(&mut tasks, &mut descents_m, gates_most).map_err(|_| PlanError::SwarmFull)?;
+    let request = mission
+        .plan_request(&mut tasks, &mut descents_m, gates_most)
+        .map_err(|_| PlanError::SwarmFull)?;
     let mut goals = plan::Goals::new();
     plan::compute_costs(roadmap, &request, ws)?;
     done(PlanStep::Search);
@@ -59,17 +63,22 @@ impl From<PlanError> for PlanFailure {
 /// The companion's failure for an error of the planner.
 fn plan_failure(error: &PlanError) -> PlanFailure {
     match error {
-        PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,
-        PlanError::Config(_) | PlanError::BadTask(_) | PlanError::BadDescent(_) | PlanError::SameGoal(_) => {
-            PlanFailure::Invalid
+        PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => {
+            PlanFailure::NoRoadmap
         }
+        PlanError::Config(_)
+        | PlanError::BadTask(_)
+        | PlanError::BadDescent(_)
+        | PlanError::SameGoal(_) => PlanFailure::Invalid,
         PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
         | PlanError::SwarmFull
         | PlanError::Path(..)
         | PlanError::Schedule(_, ScheduleError::PiecesFull | ScheduleError::GatesFull) => {
             PlanFailure::Capacity
         }
-        PlanError::Schedule(_, ScheduleError::Blocked | ScheduleError::BadIndex) => PlanFailure::Blocked,
+        PlanError::Schedule(_, ScheduleError::Blocked | ScheduleError::BadIndex) => {
+            PlanFailure::Blocked
+        }
         PlanError::Search(..) | PlanError::Assignment(_) => PlanFailure::Unreachable,
     }
 }

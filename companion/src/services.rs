@@ -1,6 +1,7 @@
-//! What ground tools use of a companion beside commands: files, parameters, time, a restart. Served on either link, to frames
-//! addressed to our own system and component, so a ground station may come by the radio or through the autopilot's routing.
-//! Only a ground station of the mission sets parameters and uses files; what others may request is in `answer_limits`.
+//! What ground tools use of a companion beside commands: files, parameters, time, a restart. Served
+//! on either link, to frames addressed to our own system and component, so a ground station may
+//! come by the radio or through the autopilot's routing. Only a ground station of the mission sets
+//! parameters and uses files; what others may request is in `answer_limits`.
 
 pub mod ftp;
 pub mod parameters;
@@ -148,7 +149,8 @@ impl Services {
                 }
             }
             PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
-                (0..parameters::PARAMETER_COUNT).for_each(|index| self.send_parameter(heard, index, links));
+                (0..parameters::PARAMETER_COUNT)
+                    .for_each(|index| self.send_parameter(heard, index, links));
             }
             PARAM_REQUEST_READ_DATA::ID if for_us(2) => self.handle_parameter_read(heard, links),
             PARAM_SET_DATA::ID if for_us(4) => self.handle_parameter_set(heard, links),
@@ -188,7 +190,11 @@ impl Services {
     }
 
     /// Sets a parameter; it is in use from the next [`Self::apply_parameters`] on.
-    pub(crate) fn set_parameter_value(&mut self, index: usize, value: f32) -> Result<(), ParameterError> {
+    pub(crate) fn set_parameter_value(
+        &mut self,
+        index: usize,
+        value: f32,
+    ) -> Result<(), ParameterError> {
         match &mut self.store {
             Some(store) => store.set_parameter(index, value),
             None => self.parameters.set(index, value).map(|_| ()),
@@ -204,7 +210,9 @@ impl Services {
             Some(_) if heard.sender != SenderKind::GroundStation => {
                 Err(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED)
             }
-            Some(_) if kind != PARAM_TYPE_REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
+            Some(_) if kind != PARAM_TYPE_REAL32 => {
+                Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH)
+            }
             Some(index) => self.set_parameter_value(index, value).map_err(|why| match why {
                 ParameterError::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
                 ParameterError::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
@@ -242,7 +250,8 @@ fn refuse_parameter(
 /// TIMESYNC: bytes 16 and 17 name an addressee, 0 for all.
 fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     let p = heard.frame.padded();
-    let to_us = (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPANION_COMPONENT);
+    let to_us =
+        (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPANION_COMPONENT);
     let request = heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_us);
     if let Some(request) = request {
         let tc1 = heard.now.as_micros() as i64 * 1000;
@@ -261,9 +270,12 @@ fn parameter_name(field: &[u8]) -> &[u8] {
 
 /// AUTOPILOT_VERSION: what it can do, and the version of this crate.
 pub(crate) fn autopilot_version(system_id: u8) -> AUTOPILOT_VERSION_DATA {
-    let [major, minor, patch] =
-        [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")]
-            .map(|part| part.parse::<u8>().unwrap_or(0));
+    let [major, minor, patch] = [
+        env!("CARGO_PKG_VERSION_MAJOR"),
+        env!("CARGO_PKG_VERSION_MINOR"),
+        env!("CARGO_PKG_VERSION_PATCH"),
+    ]
+    .map(|part| part.parse::<u8>().unwrap_or(0));
     AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2

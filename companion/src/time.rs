@@ -1,8 +1,10 @@
-//! Time as an argument: microseconds since an arbitrary start that the shell chooses. No clock is read here.
+//! Time as an argument: microseconds since an arbitrary start that the shell chooses. No clock is
+//! read here.
 
 use core::ops::{Add, Sub};
 
-/// A point in time, microseconds since the shell's own start. Never goes back; 2⁶⁴ µs are 584 000 years.
+/// A point in time, microseconds since the shell's own start. Never goes back; 2⁶⁴ µs are 584 000
+/// years.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instant(u64);
 

@@ -1,7 +1,8 @@
 //! The one table of what is due when.
 //!
-//! Three timers wake the shell ([`Timers::next_due`]): the step of the control loop, heartbeats, and the swarm's state. The rest are looked
-//! at in each step: what they name happens in the first step at or after their time.
+//! Three timers wake the shell ([`Timers::next_due`]): the step of the control loop, heartbeats,
+//! and the swarm's state. The rest are looked at in each step: what they name happens in the first
+//! step at or after their time.
 
 use crate::time::{Duration, Instant};
 
@@ -71,7 +72,8 @@ impl Timers {
         due
     }
 
-    /// Sets the next due time to `every` after the last one. After a gap the period starts again instead of catching up.
+    /// Sets the next due time to `every` after the last one. After a gap the period starts again
+    /// instead of catching up.
     pub(crate) fn schedule_next(&mut self, timer: Timer, now: Instant, every: Duration) {
         let due = self.due_at[timer as usize] + every;
         self.set(timer, if due > now { due } else { now + every });
@@ -84,8 +86,8 @@ impl Timers {
 
     /// When the shell is to call again.
     pub(crate) fn next_due(&self) -> Instant {
-        WAKING_TIMERS
-            .iter()
-            .fold(self.due_at[Timer::Step as usize], |next, timer| next.min(self.due_at[*timer as usize]))
+        WAKING_TIMERS.iter().fold(self.due_at[Timer::Step as usize], |next, timer| {
+            next.min(self.due_at[*timer as usize])
+        })
     }
 }

@@ -1,8 +1,9 @@
 //! The smallest board: all that the shell wants of a machine, here of a desk.
 //!
-//! A board has a clock (embassy-time's driver), two UARTs (embedded-io-async), a flash for files and parameters, and something
-//! that runs tasks. `src/boards/pico2` is the same with registers: links and setpoints in an interrupt above planning, and
-//! a watchdog that is fed while `Shell::is_alive`.
+//! A board has a clock (embassy-time's driver), two UARTs (embedded-io-async), a flash for files
+//! and parameters, and something that runs tasks. `src/boards/pico2` is the same with registers:
+//! links and setpoints in an interrupt above planning, and a watchdog that is fed while
+//! `Shell::is_alive`.
 //!
 //! `cargo run -p firmware --example smallest_board`
 
@@ -82,22 +83,26 @@ impl Flash for Ram {
 static SHELL: Shell = Shell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
 static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
-static SWARM: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
+static SWARM: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> =
+    ConstStaticCell::new(SwarmPlan::new());
 static OWN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
 
 /// Brings a companion up and runs it; nothing is uploaded, so it has no mission.
 async fn board() {
     let mut flash = Ram(vec![0xff; LAYOUT.len() as usize]);
     let store = Store::mount(LAYOUT, &mut flash);
-    let system_id = wait_for_system_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
+    let system_id =
+        wait_for_system_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
     let nowhere = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
-    let settings =
-        Config::new(system_id, Point::zeros(), nowhere).checked().expect("these settings are sound");
+    let settings = Config::new(system_id, Point::zeros(), nowhere)
+        .checked()
+        .expect("these settings are sound");
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
     SHELL.start(companion);
     let memory = PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM.take(), own: OWN.take() };
-    let mut planner = Planner { roadmap: None, field: None, mission: None, system_id, files: 0, memory };
+    let mut planner =
+        Planner { roadmap: None, field: None, mission: None, system_id, files: 0, memory };
     let links = join5(
         SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, false),
         SHELL.receive(Link::Swarm, &FROM_RADIO, false),
@@ -108,9 +113,11 @@ async fn board() {
     join(links, SHELL.run_planner_and_flash(&mut planner, &mut flash)).await;
 }
 
-/// The far end of the autopilot's line: a HEARTBEAT each second, and what the board sends is counted.
+/// The far end of the autopilot's line: a HEARTBEAT each second, and what the board sends is
+/// counted.
 async fn autopilot() -> usize {
-    let heartbeat = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
+    let heartbeat =
+        HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
     let (mut heard, mut bytes) = (0, [0; MAX_FRAME_LEN]);
     for sequence in 0..50 {
         if sequence % 10 == 0 {

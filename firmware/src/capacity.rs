@@ -1,4 +1,5 @@
-//! Capacities of a board, and what each costs in RAM. The RP2350 has half a megabyte in all, so it takes half.
+//! Capacities of a board, and what each costs in RAM. The RP2350 has half a megabyte in all, so it
+//! takes half.
 
 use companion::Companion;
 
@@ -9,9 +10,11 @@ const fn halved_on_small_board(of: usize) -> usize {
 
 /// Nodes of a roadmap, terminals among them: 70 bytes each in scratch.
 pub const ROADMAP_NODES: usize = halved_on_small_board(4096);
-/// Half-edges of a roadmap: 4 bytes each, in flash; 8 bytes for each pair of them while a roadmap is built on board.
+/// Half-edges of a roadmap: 4 bytes each, in flash; 8 bytes for each pair of them while a roadmap
+/// is built on board.
 pub const HALF_EDGES: usize = halved_on_small_board(65_536);
-/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 100 × 100 × 50 m at Dmax 8 m.
+/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 100 × 100 ×
+/// 50 m at Dmax 8 m.
 pub const ROADMAP_CUBES: usize = halved_on_small_board(8192);
 /// Vehicles of a swarm, and goals: 1.7 kB each, the most of it in the swarm's plan.
 pub const VEHICLES: usize = halved_on_small_board(32);

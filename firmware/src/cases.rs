@@ -1,4 +1,5 @@
-//! Random cases that a board and the desk compute alike, to be compared bit by bit, and that tests count instructions of.
+//! Random cases that a board and the desk compute alike, to be compared bit by bit, and that tests
+//! count instructions of.
 //!
 //! All come from a seed and are the same everywhere: PCG numbers, f32, no clock.
 
@@ -30,8 +31,12 @@ const ADVICE_PER_PATH: usize = 4;
 const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Schedule of every swarm of these cases.
-pub const SCHEDULE: ScheduleConfig =
-    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.75, cruise_mps: 2.0, vertical_mps: 1.0 };
+pub const SCHEDULE: ScheduleConfig = ScheduleConfig {
+    separation_m: 2.0,
+    parked_separation_m: 1.75,
+    cruise_mps: 2.0,
+    vertical_mps: 1.0,
+};
 /// Radius and safety margin of every vehicle of these cases, metres.
 pub const CLEARANCE_M: f32 = 0.8;
 /// Assignment of goals in the cases of whole swarms.
@@ -56,7 +61,13 @@ pub fn goal_descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
 
 /// The plan request for that swarm.
 pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
-    PlanRequest { vehicles, descents_m, mode: ASSIGNMENT_MODE, schedule: SCHEDULE, max_gates: GATES }
+    PlanRequest {
+        vehicles,
+        descents_m,
+        mode: ASSIGNMENT_MODE,
+        schedule: SCHEDULE,
+        max_gates: GATES,
+    }
 }
 
 /// Scratch of [`plan_case`].
@@ -91,7 +102,8 @@ pub struct PlanCase {
     pub scales: u32,
 }
 
-/// One case: up to ten vehicles between random nodes, edges blocked at random, then random neighbours along every path.
+/// One case: up to ten vehicles between random nodes, edges blocked at random, then random
+/// neighbours along every path.
 pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> PlanCase {
     let mut rng = Pcg32::seed_from_u64(number);
     let nodes = view.node_count();
@@ -131,7 +143,8 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
             let _ = path.push(view.node(node), CLEARANCE_M);
         }
         for waypoint in path.waypoints() {
-            let numbers = waypoint.position.iter().chain([&waypoint.along_m, &waypoint.clearance_m]);
+            let numbers =
+                waypoint.position.iter().chain([&waypoint.along_m, &waypoint.clearance_m]);
             numbers.for_each(|number| paths_crc.update(&number.to_bits().to_le_bytes()));
         }
         (0..ADVICE_PER_PATH).for_each(|_| add_advice_along_path(&mut rng, &path, scales_crc));
@@ -145,14 +158,19 @@ fn digest_value(digest: Digest<'_, u32, Table<1>>) -> u32 {
     digest.finalize()
 }
 
-fn add_advice_along_path(rng: &mut Pcg32, path: &Path<WAYPOINTS>, scales: &mut Digest<'_, u32, Table<1>>) {
+fn add_advice_along_path(
+    rng: &mut Pcg32,
+    path: &Path<WAYPOINTS>,
+    scales: &mut Digest<'_, u32, Table<1>>,
+) {
     let along_m = random_between(rng, 0.0, path.length_m());
     let Some(position) = path.point_at(along_m) else { return };
     let neighbours: Vec<Neighbour, VEHICLES> =
         (0..VEHICLES).map(|k| random_neighbour(rng, k, &position, 12.0)).collect();
     let own = OwnVehicle { rank: 3, position, along_m, path, detours: false };
     for method in [Method::Priority, Method::Algorithm2] {
-        let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
+        let cfg =
+            DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
         let advice = deconflict::advise(&cfg, &own, &[], &neighbours);
         scales.update(&advice.speed_scale.to_bits().to_le_bytes());
         scales.update(&advice.stop_within_m.to_bits().to_le_bytes());
@@ -182,8 +200,8 @@ pub struct StepCase {
 }
 
 impl StepCase {
-    /// A random case beside so many neighbours, at most [`VEHICLES`]. A hard one has everybody near and without a shared
-    /// plan, every gate within reach and passed.
+    /// A random case beside so many neighbours, at most [`VEHICLES`]. A hard one has everybody near
+    /// and without a shared plan, every gate within reach and passed.
     pub fn new(rng: &mut Pcg32, neighbours: usize, hard: bool) -> Self {
         let cfg = DeconflictConfig {
             method: Method::Priority,
@@ -205,7 +223,8 @@ impl StepCase {
             id: 2 + random_below(rng, neighbours.max(1)) as u8,
             until_m: random_between(rng, 0.0, 60.0),
         };
-        let mut gates: Vec<_, GATES> = (0..random_below(rng, GATES + 1)).map(|_| gate(rng)).collect();
+        let mut gates: Vec<_, GATES> =
+            (0..random_below(rng, GATES + 1)).map(|_| gate(rng)).collect();
         gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
         let unplanned = if hard { 1.0 } else { random_between(rng, 0.0, 1.0) };
         // Half of the hard cases pass all gates, the other half have nobody's progress.
@@ -214,9 +233,8 @@ impl StepCase {
             .map(|k| Neighbour {
                 progress_m: match passed {
                     true => Some(100.0),
-                    false => {
-                        (random_between(rng, 0.0, 1.0) > unplanned).then(|| random_between(rng, 0.0, 60.0))
-                    }
+                    false => (random_between(rng, 0.0, 1.0) > unplanned)
+                        .then(|| random_between(rng, 0.0, 60.0)),
                 },
                 grounded: !hard && rng.next_u32().is_multiple_of(8),
                 ..random_neighbour(rng, k, &position, if hard { 12.0 } else { 40.0 })
@@ -228,8 +246,14 @@ impl StepCase {
     /// The call that is counted.
     pub fn advise(&self, method: Method) -> Advice {
         let Self { position, along_m, path, .. } = self;
-        let own = OwnVehicle { rank: 0, position: *position, along_m: *along_m, path, detours: false };
-        deconflict::advise(&DeconflictConfig { method, ..self.cfg }, &own, &self.gates, &self.neighbours)
+        let own =
+            OwnVehicle { rank: 0, position: *position, along_m: *along_m, path, detours: false };
+        deconflict::advise(
+            &DeconflictConfig { method, ..self.cfg },
+            &own,
+            &self.gates,
+            &self.neighbours,
+        )
     }
 }
 
@@ -258,14 +282,15 @@ pub const ROADMAP_CONFIG: Config = Config {
     sampling: Sampling::Uniform,
 };
 
-/// The map that lies in a board's memory: its head (three dimensions, three coordinates of the minimum corner, the resolution)
-/// and its words.
+/// The map that lies in a board's memory: its head (three dimensions, three coordinates of the
+/// minimum corner, the resolution) and its words.
 ///
 /// # Panics
 /// It is none.
 pub fn voxel_map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
-    let word =
-        |i: usize| u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]]);
+    let word = |i: usize| {
+        u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]])
+    };
     let shape = GridShape {
         dims: [word(0), word(1), word(2)],
         min: Point::new(f32::from_bits(word(3)), f32::from_bits(word(4)), f32::from_bits(word(5))),
@@ -278,6 +303,8 @@ pub fn voxel_map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
 pub fn roadmap_crc(nodes: &[Point], edges: &[Edge]) -> u32 {
     let mut digest = CRC32.digest();
     nodes.iter().flatten().for_each(|c| digest.update(&c.to_bits().to_le_bytes()));
-    edges.iter().for_each(|e| [e.a, e.b].iter().for_each(|node| digest.update(&node.to_le_bytes())));
+    edges
+        .iter()
+        .for_each(|e| [e.a, e.b].iter().for_each(|node| digest.update(&node.to_le_bytes())));
     digest.finalize()
 }

@@ -154,7 +154,8 @@ impl CrashRecord {
         let mut text = [0; 4 * TEXT_WORDS];
         text[..self.text.len()].copy_from_slice(self.text.as_bytes());
         let mut words = [0; RECORD_WORDS];
-        let head = [self.end as u32, self.text.len() as u32, self.task.0 as u32, self.task.1, self.done];
+        let head =
+            [self.end as u32, self.text.len() as u32, self.task.0 as u32, self.task.1, self.done];
         let failed = self.failed_work.iter().flat_map(|(files, times)| [*files, *times]);
         let text = text.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let all = head.into_iter().chain(failed).chain(text);
@@ -172,7 +173,8 @@ impl CrashRecord {
             return None;
         }
         let work = |word: u32| {
-            let all = [FileWork::None, FileWork::CheckRoadmap, FileWork::ReadMission, FileWork::Plan];
+            let all =
+                [FileWork::None, FileWork::CheckRoadmap, FileWork::ReadMission, FileWork::Plan];
             all.into_iter().find(|work| *work as u32 == word)
         };
         let mut bytes = [0; 4 * TEXT_WORDS];
@@ -245,7 +247,10 @@ mod tests {
         }
         let mut asked = fresh.clone();
         asked.note_requested_restart();
-        assert_eq!((says(&asked, ResetCause::Request), says(&asked, ResetCause::Unknown)), (None, None));
+        assert_eq!(
+            (says(&asked, ResetCause::Request), says(&asked, ResetCause::Unknown)),
+            (None, None)
+        );
         let mut crashed = fresh;
         crashed.note_crash("Restarted: panic at a_file_whose_name_is_so_long.rs:12345");
         let cut = "Restarted: panic at a_file_whose_name_is_so_long.r";
@@ -265,9 +270,11 @@ mod tests {
 
     #[test]
     fn files_that_bring_three_starts_in_a_row_down_are_set_aside() {
-        for (cause, panics) in
-            [(ResetCause::Request, true), (ResetCause::Unknown, true), (ResetCause::Watchdog, false)]
-        {
+        for (cause, panics) in [
+            (ResetCause::Request, true),
+            (ResetCause::Unknown, true),
+            (ResetCause::Watchdog, false),
+        ] {
             let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
             assert!((0..3).all(|_| fails(&mut kept, 7, cause, panics)));
             assert!(!kept.begin_work(FileWork::Plan, 7), "three times");

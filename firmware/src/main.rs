@@ -1,7 +1,8 @@
 //! The firmware: a companion between an autopilot's serial port and a swarm's radio.
 //!
-//! Two executors, both in interrupts: links and setpoints above plans and flash. Thread mode only sleeps, by WFI. (Embassy's
-//! executor for thread mode sleeps by WFE, which QEMU does not emulate: it would never sleep.)
+//! Two executors, both in interrupts: links and setpoints above plans and flash. Thread mode only
+//! sleeps, by WFI. (Embassy's executor for thread mode sleeps by WFE, which QEMU does not emulate:
+//! it would never sleep.)
 #![no_std]
 #![no_main]
 #![expect(unsafe_code, reason = "the handler of faults, and where a static lies")]
@@ -46,7 +47,8 @@ const MISSION_SET_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row
 static SHELL: StaticCell<Shell> = StaticCell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
 static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
-static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
+static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> =
+    ConstStaticCell::new(SwarmPlan::new());
 static OWN_PLAN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
 static MISSION_BYTES: ConstStaticCell<[u8; MISSION_LEN]> = ConstStaticCell::new([0; MISSION_LEN]);
 static CRASH: StaticCell<String<50>> = StaticCell::new();
@@ -79,7 +81,8 @@ fn main() -> ! {
     links.spawn(watchdog_task(shell, watchdog).expect("there is one such task"));
     let said = StartReport { crashed, warnings };
     plans.spawn(
-        planner_and_flash_task(shell, links, autopilot, swarm, flash, said).expect("there is one such task"),
+        planner_and_flash_task(shell, links, autopilot, swarm, flash, said)
+            .expect("there is one such task"),
     );
     loop {
         sleep();
@@ -109,7 +112,8 @@ async fn planner_and_flash_task(
     let (lent, roadmap_aside) = find_roadmap(&mut store, &mut flash);
     let roadmap = lent.as_deref().and_then(|bytes| RoadmapView::parse(bytes).ok());
     let field = lent.as_deref().and_then(|bytes| FieldView::parse(bytes).ok());
-    let map_crc = roadmap.as_ref().map(RoadmapView::crc).or(field.as_ref().map(FieldView::crc)).unwrap_or(0);
+    let map_crc =
+        roadmap.as_ref().map(RoadmapView::crc).or(field.as_ref().map(FieldView::crc)).unwrap_or(0);
     let FoundMission { mission, files, set_aside: mission_aside, refused } =
         find_mission(&store, &mut flash, roadmap.as_ref(), map_crc);
     let known = match store.parameters().system_id() {
@@ -129,8 +133,9 @@ async fn planner_and_flash_task(
     let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
     let unfit = own.as_ref().and_then(|own| own.as_ref().err().copied());
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
-    let config =
-        own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_PLACE));
+    let config = own
+        .and_then(Result::ok)
+        .unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_PLACE));
     // Neither the stack nor the task's own memory has room for another.
     // `expect` would print the error, and printing one that has a name in it takes 3 kB of flash.
     let Ok(settings) = config.checked() else { panic!("every setting was checked") };
@@ -151,12 +156,14 @@ async fn planner_and_flash_task(
     }
     shell.start(companion);
     start_links(links, shell, known.is_none(), autopilot, swarm);
-    let memory = PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
+    let memory =
+        PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
     let mut planner = Planner { roadmap, field, mission, system_id, files, memory };
     shell.run_planner_and_flash(&mut planner, &mut flash).await
 }
 
-/// The newest roadmap or field that is one, as long as it may be used; and whether one was set aside.
+/// The newest roadmap or field that is one, as long as it may be used; and whether one was set
+/// aside.
 fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, bool) {
     let mut aside = false;
     loop {
@@ -166,7 +173,8 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, boo
             let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
             let begun = crash::begin_work(FileWork::CheckRoadmap, sum);
             aside |= !begun;
-            let is_one = begun && (RoadmapView::parse(&lent).is_ok() || FieldView::parse(&lent).is_ok());
+            let is_one =
+                begun && (RoadmapView::parse(&lent).is_ok() || FieldView::parse(&lent).is_ok());
             crash::finish_work();
             if is_one {
                 return (Some(lent), aside);
@@ -192,7 +200,8 @@ struct FoundMission {
     refused: Option<MissionError>,
 }
 
-/// Looks for the mission on this roadmap. It is copied: the journal it lies in moves. `map_crc` is the roadmap's or the field's.
+/// Looks for the mission on this roadmap. It is copied: the journal it lies in moves. `map_crc` is
+/// the roadmap's or the field's.
 fn find_mission(
     store: &Store,
     flash: &mut Flash,
@@ -209,7 +218,8 @@ fn find_mission(
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
     let files = map_crc ^ sum.rotate_left(1);
     // The crash may have come from reading the mission, or from a plan.
-    if !crash::may_begin(FileWork::Plan, files) || !crash::begin_work(FileWork::ReadMission, files) {
+    if !crash::may_begin(FileWork::Plan, files) || !crash::begin_work(FileWork::ReadMission, files)
+    {
         return FoundMission { files, set_aside: true, ..FoundMission::default() };
     }
     let read = MissionView::parse(bytes);

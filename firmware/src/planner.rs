@@ -1,5 +1,5 @@
-//! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission file as they lie in flash, or a
-//! way around what is in its way.
+//! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission
+//! file as they lie in flash, or a way around what is in its way.
 
 use companion::planner::coverage::Request;
 use companion::storage::mission_file::coverage::CoverageView;
@@ -83,8 +83,13 @@ pub struct Planner<'a> {
 
 impl Planner<'_> {
     /// Inputs of the plan that the companion wants: lost vehicles, or keep-out zones of its detour.
-    pub fn read_inputs(&mut self, wanted: PlanKind, companion: &mut BoardCompanion) -> Option<DetourRequest> {
-        let OwnPlanMemory { obstacles, too_many_zones: crowded, done, losses, .. } = &mut *self.memory.own;
+    pub fn read_inputs(
+        &mut self,
+        wanted: PlanKind,
+        companion: &mut BoardCompanion,
+    ) -> Option<DetourRequest> {
+        let OwnPlanMemory { obstacles, too_many_zones: crowded, done, losses, .. } =
+            &mut *self.memory.own;
         obstacles.clear();
         done.clear();
         losses.clear();
@@ -186,7 +191,8 @@ fn plan_area_detour<'m>(
     Ok(&own.plan)
 }
 
-/// The plan of a coverage mission. Apart, so that what it has on the stack is not there while others plan.
+/// The plan of a coverage mission. Apart, so that what it has on the stack is not there while
+/// others plan.
 #[inline(never)]
 fn plan_area<'m>(
     mission: &MissionView<'_>,
@@ -197,7 +203,14 @@ fn plan_area<'m>(
     let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
     let PlanningMemory { scratch, swarm, own } = memory;
     let ws = scratch.area();
-    planner::coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+    planner::coverage::plan_flights::<
+        AREA_VERTICES,
+        LANES,
+        VEHICLES,
+        AREA_CORNERS,
+        VEHICLES,
+        WAYPOINTS,
+    >(
         &Request { mission, view, field, max_gates: GATES, photographed: &own.done },
         own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,

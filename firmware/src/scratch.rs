@@ -1,7 +1,8 @@
-//! What a board plans with: one piece of memory, for planning on a roadmap, for building one, or for a coverage mission.
+//! What a board plans with: one piece of memory, for planning on a roadmap, for building one, or
+//! for a coverage mission.
 //!
-//! An enum would do but for its change from one use to the other, which the compiler makes on the stack, where there is no
-//! room for it.
+//! An enum would do but for its change from one use to the other, which the compiler makes on the
+//! stack, where there is no room for it.
 #![expect(unsafe_code, reason = "four uses of one piece of memory")]
 
 use core::mem::{ManuallyDrop, MaybeUninit};
@@ -71,9 +72,18 @@ union Memory {
 const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageWorkspace, AreaWorkspace) = {
     // SAFETY: the compiler checks it.
     unsafe {
-        let zeroed =
-            (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
-        (zeroed.0.assume_init(), zeroed.1.assume_init(), zeroed.2.assume_init(), zeroed.3.assume_init())
+        let zeroed = (
+            MaybeUninit::zeroed(),
+            MaybeUninit::zeroed(),
+            MaybeUninit::zeroed(),
+            MaybeUninit::zeroed(),
+        );
+        (
+            zeroed.0.assume_init(),
+            zeroed.1.assume_init(),
+            zeroed.2.assume_init(),
+            zeroed.3.assume_init(),
+        )
     }
 };
 
@@ -86,7 +96,8 @@ impl WorkspaceOverlay {
     /// The memory for planning from here on.
     pub fn planner(&mut self) -> &mut Planner {
         self.switch_use(OverlayUse::Plan);
-        // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner was written since.
+        // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner
+        // was written since.
         unsafe { &mut self.memory.plan }
     }
 
@@ -176,7 +187,8 @@ pub struct RoadmapBuilder {
 }
 
 impl RoadmapBuilder {
-    /// Samples nodes and joins them: Algorithm 1 of P3D. Every edge carries the clearance it was tested at.
+    /// Samples nodes and joins them: Algorithm 1 of P3D. Every edge carries the clearance it was
+    /// tested at.
     ///
     /// # Errors
     /// The map has no room, or the roadmap is larger than this board's.

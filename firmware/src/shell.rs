@@ -1,8 +1,10 @@
 //! The shell around the companion: what moves bytes, keeps time and plans.
 //!
-//! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`run_timers`](Shell::run_timers) are tasks of an interrupt's
-//! executor; [`run_planner_and_flash`](Shell::run_planner_and_flash) is a task of another one below it, so a long plan never holds a setpoint up. The companion is
-//! held only for the time of one of its calls, never across an `await`, and both executors wait for so long ([`HoldsExecutors`]).
+//! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`run_timers`](Shell::run_timers)
+//! are tasks of an interrupt's executor; [`run_planner_and_flash`](Shell::run_planner_and_flash) is
+//! a task of another one below it, so a long plan never holds a setpoint up. The companion is held
+//! only for the time of one of its calls, never across an `await`, and both executors wait for so
+//! long ([`HoldsExecutors`]).
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -56,7 +58,8 @@ pub struct Shell {
     restart_ms: AtomicU32,
     /// Whether the flash is at work.
     flash_busy: AtomicBool,
-    /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
+    /// When each task last came by, milliseconds: receiving and transmitting of both links, and
+    /// time.
     checked_in_ms: [AtomicU32; TASK_COUNT],
     /// Whether there is a companion.
     started: AtomicBool,
@@ -72,8 +75,9 @@ enum Request {
     Read(u32, usize),
 }
 
-/// The system id of the autopilot: of those whose heartbeat comes within a while after the first one, that of which most is
-/// heard, since an autopilot may pass on those of others. `None` where none comes in time.
+/// The system id of the autopilot: of those whose heartbeat comes within a while after the first
+/// one, that of which most is heard, since an autopilot may pass on those of others. `None` where
+/// none comes in time.
 pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
     let mut ear = AutopilotListener::new();
     let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
@@ -180,11 +184,16 @@ impl Shell {
     /// Holds the companion for the time of `run_planner_and_flash`.
     fn lock_companion<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
         self.companion.lock(|held| {
-            work(held.borrow_mut().as_deref_mut().expect("the companion is put in before any task starts"))
+            work(
+                held.borrow_mut()
+                    .as_deref_mut()
+                    .expect("the companion is put in before any task starts"),
+            )
         })
     }
 
-    /// Does something with the companion, at a time no earlier than that of the last, and hands on what came of it.
+    /// Does something with the companion, at a time no earlier than that of the last, and hands on
+    /// what came of it.
     fn with_companion<T>(
         &'static self,
         work: impl FnOnce(&mut BoardCompanion, companion::Instant) -> T,
@@ -205,7 +214,9 @@ impl Shell {
                         }
                     }
                     // The event's text is reported already.
-                    Event::StateChanged { .. } | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
+                    Event::StateChanged { .. }
+                    | Event::WaitsForStart { .. }
+                    | Event::FlownAround { .. } => {}
                 }
             }
             if companion.streams_setpoints() {
@@ -223,7 +234,12 @@ impl Shell {
 
     /// Requests a restart. A repeated request does not delay it.
     fn request_restart(&self) {
-        let _ = self.restart_ms.compare_exchange(0, now_ms().max(1), Ordering::Relaxed, Ordering::Relaxed);
+        let _ = self.restart_ms.compare_exchange(
+            0,
+            now_ms().max(1),
+            Ordering::Relaxed,
+            Ordering::Relaxed,
+        );
     }
 
     fn check_in(&self, task: usize) {
@@ -241,7 +257,9 @@ impl Shell {
         loop {
             match with_timeout(CHECK_IN_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
-                    self.with_companion(|companion, now| companion.handle_bytes(link, now, &chunk[..length]));
+                    self.with_companion(|companion, now| {
+                        companion.handle_bytes(link, now, &chunk[..length])
+                    });
                     if let Some(ear) = &mut ear {
                         ear.handle_bytes(&chunk[..length]);
                         if ear.most_heard().is_some() {
@@ -259,7 +277,11 @@ impl Shell {
                 self.with_companion(|companion, _| {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
-                    companion.send_text_with_numbers(true, LINE_TEXTS[link as usize], [count, damaged]);
+                    companion.send_text_with_numbers(
+                        true,
+                        LINE_TEXTS[link as usize],
+                        [count, damaged],
+                    );
                 });
             }
             self.check_in(link as usize);
@@ -294,18 +316,20 @@ impl Shell {
         loop {
             let now = now();
             let due = self.lock_companion(|companion| companion.poll_timeout());
-            let due = due.unwrap_or(now + companion::Duration::from_micros(CHECK_IN_EVERY.as_micros()));
+            let due =
+                due.unwrap_or(now + companion::Duration::from_micros(CHECK_IN_EVERY.as_micros()));
             if due <= now {
                 self.with_companion(BoardCompanion::handle_timeout);
             } else {
-                select(Timer::at(Instant::from_micros(due.as_micros())), self.timer_changed.wait()).await;
+                select(Timer::at(Instant::from_micros(due.as_micros())), self.timer_changed.wait())
+                    .await;
             }
             self.check_in(TIME_TASK);
         }
     }
 
-    /// Answers the companion's requests for plans and for its flash, one after the other: the flash is never erased while
-    /// a roadmap in it is planned on.
+    /// Answers the companion's requests for plans and for its flash, one after the other: the flash
+    /// is never erased while a roadmap in it is planned on.
     pub async fn run_planner_and_flash(
         &'static self,
         planner: &mut Planner<'_>,
@@ -313,7 +337,8 @@ impl Shell {
     ) -> ! {
         loop {
             if let Some(wanted) = self.plan_requests.take() {
-                let detour = self.lock_companion(|companion| planner.read_inputs(wanted, companion));
+                let detour =
+                    self.lock_companion(|companion| planner.read_inputs(wanted, companion));
                 let answer: Result<_, PlanFailure> = planner.answer(wanted, detour.as_ref());
                 self.with_companion(|companion, now| companion.handle_plan(now, wanted, answer));
                 continue;
@@ -324,8 +349,8 @@ impl Shell {
         }
     }
 
-    /// Executes one flash request of the companion; false if it asks for none, or is about to restart: that must
-    /// not tear what is being written.
+    /// Executes one flash request of the companion; false if it asks for none, or is about to
+    /// restart: that must not tear what is being written.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
         if self.restart_ms.load(Ordering::Relaxed) != 0 {
             return false;
@@ -358,7 +383,8 @@ impl Shell {
         true
     }
 
-    /// Whether a restart was asked for, what was to be said before has had time to go out, and the flash is at rest.
+    /// Whether a restart was asked for, what was to be said before has had time to go out, and the
+    /// flash is at rest.
     pub fn is_restart_due(&self) -> bool {
         let asked = self.restart_ms.load(Ordering::Relaxed);
         asked != 0
@@ -366,8 +392,8 @@ impl Shell {
             && !self.flash_busy.load(Ordering::Relaxed)
     }
 
-    /// Whether every task of the links and of time came by lately, and so did the last setpoint where they are to flow: else the
-    /// watchdog is left to bite.
+    /// Whether every task of the links and of time came by lately, and so did the last setpoint
+    /// where they are to flow: else the watchdog is left to bite.
     pub fn is_alive(&self) -> bool {
         self.is_alive_at(now_ms())
     }
@@ -377,7 +403,9 @@ impl Shell {
             return now_ms < START_TIMEOUT_MS;
         }
         let limit = 4 * CHECK_IN_EVERY.as_millis() as u32;
-        self.checked_in_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
+        self.checked_in_ms
+            .iter()
+            .all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
             && self.setpoints.since_last_ms(now_ms).is_none_or(|passed| passed < limit)
     }
 }
@@ -393,7 +421,8 @@ impl Default for Shell {
 /// be seen.
 struct SetpointGaps {
     count: AtomicU32,
-    /// The longest time between two, or from the stream's begin to the first or from the last to its end, milliseconds.
+    /// The longest time between two, or from the stream's begin to the first or from the last to
+    /// its end, milliseconds.
     gap_ms: AtomicU32,
     /// When the last went out, or the stream began, milliseconds; 0 while there is no stream.
     last_ms: AtomicU32,
@@ -412,7 +441,8 @@ impl SetpointGaps {
 
     /// The companion streams them, from now on if it did not before.
     fn begin_stream(&self, now_ms: u32) {
-        let _ = self.last_ms.compare_exchange(0, now_ms.max(1), Ordering::Relaxed, Ordering::Relaxed);
+        let _ =
+            self.last_ms.compare_exchange(0, now_ms.max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
 
     /// Time since the last, if more are to come, milliseconds.
@@ -431,7 +461,8 @@ impl SetpointGaps {
         }
     }
 
-    /// Returns the count and the longest gap of the setpoints of a flight that is over, and clears both; `None` without any.
+    /// Returns the count and the longest gap of the setpoints of a flight that is over, and clears
+    /// both; `None` without any.
     fn take_setpoint_stats(&self, now_ms: u32) -> Option<[u32; 2]> {
         self.end_stream(now_ms);
         let reported = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
@@ -459,7 +490,10 @@ mod tests {
         assert_eq!(setpoints.since_last_ms(1000), None);
         setpoints.note_setpoint(1000);
         setpoints.note_setpoint(1050);
-        assert_eq!((setpoints.since_last_ms(1050), setpoints.since_last_ms(1500)), (Some(0), Some(450)));
+        assert_eq!(
+            (setpoints.since_last_ms(1050), setpoints.since_last_ms(1500)),
+            (Some(0), Some(450))
+        );
         setpoints.end_stream(1500);
         assert_eq!(setpoints.since_last_ms(9000), None);
         setpoints.begin_stream(9000);
@@ -473,7 +507,8 @@ mod tests {
         let shell = Shell::new();
         assert!(shell.is_alive_at(19_999) && !shell.is_alive_at(20_000), "it starts");
         shell.started.store(true, Ordering::Relaxed);
-        let come_by = |ms| shell.checked_in_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
+        let come_by =
+            |ms| shell.checked_in_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
         come_by(1000);
         assert!(shell.is_alive_at(1399) && !shell.is_alive_at(1400));
         come_by(5000);

@@ -1,5 +1,5 @@
-//! A line that fails under the shell: overruns and framing errors at the driver's boundary are counted, reported and survived. The
-//! clock is the test's.
+//! A line that fails under the shell: overruns and framing errors at the driver's boundary are
+//! counted, reported and survived. The clock is the test's.
 
 use std::collections::VecDeque;
 use std::pin::pin;
@@ -69,7 +69,8 @@ impl Write for End<'_> {
 
 /// An autopilot's heartbeat.
 fn beat() -> Vec<u8> {
-    let data = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
+    let data =
+        HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
     let mut out = [0; frame::MAX_FRAME_LEN];
     let length = frame::encode(Header { system: 1, component: 1, sequence: 0 }, &data, &mut out);
     out[..length].to_vec()
@@ -79,14 +80,16 @@ fn beat() -> Vec<u8> {
 fn texts(bytes: &[u8]) -> Vec<String> {
     let (mut framer, mut input) = (Framer::new(), bytes);
     let frames = std::iter::from_fn(|| framer.next(companion::Instant::ZERO, &mut input));
-    let text =
-        |frame: Frame| frame.decode::<STATUSTEXT_DATA>().map(|data| data.text.to_str().unwrap().to_owned());
+    let text = |frame: Frame| {
+        frame.decode::<STATUSTEXT_DATA>().map(|data| data.text.to_str().unwrap().to_owned())
+    };
     frames.filter(|frame| frame.message_id == STATUSTEXT_DATA::ID).filter_map(text).collect()
 }
 
 #[test]
 fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
-    let config = Config::new(1, Point::zeros(), Geodetic { lat_deg: 47.0, lon_deg: 8.0, alt_m: 500.0 });
+    let config =
+        Config::new(1, Point::zeros(), Geodetic { lat_deg: 47.0, lon_deg: 8.0, alt_m: 500.0 });
     let shell: &'static Shell = Box::leak(Box::new(Shell::new()));
     shell.start(Box::leak(Box::new(BoardCompanion::new(config).expect("the settings are good"))));
     let lines = [Line::default(), Line::default()];
@@ -115,11 +118,13 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     receive(Ok(beat()));
     run(300);
     let reported = |link: usize| texts(&lines[link].sent.lock().unwrap());
-    let errors =
-        |link: usize| reported(link).into_iter().filter(|text| text.contains("errors")).collect::<Vec<_>>();
+    let errors = |link: usize| {
+        reported(link).into_iter().filter(|text| text.contains("errors")).collect::<Vec<_>>()
+    };
     assert_eq!(shell.line_errors[0].load(Ordering::Relaxed), 2);
     assert!(reported(0).contains(&"Autopilot found".to_owned()), "{:?}", reported(0));
-    // The first is reported at once, on both links, the others ten seconds later with all that came meanwhile.
+    // The first is reported at once, on both links, the others ten seconds later with all that came
+    // meanwhile.
     assert_eq!(errors(0), ["Autopilot line: 1 errors, 0 damaged frames"]);
     assert_eq!(errors(1), errors(0));
     (0..500).for_each(|_| receive(Err(ErrorKind::Other)));

@@ -8,7 +8,8 @@ use planner_core::roadmap::RoadmapView;
 
 /// Nodes of a roadmap, terminals among them: 30 bytes each in scratch.
 pub const ROADMAP_NODES: usize = 16_384;
-/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 250 × 250 × 100 m at Dmax 8 m.
+/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 250 × 250 ×
+/// 100 m at Dmax 8 m.
 pub const ROADMAP_CUBES: usize = 1 << 17;
 /// Vehicles of a swarm, and goals: 4 bytes for each pair, 1.6 kB for each path.
 pub const VEHICLES: usize = 256;
@@ -27,8 +28,8 @@ pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 /// # Errors
 /// The configuration names what is wrong.
 pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
-    let companion =
-        DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
+    let companion = DeskCompanion::new(config)
+        .map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
     Ok(Box::new(companion))
 }
 
@@ -88,7 +89,8 @@ pub const HALF: BoardCapacity = BoardCapacity {
 };
 
 /// All boards; the first holds the most.
-pub const BOARDS: [BoardCapacity; 3] = [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, HALF];
+pub const BOARDS: [BoardCapacity; 3] =
+    [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, HALF];
 
 impl BoardCapacity {
     /// The board of this name.
@@ -97,7 +99,10 @@ impl BoardCapacity {
     /// There is none; the error names those there are.
     pub fn by_name(name: &str) -> Result<&'static Self, String> {
         let names = || BOARDS.map(|board| board.name).join(", ");
-        BOARDS.iter().find(|board| board.name == name).ok_or_else(|| format!("boards are {}", names()))
+        BOARDS
+            .iter()
+            .find(|board| board.name == name)
+            .ok_or_else(|| format!("boards are {}", names()))
     }
 
     /// The first of the board's limits that a roadmap file exceeds.
@@ -133,7 +138,8 @@ impl BoardCapacity {
     }
 }
 
-/// A large value on the heap. Debug builds make it on a stack first, so a thread with room for that makes it.
+/// A large value on the heap. Debug builds make it on a stack first, so a thread with room for that
+/// makes it.
 pub fn on_heap<T: Send + 'static>(make: fn() -> T) -> Box<T> {
     std::thread::Builder::new()
         .stack_size(4 * size_of::<T>() + (1 << 20))

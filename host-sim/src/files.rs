@@ -1,7 +1,8 @@
 //! Files read with a limit, and files written whole or not at all.
 //!
-//! Only regular files are read: a FIFO without a writer, a terminal or `/dev/zero` would never end. What a command
-//! writes is tried before its work, written beside its target, and takes its name in the end, when all of it is there.
+//! Only regular files are read: a FIFO without a writer, a terminal or `/dev/zero` would never end.
+//! What a command writes is tried before its work, written beside its target, and takes its name in
+//! the end, when all of it is there.
 
 use std::fs;
 use std::io::{self, Read as _, Write as _};
@@ -61,15 +62,18 @@ pub struct ResultFiles {
 }
 
 impl ResultFiles {
-    /// Makes the directory and tries whether it takes files of these names. It is gone again if nothing is kept in it.
+    /// Makes the directory and tries whether it takes files of these names. It is gone again if
+    /// nothing is kept in it.
     ///
     /// # Errors
     /// It cannot be made or written to, or something else than a file has one of the names.
     pub fn open(dir: &Path, names: &[&str]) -> anyhow::Result<Self> {
         let dir = if dir.as_os_str().is_empty() { Path::new(".") } else { dir };
         let missing = dir.ancestors().take_while(|d| !d.as_os_str().is_empty() && !d.exists());
-        let results = Self { dir: dir.into(), made: missing.map(PathBuf::from).collect(), files: Vec::new() };
-        fs::create_dir_all(dir).with_context(|| format!("cannot make a directory: {}", quoted_path(dir)))?;
+        let results =
+            Self { dir: dir.into(), made: missing.map(PathBuf::from).collect(), files: Vec::new() };
+        fs::create_dir_all(dir)
+            .with_context(|| format!("cannot make a directory: {}", quoted_path(dir)))?;
         for name in names {
             results.target_path(name)?;
         }
@@ -85,7 +89,8 @@ impl ResultFiles {
         // `a/` means a directory, though its last part is `a`.
         let slash = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         let name = path.file_name().and_then(|name| name.to_str()).filter(|_| !slash);
-        let name = name.with_context(|| format!("cannot write: {}: it names no file", quoted_path(path)))?;
+        let name =
+            name.with_context(|| format!("cannot write: {}: it names no file", quoted_path(path)))?;
         Self::open(path.parent().unwrap_or(Path::new(".")), &[name])
     }
 
@@ -152,7 +157,8 @@ impl ResultFiles {
             });
             if let Err(error) = kept {
                 replaced.into_iter().rev().for_each(|(target, before)| put_back(&target, before));
-                return Err(error).with_context(|| format!("cannot write: {}", quoted_path(&target)));
+                return Err(error)
+                    .with_context(|| format!("cannot write: {}", quoted_path(&target)));
             }
         }
         self.made.clear();
@@ -165,7 +171,8 @@ impl ResultFiles {
         if !target.try_exists()? {
             return Ok(None);
         }
-        let aside = tempfile::Builder::new().prefix(".flockmate-").tempfile_in(&self.dir)?.into_temp_path();
+        let aside =
+            tempfile::Builder::new().prefix(".flockmate-").tempfile_in(&self.dir)?.into_temp_path();
         fs::rename(target, &aside)?;
         Ok(Some(aside))
     }
@@ -202,7 +209,12 @@ mod tests {
         assert_eq!(read(&path, 100).unwrap(), [7; 100]);
         assert!(read(&path, 99).unwrap_err().to_string().contains("longer than 99 bytes"));
         assert!(read(folder.path(), 99).unwrap_err().to_string().contains("directory"));
-        assert!(read(Path::new("/dev/zero"), 99).unwrap_err().to_string().contains("not a regular file"));
+        assert!(
+            read(Path::new("/dev/zero"), 99)
+                .unwrap_err()
+                .to_string()
+                .contains("not a regular file")
+        );
         fs::write(&path, b"\xff\xfe").unwrap();
         assert!(read_text(&path).unwrap_err().to_string().contains("UTF-8"));
     }
@@ -249,10 +261,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("file"), b"").unwrap();
         fs::create_dir_all(folder.path().join("out/result.json")).unwrap();
-        for (dir, name) in [("file", "result.json"), ("file/x", "result.json"), ("out", "result.json")] {
+        for (dir, name) in
+            [("file", "result.json"), ("file/x", "result.json"), ("out", "result.json")]
+        {
             assert!(ResultFiles::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
         }
-        for path in ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y", "/tmp/x/"] {
+        for path in
+            ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y", "/tmp/x/"]
+        {
             assert!(ResultFiles::single_file(Path::new(path)).is_err(), "{path}");
         }
         assert!(!folder.path().join("file/x").exists());

@@ -20,7 +20,8 @@ pub struct DeskFlash {
 }
 
 impl DeskFlash {
-    /// An erased bank, or what a file holds of an earlier one; what changes is written to the file at once.
+    /// An erased bank, or what a file holds of an earlier one; what changes is written to the file
+    /// at once.
     ///
     /// # Errors
     /// The file cannot be read or made, or is no such bank.
@@ -39,7 +40,11 @@ impl DeskFlash {
                 file.read_exact(&mut bytes).with_context(failed)?;
             }
             length => {
-                bail!("no flash image: {}: it has {length} bytes, not {}", quoted_path(path), LAYOUT.len())
+                bail!(
+                    "no flash image: {}: it has {length} bytes, not {}",
+                    quoted_path(path),
+                    LAYOUT.len()
+                )
             }
         }
         Ok(Self { bytes, file: Some(file) })
@@ -83,7 +88,8 @@ impl DeskFlash {
         let part = self.bytes.get_mut(start..start + len).ok_or(FlashFault)?;
         change(part);
         if let Some(file) = &mut self.file {
-            let written = file.seek(SeekFrom::Start(u64::from(at))).and_then(|_| file.write_all(part));
+            let written =
+                file.seek(SeekFrom::Start(u64::from(at))).and_then(|_| file.write_all(part));
             written.map_err(|_| FlashFault)?;
         }
         Ok(())

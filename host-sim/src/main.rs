@@ -54,7 +54,8 @@ fn main() -> ExitCode {
     let done = done.and_then(|code| progress::check_printed().map(|()| code));
     done.unwrap_or_else(|error| {
         // Where the error cannot be printed either, the exit code reports it.
-        let _ = writeln!(std::io::stderr(), "error: {}", quote::quote_message(&format!("{error:#}")));
+        let _ =
+            writeln!(std::io::stderr(), "error: {}", quote::quote_message(&format!("{error:#}")));
         ExitCode::from(BAD_INPUT)
     })
 }
@@ -75,16 +76,22 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// A command line that is no command: help that was asked for, or one line that says what is wrong, and a hint.
+/// A command line that is no command: help that was asked for, or one line that says what is wrong,
+/// and a hint.
 fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
     if asked {
         let text = error.render();
-        let text = if std::io::stdout().is_terminal() { text.ansi().to_string() } else { text.to_string() };
+        let text = if std::io::stdout().is_terminal() {
+            text.ansi().to_string()
+        } else {
+            text.to_string()
+        };
         say!("{}", text.trim_end());
         return Ok(ExitCode::SUCCESS);
     }
-    let arguments: Vec<String> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    let arguments: Vec<String> =
+        std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     let help = help_of(&arguments);
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         bail!("no command given\nhint: `{help}` lists them");
@@ -93,7 +100,9 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let mut lines = text.lines().map(str::trim);
     let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
     // How to pass `-x` as a value is never what was meant.
-    let tips = lines.filter_map(|line| line.strip_prefix("tip: ")).filter(|tip| !tip.starts_with("to pass"));
+    let tips = lines
+        .filter_map(|line| line.strip_prefix("tip: "))
+        .filter(|tip| !tip.starts_with("to pass"));
     let tips: String = tips.map(|tip| format!("\nhint: {tip}")).collect();
     let what = what.join(" ");
     bail!("{}{tips}\nhint: `{help}` says more", what.strip_prefix("error: ").unwrap_or(&what))

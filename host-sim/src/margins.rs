@@ -1,4 +1,5 @@
-//! The margins that the desk plans with, added up in one place; the companion's are in [`companion::margins`].
+//! The margins that the desk plans with, added up in one place; the companion's are in
+//! [`companion::margins`].
 //!
 //! | what | value | reason |
 //! |---|---|---|
@@ -73,7 +74,11 @@ pub const TRIGGER_DELAY_S: f32 = 0.15;
 
 /// Least distance between pads, metres: a vehicle comes down beside one that came down, and both
 /// err.
-pub fn min_pad_distance_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> f32 {
+pub fn min_pad_distance_m(
+    simulation: &Simulation,
+    safety_distance_m: f32,
+    vehicles: &[Vehicle],
+) -> f32 {
     let own = |v: &Vehicle| {
         max_estimate_error_m(simulation.estimator, v.personality)
             + touchdown_extra_m(simulation.gust_mps, v.personality)
@@ -112,19 +117,29 @@ pub fn usable_footprint(
     vehicles: &[Vehicle],
 ) -> Spacing {
     let stray_m = required_distances(simulation, 0.0, vehicles).margin_m;
-    let lower_m =
-        vehicles.iter().map(|v| max_height_error_m(simulation.estimator, v.personality)).fold(0.0, f32::max);
+    let lower_m = vehicles
+        .iter()
+        .map(|v| max_height_error_m(simulation.estimator, v.personality))
+        .fold(0.0, f32::max);
     let share = (1.0 - lower_m / height_m).max(0.0);
-    let along_m = spacing.footprint.along_m * share - 2.0 * (stray_m + TRIGGER_DELAY_S * cruise_mps);
+    let along_m =
+        spacing.footprint.along_m * share - 2.0 * (stray_m + TRIGGER_DELAY_S * cruise_mps);
     let across_m = spacing.footprint.across_m * share - 2.0 * stray_m;
-    let footprint =
-        Footprint { along_m: along_m.max(spacing.waypoint_m), across_m: across_m.max(spacing.lane_m) };
+    let footprint = Footprint {
+        along_m: along_m.max(spacing.waypoint_m),
+        across_m: across_m.max(spacing.lane_m),
+    };
     Spacing { footprint, ..*spacing }
 }
 
 /// Distance that a path keeps from a vehicle that stands on the ground, metres.
-pub fn parked_separation_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> f32 {
-    let estimates = vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.personality));
+pub fn parked_separation_m(
+    simulation: &Simulation,
+    safety_distance_m: f32,
+    vehicles: &[Vehicle],
+) -> f32 {
+    let estimates =
+        vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.personality));
     safety_distance_m
         + STRAY_BESIDE_PARKED_M
         + STRAY_PER_GUST_S * simulation.gust_mps

@@ -1,4 +1,5 @@
-//! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request every companion plans.
+//! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request
+//! every companion plans.
 
 mod coverage;
 mod on_board;
@@ -22,7 +23,8 @@ use planner_core::search::SearchWorkspace;
 use self::ready::schedule_config;
 pub use self::ready::{Mission, OwnPlan, PLANNED_ACCEL_MPS2, SwarmPlan, VERTICAL_MPS};
 use crate::capacity::{
-    BoardCapacity, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap,
+    BoardCapacity, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
+    on_heap,
 };
 use crate::coverage::check_ground;
 use crate::map::{self, VoxelMap};
@@ -73,7 +75,8 @@ impl Mission {
         let mut timing = Timing::default();
         let begun = Instant::now();
         let stage = progress.begin_stage("map");
-        let map = map::load(&scenario.map.file, scenario.map.resolution_m)?.voxel_map(scenario.map.unknown);
+        let map = map::load(&scenario.map.file, scenario.map.resolution_m)?
+            .voxel_map(scenario.map.unknown);
         timing.map_s = begun.elapsed().as_secs_f64();
         drop(stage);
 
@@ -126,13 +129,18 @@ impl Mission {
         self.encode(&MissionBlock::Goals(&goals))
     }
 
-    /// Another separation than the scenario's, in the air and from vehicles that stand, metres. Plans follow from the mission
-    /// file, which is written again.
+    /// Another separation than the scenario's, in the air and from vehicles that stand, metres.
+    /// Plans follow from the mission file, which is written again.
     ///
     /// # Errors
     /// What a mission file does not hold.
-    pub fn set_separation(&mut self, separation_m: f32, parked_separation_m: f32) -> anyhow::Result<()> {
-        (self.schedule.separation_m, self.schedule.parked_separation_m) = (separation_m, parked_separation_m);
+    pub fn set_separation(
+        &mut self,
+        separation_m: f32,
+        parked_separation_m: f32,
+    ) -> anyhow::Result<()> {
+        (self.schedule.separation_m, self.schedule.parked_separation_m) =
+            (separation_m, parked_separation_m);
         self.mission_file = self.goals_file()?;
         Ok(())
     }
@@ -151,7 +159,8 @@ impl Mission {
         let mut plan = on_heap(SwarmPlan::new);
         let (mut step_begun, mut search_s, mut assignment_s) = (Instant::now(), 0.0, 0.0);
         planner::plan_goals(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
-            let took_s = core::mem::replace(&mut step_begun, Instant::now()).elapsed().as_secs_f64();
+            let took_s =
+                core::mem::replace(&mut step_begun, Instant::now()).elapsed().as_secs_f64();
             match step {
                 PlanStep::Search => search_s = took_s,
                 PlanStep::Assignment => assignment_s = took_s,
@@ -182,7 +191,9 @@ impl Mission {
             ),
             PlanError::Schedule(id, ScheduleError::GatesFull) => {
                 let most = self.max_gates();
-                anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {most} gates")
+                anyhow!(
+                    "vehicle {id} meets too many others: {path}: its plan holds at most {most} gates"
+                )
             }
             PlanError::Schedule(id, ScheduleError::PiecesFull) => {
                 anyhow!(
@@ -195,18 +206,24 @@ impl Mission {
                      hint: a larger roadmap.edge_max_m makes fewer of them"
                 )
             }
-            PlanError::SwarmFull => anyhow!("too many vehicles or goals: {path}: at most {VEHICLES}"),
-            PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {path}: {error:?}"),
+            PlanError::SwarmFull => {
+                anyhow!("too many vehicles or goals: {path}: at most {VEHICLES}")
+            }
+            PlanError::Search(id, error) => {
+                anyhow!("no search for vehicle {id}: {path}: {error:?}")
+            }
             other => anyhow!("no plan: {path}: {other:?}"),
         }
     }
 
-    /// Two goals that are too near to each other for two vehicles to land there, and the distance needed.
+    /// Two goals that are too near to each other for two vehicles to land there, and the distance
+    /// needed.
     fn describe_near_goals(&self) -> Option<String> {
         let scenario = &self.scenario;
         let needed_m = self.schedule.parked_separation_m;
         let landed = |i: usize| self.goals[i] - Point::new(0.0, 0.0, self.descents_m[i]);
-        let place = |i: usize| scenario.mission.goal_places.get(i).map_or(&*scenario.path, String::as_str);
+        let place =
+            |i: usize| scenario.mission.goal_places.get(i).map_or(&*scenario.path, String::as_str);
         let mut pairs = (0..self.goals.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
         let (j, i) = pairs.find(|&(j, i)| (landed(i) - landed(j)).norm() < needed_m)?;
         Some(format!(
@@ -231,7 +248,8 @@ impl Mission {
         }
     }
 
-    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or a detour.
+    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or
+    /// a detour.
     pub fn answer_plan_request(
         &self,
         plan: &SwarmPlan,
@@ -243,8 +261,11 @@ impl Mission {
         match wanted {
             PlanKind::Mission if companion.excluded_waypoints().is_empty() => own(plan),
             PlanKind::Mission | PlanKind::Division => {
-                let losses =
-                    companion.losses().take(if wanted == PlanKind::Division { usize::MAX } else { 0 });
+                let losses = companion.losses().take(if wanted == PlanKind::Division {
+                    usize::MAX
+                } else {
+                    0
+                });
                 let rest = self.plan_rest(companion.excluded_waypoints(), losses);
                 own(&*rest.map_err(|_| PlanFailure::Unreachable)?)
             }
@@ -254,7 +275,9 @@ impl Mission {
                 let request = request.ok_or(PlanFailure::Unreachable)?;
                 match self.scenario.area.is_some() {
                     true => self.plan_area_detour(&request, &mut obstacles),
-                    false => self.plan_detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable),
+                    false => self
+                        .plan_detour(&request, &mut obstacles)
+                        .map_err(|_| PlanFailure::Unreachable),
                 }
             }
         }
@@ -269,7 +292,14 @@ impl Mission {
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();
-        detour::plan_vehicle_detour(&self.view(), request, obstacles, &mut search, &mut nodes, &mut own)?;
+        detour::plan_vehicle_detour(
+            &self.view(),
+            request,
+            obstacles,
+            &mut search,
+            &mut nodes,
+            &mut own,
+        )?;
         Ok(own)
     }
 }

@@ -54,7 +54,11 @@ pub fn planned_page(
 }
 
 /// The page of a flown mission: tracks, log and smallest distances too.
-pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyhow::Result<ReportData> {
+pub fn flown_page(
+    mission: &Mission,
+    plan: &SwarmPlan,
+    flight: &Flight,
+) -> anyhow::Result<ReportData> {
     let mut page = planned_page(mission, plan, &flight.result)?;
     for (vehicle, track) in page.vehicles.iter_mut().zip(&flight.tracks) {
         vehicle.track = track.iter().map(|&(t_s, position)| TrackPoint { t_s, position }).collect();
@@ -134,7 +138,11 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));
     say!();
     say!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
-    say!("walls      {} contacts, nearest {}", safety.wall_contacts, metres(safety.min_clearance_m));
+    say!(
+        "walls      {} contacts, nearest {}",
+        safety.wall_contacts,
+        metres(safety.min_clearance_m)
+    );
     say!(
         "vehicles   {} violations of {} m, nearest {}, {} deadlocks",
         safety.violations,

@@ -74,7 +74,9 @@ static STDOUT_ERROR: Mutex<Option<std::io::Error>> = Mutex::new(None);
 /// Prints a line: what [`say!`](crate::say) calls.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
-    if let Err(error) = out.write_fmt(line).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+    if let Err(error) =
+        out.write_fmt(line).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush())
+    {
         *STDOUT_ERROR.lock().expect("nobody panics with it") = Some(error);
     }
 }
@@ -90,8 +92,8 @@ pub fn check_printed() -> anyhow::Result<()> {
     }
 }
 
-/// Prints a line. Where that fails the work continues, since it may fly something; [`check_printed`](crate::progress::check_printed)
-/// reports at its end.
+/// Prints a line. Where that fails the work continues, since it may fly something;
+/// [`check_printed`](crate::progress::check_printed) reports at its end.
 #[macro_export]
 macro_rules! say {
     () => { $crate::progress::print_line(format_args!("")) };

@@ -1,4 +1,5 @@
-//! What a user gave, as an error may show it: short, on one line, and without codes that a terminal obeys.
+//! What a user gave, as an error may show it: short, on one line, and without codes that a terminal
+//! obeys.
 
 use std::path::Path;
 
@@ -13,7 +14,8 @@ fn is_control_code(c: char) -> bool {
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
 }
 
-/// The text with its codes escaped; where it is longer than [`MAX_QUOTE_CHARS`] characters, its beginning and its end.
+/// The text with its codes escaped; where it is longer than [`MAX_QUOTE_CHARS`] characters, its
+/// beginning and its end.
 pub fn quoted(text: &str) -> String {
     // No more than could be shown is checked, from either end.
     shortened(&escaped(&shortened(text, 2 * MAX_QUOTE_CHARS)), MAX_QUOTE_CHARS)
@@ -46,9 +48,11 @@ fn shortened(text: &str, most: usize) -> String {
     begin + "…" + &end.iter().rev().collect::<String>()
 }
 
-/// A whole message as it is printed: nothing in it is a code but its ends of line, and no line is endless.
+/// A whole message as it is printed: nothing in it is a code but its ends of line, and no line is
+/// endless.
 pub fn quote_message(text: &str) -> String {
-    let lines: Vec<String> = text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
+    let lines: Vec<String> =
+        text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
     lines.join("\n")
 }
 

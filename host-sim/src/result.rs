@@ -1,6 +1,8 @@
-//! `result.json` and `timing.json`: what a command found, and what the clock said. Units are in the keys.
+//! `result.json` and `timing.json`: what a command found, and what the clock said. Units are in the
+//! keys.
 //!
-//! `result.json` is the same for the same scenario and seed, whatever the machine or the build; nothing timed goes in it.
+//! `result.json` is the same for the same scenario and seed, whatever the machine or the build;
+//! nothing timed goes in it.
 
 use serde::Serialize;
 
@@ -158,7 +160,8 @@ pub struct VehicleResult {
     pub flown_m: f64,
     /// Time from take-off to landing, seconds.
     pub flight_time_s: f64,
-    /// How it ended: a state of the companion's mission, and the text of the row that led there where it is a warning.
+    /// How it ended: a state of the companion's mission, and the text of the row that led there
+    /// where it is a warning.
     pub end: String,
 }
 
@@ -177,7 +180,8 @@ pub struct Totals {
 pub struct Safety {
     /// Times a body touched an obstacle; the floor while taking off or landing is none.
     pub wall_contacts: u32,
-    /// Smallest distance from a vehicle's centre to an obstacle between take-off and landing, metres.
+    /// Smallest distance from a vehicle's centre to an obstacle between take-off and landing,
+    /// metres.
     pub min_clearance_m: Option<f64>,
     /// Smallest distance between two centres, one of them flying, metres.
     pub min_separation_m: Option<f64>,

@@ -1,7 +1,8 @@
-//! Building a roadmap on the desk: planner-core's PRM on all cores, every edge with its clearance, encoded as the file
-//! that goes on the board.
+//! Building a roadmap on the desk: planner-core's PRM on all cores, every edge with its clearance,
+//! encoded as the file that goes on the board.
 //!
-//! Edges come in the same order whatever the number of threads, because pieces of work are joined in their order.
+//! Edges come in the same order whatever the number of threads, because pieces of work are joined
+//! in their order.
 
 pub mod cap;
 pub mod passages;
@@ -62,9 +63,13 @@ pub struct BuildTimes {
     pub file_s: f64,
 }
 
-/// Samples and joins: Algorithm 1 of P3D, with the clearance of every edge. The result does not depend on the number of
-/// threads.
-pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<(Roadmap, BuildTimes)> {
+/// Samples and joins: Algorithm 1 of P3D, with the clearance of every edge. The result does not
+/// depend on the number of threads.
+pub fn build(
+    map: &VoxelMap,
+    terminals: &[Point],
+    config: &Config,
+) -> anyhow::Result<(Roadmap, BuildTimes)> {
     let grid = map.grid();
     let sampled = || {
         let nodes = sample(map, terminals, config)?;
@@ -77,13 +82,17 @@ pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Re
     let joining = Instant::now();
     let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     let edges = join(&grid, &tree, &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
-    let parts =
-        BuildTimes { boxes_s, nodes_s, edges_s: joining.elapsed().as_secs_f64(), ..BuildTimes::default() };
+    let parts = BuildTimes {
+        boxes_s,
+        nodes_s,
+        edges_s: joining.elapsed().as_secs_f64(),
+        ..BuildTimes::default()
+    };
     Ok((Roadmap { nodes, edges, heights_m }, parts))
 }
 
-/// Adds the nodes of passages between starts and goals that random nodes have missed, and joins them as all others; returns
-/// how many there are. Nothing changes where none is missing.
+/// Adds the nodes of passages between starts and goals that random nodes have missed, and joins
+/// them as all others; returns how many there are. Nothing changes where none is missing.
 pub fn add_passages(
     map: &VoxelMap,
     roadmap: &mut Roadmap,
@@ -91,7 +100,8 @@ pub fn add_passages(
     wanted: &[passages::WantedConnection],
 ) -> anyhow::Result<usize> {
     let (grid, tree) = (map.grid(), BoxTree::new(&map.grid()));
-    let added = passages::missing_passage_nodes(map, &tree, &roadmap.nodes, &roadmap.edges, config, wanted);
+    let added =
+        passages::missing_passage_nodes(map, &tree, &roadmap.nodes, &roadmap.edges, config, wanted);
     if added.is_empty() {
         return Ok(0);
     }
@@ -102,7 +112,8 @@ pub fn add_passages(
     roadmap.heights_m.extend(added.iter().map(|node| height_m(map, node)));
     roadmap.nodes.extend(&added);
     let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
-    roadmap.edges = join(&grid, &tree, &roadmap.nodes, config, &mut workspace).map_err(|e| describe(&e))?;
+    roadmap.edges =
+        join(&grid, &tree, &roadmap.nodes, config, &mut workspace).map_err(|e| describe(&e))?;
     Ok(added.len())
 }
 
@@ -159,8 +170,10 @@ pub fn join<const NODES: usize, const CUBES: usize>(
 ) -> Result<Vec<Edge>, PrmError> {
     workspace.build_index(nodes, config)?;
     // No edge is farther from obstacles than its ends; most are just as far as the nearer of them.
-    let around: Vec<f32> =
-        nodes.par_iter().map(|node| tree.clearance_m(node, node, MAX_STORED_CLEARANCE_M, 0.0)).collect();
+    let around: Vec<f32> = nodes
+        .par_iter()
+        .map(|node| tree.clearance_m(node, node, MAX_STORED_CLEARANCE_M, 0.0))
+        .collect();
     let ends = |edge: prm::Edge| (usize::from(edge.a), usize::from(edge.b));
     let most_m = |edge: prm::Edge| {
         let (a, b) = ends(edge);
@@ -231,8 +244,9 @@ impl Roadmap {
         let bare = roadmap::encoded_len(nodes, 0, NODE_COLUMNS).unwrap_or(usize::MAX);
         let an_edge = 2 * size_of::<u32>();
         let most = (board.half_edges / 2).min(board.roadmap_bytes.saturating_sub(bare) / an_edge);
-        let edges = cap::limit_edges(&self.nodes, &self.edges, most)
-            .ok_or_else(|| anyhow!("the roadmap does not fit {name}: {most} edges do not connect it"))?;
+        let edges = cap::limit_edges(&self.nodes, &self.edges, most).ok_or_else(|| {
+            anyhow!("the roadmap does not fit {name}: {most} edges do not connect it")
+        })?;
         Ok(Self { edges, ..self })
     }
 }
@@ -254,7 +268,8 @@ pub fn header(config: &Config, origin: Geodetic, starts: u16, goals: u16) -> Roa
 pub fn encode(roadmap: &Roadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
     let Roadmap { nodes, edges, heights_m } = roadmap;
-    let length = roadmap::encoded_len(nodes.len(), edges.len(), NODE_COLUMNS).ok_or_else(too_large)?;
+    let length =
+        roadmap::encoded_len(nodes.len(), edges.len(), NODE_COLUMNS).ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
     let mut workspace = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
     roadmap::write_with_landmarks(header, nodes, edges, heights_m, &mut workspace, &mut bytes)
@@ -268,7 +283,9 @@ fn describe(error: &PrmError) -> anyhow::Error {
         PrmError::TerminalBlocked(i) => {
             anyhow!("terminal {i} lies in an obstacle, in unknown space or outside the map")
         }
-        PrmError::NoFreeSpace(found) => anyhow!("only {found} nodes found: too little of the map is free"),
+        PrmError::NoFreeSpace(found) => {
+            anyhow!("only {found} nodes found: too little of the map is free")
+        }
         other => anyhow!("{other:?}"),
     }
 }
@@ -298,7 +315,8 @@ mod tests {
         assert!(count > 500);
         for threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let edges = pool.install(|| connect(&map.grid(), &nodes, &config, &mut workspace)).unwrap();
+            let edges =
+                pool.install(|| connect(&map.grid(), &nodes, &config, &mut workspace)).unwrap();
             assert_eq!(edges, alone[..count]);
         }
     }

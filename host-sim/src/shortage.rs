@@ -1,9 +1,11 @@
-//! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what would help.
+//! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what
+//! would help.
 //!
-//! Whether a way is missing in the roadmap or in the building is read from the map itself: the widest way from a goal to a
-//! start, over the centres of its cells, by a flood that always continues from the widest cell it has reached. Its width is
-//! the distance to the nearest obstacle at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood
-//! of each near a wall; only missions that fall short pay it.
+//! Whether a way is missing in the roadmap or in the building is read from the map itself: the
+//! widest way from a goal to a start, over the centres of its cells, by a flood that always
+//! continues from the widest cell it has reached. Its width is the distance to the nearest obstacle
+//! at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood of each
+//! near a wall; only missions that fall short pay it.
 
 use std::collections::BTreeMap;
 
@@ -21,14 +23,16 @@ const MAX_FLOODED_CELLS: usize = 1 << 25;
 /// Most lines about goals; further goals are counted.
 const MAX_GOAL_LINES: usize = 8;
 
-/// One line for each goal that is left and each vehicle without one, with its place and what would help.
+/// One line for each goal that is left and each vehicle without one, with its place and what would
+/// help.
 pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     let left = mission.unserved(plan);
     let all = left.goals.len() + left.vehicles.len();
     if all == 0 {
         return Vec::new();
     }
-    let mut asked = ShortageFindings { mission, reach: Reachability::new(mission), widths: BTreeMap::new() };
+    let mut asked =
+        ShortageFindings { mission, reach: Reachability::new(mission), widths: BTreeMap::new() };
     let mut lines = Vec::new();
     for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
@@ -56,9 +60,13 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     let (mission, reach) = (asked.mission, &asked.reach);
     let (at, vehicles) = (&mission.goals[goal], mission.tasks.len());
     let what = format!("goal {goal} at [{}, {}, {}]", at.x, at.y, at.z);
-    let place = mission.scenario.mission.goal_places.get(goal).map_or(String::new(), |p| format!(" ({p})"));
-    let bound =
-        mission.tasks.iter().enumerate().find(|(_, task)| task.goal.is_some_and(|g| usize::from(g) == goal));
+    let place =
+        mission.scenario.mission.goal_places.get(goal).map_or(String::new(), |p| format!(" ({p})"));
+    let bound = mission
+        .tasks
+        .iter()
+        .enumerate()
+        .find(|(_, task)| task.goal.is_some_and(|g| usize::from(g) == goal));
     let reachable = match bound {
         Some((vehicle, _)) => reach.are_connected(vehicle, goal),
         None => (0..vehicles).any(|vehicle| reach.are_connected(vehicle, goal)),
@@ -85,11 +93,13 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String 
     let (mission, reach) = (asked.mission, &asked.reach);
     let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();
     let at = &mission.scenario.vehicles[vehicle].start;
-    let place = mission.scenario.vehicle_places.get(vehicle).map_or(String::new(), |p| format!(" ({p})"));
+    let place =
+        mission.scenario.vehicle_places.get(vehicle).map_or(String::new(), |p| format!(" ({p})"));
     let goals = mission.goals.len();
     let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
-        let helps = if asks { format!("; {}", what_helps(asked, vehicle, goal)) } else { String::new() };
+        let helps =
+            if asks { format!("; {}", what_helps(asked, vehicle, goal)) } else { String::new() };
         format!("no way in the roadmap leads from it to a goal{helps}")
     } else if goals < mission.tasks.len() {
         format!("{goals} goals are for at most {goals} of {} vehicles", mission.tasks.len())
@@ -158,7 +168,8 @@ impl Reachability {
         let view = mission.view();
         let vehicles = mission.tasks.len();
         let row = |vehicle: usize| {
-            let seen = connected_component(&view, vehicle, mission.tasks[vehicle].required_clearance_m);
+            let seen =
+                connected_component(&view, vehicle, mission.tasks[vehicle].required_clearance_m);
             (0..mission.goals.len()).map(|goal| seen[vehicles + goal]).collect()
         };
         Self { joined: (0..vehicles).map(row).collect() }
@@ -184,8 +195,9 @@ fn connected_component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> 
     seen
 }
 
-/// Distance to the nearest obstacle at the narrowest cell of the widest way to each goal, metres, at most `most_m` rounded
-/// up to a step; 0 where there is no way. `None` where the map is too large to be asked. `at_least_m` is a cheap bound.
+/// Distance to the nearest obstacle at the narrowest cell of the widest way to each goal, metres,
+/// at most `most_m` rounded up to a step; 0 where there is no way. `None` where the map is too
+/// large to be asked. `at_least_m` is a cheap bound.
 fn widest_path_clearances_m(
     map: &VoxelMap,
     at_least_m: impl Fn(&Point) -> f32,
@@ -207,7 +219,8 @@ fn widest_path_clearances_m(
         }
         ((point_clearance(&grid, place, most_m) / SAME_WIDTH_M + 1e-3) as usize).min(steps)
     };
-    // A start or goal may be nearer to an obstacle than the centre of its cell, and above all to the ground.
+    // A start or goal may be nearer to an obstacle than the centre of its cell, and above all to
+    // the ground.
     let (at_start, at_goals) = (steps_at(from), goals.iter().map(steps_at).collect::<Vec<_>>());
     let from = shape.cell_of(from)?;
     let goals: Vec<_> = goals.iter().map(|goal| shape.cell_of(goal)).collect();
@@ -233,9 +246,10 @@ fn widest_path_clearances_m(
             missing -= 1;
         }
         for axis in 0..3 {
-            for next in
-                [cell[axis].checked_sub(1), cell[axis].checked_add(1).filter(|&c| c < shape.dims[axis])]
-            {
+            for next in [
+                cell[axis].checked_sub(1),
+                cell[axis].checked_add(1).filter(|&c| c < shape.dims[axis]),
+            ] {
                 let Some(next) = next else { continue };
                 let mut place = cell;
                 place[axis] = next;
@@ -263,7 +277,9 @@ mod tests {
     fn rooms(door: u32) -> VoxelMap {
         let shape = GridShape { dims: [60, 40, 20], min: Point::zeros(), resolution_m: 0.1 };
         let mut map = OccupancyMap::all_unknown(shape, "rooms").unwrap();
-        for (i, j, k) in (0..60).flat_map(|i| (0..40).flat_map(move |j| (0..20).map(move |k| (i, j, k)))) {
+        for (i, j, k) in
+            (0..60).flat_map(|i| (0..40).flat_map(move |j| (0..20).map(move |k| (i, j, k))))
+        {
             let in_door = (20 - door / 2..20 + door.div_ceil(2)).contains(&j);
             let wall = (i == 30 && !in_door) || k == 0;
             map.set([i, j, k], if wall { Occupancy::Occupied } else { Occupancy::Free });
@@ -271,7 +287,8 @@ mod tests {
         map.voxel_map(Unknown::Free)
     }
 
-    /// A start or goal near the floor of its cell is as near to the floor as it is, not as the centre of its cell.
+    /// A start or goal near the floor of its cell is as near to the floor as it is, not as the
+    /// centre of its cell.
     #[test]
     fn a_way_is_no_wider_than_its_ends() {
         let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));
@@ -287,10 +304,14 @@ mod tests {
     fn the_widest_way_is_as_wide_as_the_door() {
         let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));
         for door in [2, 5, 8, 12] {
-            let width_m = widest_path_clearances_m(&rooms(door), |_| 0.0, &from, &[to], 2.0).unwrap()[0];
+            let width_m =
+                widest_path_clearances_m(&rooms(door), |_| 0.0, &from, &[to], 2.0).unwrap()[0];
             let half_m = door as f32 * 0.05;
             assert!((width_m - half_m).abs() <= 0.1, "{door}: {width_m} for {half_m}");
         }
-        assert_eq!(widest_path_clearances_m(&rooms(0), |_| 0.0, &from, &[from, to], 2.0).unwrap()[1], 0.0);
+        assert_eq!(
+            widest_path_clearances_m(&rooms(0), |_| 0.0, &from, &[from, to], 2.0).unwrap()[1],
+            0.0
+        );
     }
 }

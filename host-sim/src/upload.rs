@@ -1,7 +1,8 @@
 //! A MAVLink FTP client: uploads a file to a companion and compares CRCs.
 //!
-//! Source: MAVLink guide, "File Transfer Protocol". Several pieces are under way at once; what is not answered is sent again
-//! with the same sequence number, as often as this link bears ([`retransmission`]).
+//! Source: MAVLink guide, "File Transfer Protocol". Several pieces are under way at once; what is
+//! not answered is sent again with the same sequence number, as often as this link bears
+//! ([`retransmission`]).
 
 mod retransmission;
 
@@ -102,7 +103,8 @@ impl FtpClient {
         Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frames }
     }
 
-    /// The next frame from a companion, if there is one; beats once a second, so that autopilots pass things on to us.
+    /// The next frame from a companion, if there is one; beats once a second, so that autopilots
+    /// pass things on to us.
     fn receive_frames(&mut self) -> anyhow::Result<Vec<Frame>> {
         if self.link.now() >= self.beat_at {
             self.beat_at += HEARTBEAT_EVERY;
@@ -121,7 +123,8 @@ impl FtpClient {
         if length == 0 {
             self.link.rest();
         }
-        let now = Instant::from_micros(self.link.now().duration_since(self.began).as_micros() as u64);
+        let now =
+            Instant::from_micros(self.link.now().duration_since(self.began).as_micros() as u64);
         let mut input = &buffer[..length];
         let mut frames = Vec::new();
         while let Some(frame) = self.framer.next(now, &mut input) {
@@ -213,10 +216,17 @@ impl FtpClient {
     ///
     /// # Errors
     /// The companion refuses it, does not answer, or got something else.
-    pub fn upload(&mut self, file: File, bytes: &[u8], progress: impl Fn(u64)) -> anyhow::Result<()> {
+    pub fn upload(
+        &mut self,
+        file: File,
+        bytes: &[u8],
+        progress: impl Fn(u64),
+    ) -> anyhow::Result<()> {
         self.request_until_answered(RESET, &[])?;
-        self.session =
-            self.request_until_answered(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
+        self.session = self
+            .request_until_answered(CREATE, file.name().as_bytes())
+            .context("cannot begin")?
+            .session;
         // The time for erasing its flash says nothing about the link.
         self.retransmission = Retransmission::new(self.link.now());
         let mut pieces = bytes.chunks(MAX_DATA).enumerate();
@@ -228,8 +238,12 @@ impl FtpClient {
             {
                 let request = self.request_payload(WRITE, (i * MAX_DATA) as u32, piece);
                 self.send_request(&request)?;
-                let piece =
-                    PendingPiece { request, length: piece.len(), sent_at: self.link.now(), repeated: false };
+                let piece = PendingPiece {
+                    request,
+                    length: piece.len(),
+                    sent_at: self.link.now(),
+                    repeated: false,
+                };
                 under_way.insert(self.sequence, piece);
             }
             if under_way.is_empty() {
@@ -283,14 +297,21 @@ impl FtpClient {
 
 /// FTP's CRC-32: that of zip, but begun at 0 and not inverted.
 pub fn crc32(bytes: &[u8]) -> u32 {
-    const FTP: crc::Algorithm<u32> =
-        crc::Algorithm { init: 0, xorout: 0, check: 0x2DFD_2D88, residue: 0, ..crc::CRC_32_ISO_HDLC };
+    const FTP: crc::Algorithm<u32> = crc::Algorithm {
+        init: 0,
+        xorout: 0,
+        check: 0x2DFD_2D88,
+        residue: 0,
+        ..crc::CRC_32_ISO_HDLC
+    };
     crc::Crc::<u32>::new(&FTP).checksum(bytes)
 }
 
 fn nak_reason(data: &[u8]) -> String {
     let known = match data {
-        [2, 5, ..] => "the file is no such file, damaged, or the flash failed; the old one was kept",
+        [2, 5, ..] => {
+            "the file is no such file, damaged, or the flash failed; the old one was kept"
+        }
         [2, 27, ..] => "the file is too large",
         [4, ..] => "the companion was restarted",
         [5, ..] => "another client is uploading",

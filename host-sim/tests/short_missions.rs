@@ -22,16 +22,23 @@ fn reasons(more: &str) -> Vec<String> {
 #[test]
 fn too_few_nodes_and_too_wide_a_margin_are_told_apart() {
     let few = reasons("[roadmap]\nnodes = 10");
-    assert!(few.len() == 4 && few[..2].iter().all(|l| l.contains("more roadmap.nodes (10)")), "{few:?}");
+    assert!(
+        few.len() == 4 && few[..2].iter().all(|l| l.contains("more roadmap.nodes (10)")),
+        "{few:?}"
+    );
     assert!(few[0].starts_with("goal 0 at [28, 3, 1.8] (lobby.toml:10): "), "{few:?}");
-    assert!(few[..2].iter().all(|l| l.contains("or roadmap.passages = true, would help")), "{few:?}");
+    assert!(
+        few[..2].iter().all(|l| l.contains("or roadmap.passages = true, would help")),
+        "{few:?}"
+    );
     assert_eq!(reasons("[roadmap]\nnodes = 2300"), [""; 0]);
     assert_eq!(reasons("[roadmap]\nnodes = 10\npassages = true"), [""; 0]);
     // No door of the demo's rooms leaves 1.5 m.
     let margin = DEMO.replace("safety_margin_m = 0.5", "safety_margin_m = 1.2");
     assert!(margin.contains("safety_margin_m = 1.2"));
     let mut mission =
-        Mission::prepare(scenario::parse(&margin, "demo.toml").unwrap(), &Progress::hidden()).unwrap();
+        Mission::prepare(scenario::parse(&margin, "demo.toml").unwrap(), &Progress::hidden())
+            .unwrap();
     let plan = mission.plan().unwrap();
     let wide = shortage::shortage_lines(&mission, &plan);
     assert!(wide.len() == 9 && wide[8] == "and 12 more", "{wide:?}");
@@ -53,11 +60,16 @@ fn a_serial_link_that_fails_a_mission_is_told_with_what_would_do() {
     ] {
         let flight = fly(&format!("[simulation]\n{key} = {value}"));
         assert!(!flight.result.complete, "{key}");
-        let found = flight.log.iter().find(|event| event.text.contains(cause)).map(|event| &event.text);
-        let (_, remedy) = found.expect(key).split_once(&format!("simulation.{key} of ")).expect(key);
+        let found =
+            flight.log.iter().find(|event| event.text.contains(cause)).map(|event| &event.text);
+        let (_, remedy) =
+            found.expect(key).split_once(&format!("simulation.{key} of ")).expect(key);
         let remedy = remedy.split(' ').next().unwrap();
         // What it says would do does.
-        assert!(fly(&format!("[simulation]\n{key} = {remedy}")).result.complete, "{key} = {remedy}");
+        assert!(
+            fly(&format!("[simulation]\n{key} = {remedy}")).result.complete,
+            "{key} = {remedy}"
+        );
     }
 }
 
@@ -67,19 +79,32 @@ fn terminals_are_kept_apart_and_lengths_follow_the_map() {
     let terminals = |mission: &Mission| mission.scenario.vehicles.len() + mission.goals.len();
     let joined = |mission: &Mission| {
         let is_terminal = |node: u16| usize::from(node) < terminals(mission);
-        mission.roadmap.edges.iter().filter(|edge| is_terminal(edge.a) && is_terminal(edge.b)).count()
+        mission
+            .roadmap
+            .edges
+            .iter()
+            .filter(|edge| is_terminal(edge.a) && is_terminal(edge.b))
+            .count()
     };
     // The longest side of the building is 49 m.
     let longest_m = 49.0 * 0.15;
-    let apart = prepared("[roadmap]\nterminals = \"apart\"\nedge_min_share = 0.02\nedge_max_share = 0.15");
+    let apart =
+        prepared("[roadmap]\nterminals = \"apart\"\nedge_min_share = 0.02\nedge_max_share = 0.15");
     assert!(joined(&prepared("")) > 0, "otherwise there is nothing to be kept apart");
     assert_eq!(joined(&apart), 0);
-    let length_m =
-        |a: u16, b: u16| (apart.roadmap.nodes[usize::from(a)] - apart.roadmap.nodes[usize::from(b)]).norm();
-    let lengths: Vec<f32> = apart.roadmap.edges.iter().map(|edge| length_m(edge.a, edge.b)).collect();
-    let (least_m, most_m) =
-        (lengths.iter().copied().fold(f32::INFINITY, f32::min), lengths.iter().copied().fold(0.0, f32::max));
-    assert!(least_m >= 0.979 && most_m <= longest_m + 1e-3 && most_m > longest_m - 0.5, "{least_m} {most_m}");
+    let length_m = |a: u16, b: u16| {
+        (apart.roadmap.nodes[usize::from(a)] - apart.roadmap.nodes[usize::from(b)]).norm()
+    };
+    let lengths: Vec<f32> =
+        apart.roadmap.edges.iter().map(|edge| length_m(edge.a, edge.b)).collect();
+    let (least_m, most_m) = (
+        lengths.iter().copied().fold(f32::INFINITY, f32::min),
+        lengths.iter().copied().fold(0.0, f32::max),
+    );
+    assert!(
+        least_m >= 0.979 && most_m <= longest_m + 1e-3 && most_m > longest_m - 0.5,
+        "{least_m} {most_m}"
+    );
     let header = apart.view();
     assert!((header.header().edge_max_m - longest_m).abs() < 1e-3);
 }

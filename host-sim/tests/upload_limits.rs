@@ -1,4 +1,5 @@
-//! `host-sim upload` sends no file that the board cannot hold: the limit is named, and not one byte leaves.
+//! `host-sim upload` sends no file that the board cannot hold: the limit is named, and not one byte
+//! leaves.
 
 use std::net::UdpSocket;
 use std::process::Command;
@@ -19,7 +20,8 @@ fn file(nodes: usize, next: usize) -> Vec<u8> {
         goals: 1,
     };
     let places: Vec<Point> = (0..nodes).map(|i| Point::new(0.5 * i as f32, 0.0, 1.5)).collect();
-    let pairs = (0..nodes).flat_map(|a| (a + 1..nodes.min(a + 1 + next)).map(move |b| (a as u16, b as u16)));
+    let pairs = (0..nodes)
+        .flat_map(|a| (a + 1..nodes.min(a + 1 + next)).map(move |b| (a as u16, b as u16)));
     let edges: Vec<Edge> = pairs.map(|(a, b)| Edge { a, b, clearance_m: 1.0 }).collect();
     let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), 0).expect("it is small")];
     roadmap::write(&header, &places, &edges, &mut bytes).expect("it is a roadmap");

@@ -1,25 +1,28 @@
-//! What the desk and an emulated board say to each other in lock step: the board's time advances only as the desk grants it.
+//! What the desk and an emulated board say to each other in lock step: the board's time advances
+//! only as the desk grants it.
 //!
-//! The desk sends a message: its length (`u32`, little endian, of what follows), then records. The board does what the
-//! records say, in order, and answers with records of which the last is [`FromBoard::Waits`]. Between two messages the board
-//! stands still: it waits in one read of its host, which takes none of its instructions, and its timers and its watchdog
-//! count instructions.
+//! The desk sends a message: its length (`u32`, little endian, of what follows), then records. The
+//! board does what the records say, in order, and answers with records of which the last is
+//! [`FromBoard::Waits`]. Between two messages the board stands still: it waits in one read of its
+//! host, which takes none of its instructions, and its timers and its watchdog count instructions.
 //!
 //! ```text
 //! desk    Bytes(port, due) …, Bytes(port, due) …, Run(until)
 //! board   Sent(port, at) …, Sent(port, at) …, Waits(now)
 //! ```
 //!
-//! A board that starts, for whatever reason, says [`FromBoard::Started`] and waits for a message; what it had left of the
-//! message before is dropped. [`ToBoard::Peek`], [`ToBoard::Poke`] and [`ToBoard::Call`] are its debug probe; they travel in a
-//! message without `Run`.
+//! A board that starts, for whatever reason, says [`FromBoard::Started`] and waits for a message;
+//! what it had left of the message before is dropped. [`ToBoard::Peek`], [`ToBoard::Poke`] and
+//! [`ToBoard::Call`] are its debug probe; they travel in a message without `Run`.
 //!
-//! A record is 16 bytes, little endian (kind `u8`, port `u8`, length `u16`, address `u32`, time or argument `u64`), and the
-//! bytes that its length counts. Times are microseconds since the board's start.
+//! A record is 16 bytes, little endian (kind `u8`, port `u8`, length `u16`, address `u32`, time or
+//! argument `u64`), and the bytes that its length counts. Times are microseconds since the board's
+//! start.
 #![no_std]
 #![forbid(unsafe_code)]
 
-/// The board runs in lock step if this is its whole command line (QEMU: `-semihosting-config arg=…`).
+/// The board runs in lock step if this is its whole command line (QEMU:
+/// `-semihosting-config arg=…`).
 pub const COMMAND_LINE: &str = "lock-step";
 /// Bytes of a record before those that it carries.
 pub const HEAD: usize = 16;
@@ -106,7 +109,13 @@ fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEAD] {
 
 fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
     let [kind, port, l0, l1, a0, a1, a2, a3, time @ ..] = *head;
-    (kind, port, u16::from_le_bytes([l0, l1]), u32::from_le_bytes([a0, a1, a2, a3]), u64::from_le_bytes(time))
+    (
+        kind,
+        port,
+        u16::from_le_bytes([l0, l1]),
+        u32::from_le_bytes([a0, a1, a2, a3]),
+        u64::from_le_bytes(time),
+    )
 }
 
 impl ToBoard {

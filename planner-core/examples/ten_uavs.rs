@@ -1,9 +1,12 @@
-//! Plans ten UAVs past a wall: map, roadmap, goals, paths, schedule, gates. `cargo run -p planner-core --example ten_uavs`
+//! Plans ten UAVs past a wall: map, roadmap, goals, paths, schedule, gates.
+//! `cargo run -p planner-core --example ten_uavs`
 
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::frames::Geodetic;
-use planner_core::plan::{self, Mode, Objective, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask};
+use planner_core::plan::{
+    self, Mode, Objective, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
+};
 use planner_core::prm::{self, Sampling};
 use planner_core::roadmap::{self, RoadmapHeader, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
@@ -17,7 +20,8 @@ fn main() {
         let (word, bit) = shape.address([40, y, z]);
         words[word] |= bit;
     }
-    let grid = VoxelGrid::new(shape, Outside::Blocked, &words).expect("as many words as the shape needs");
+    let grid =
+        VoxelGrid::new(shape, Outside::Blocked, &words).expect("as many words as the shape needs");
 
     // Starts, then goals: the first nodes of the roadmap.
     let row = |x| (0..10u8).map(move |i| Point::new(x, 2.0 + 2.2 * f32::from(i), 2.0));
@@ -29,7 +33,8 @@ fn main() {
     prm::sample_nodes(&grid, None, &terminals, &build, &mut points).expect("the hall is free");
     let mut edges = Vec::new();
     prm::connect_all_pairs(&grid, &points, &build, |edge| {
-        let clearance_m = prm::edge_clearance(&grid, &points, edge, max_clearance_m).expect("two nodes");
+        let clearance_m =
+            prm::edge_clearance(&grid, &points, edge, max_clearance_m).expect("two nodes");
         edges.push(roadmap::Edge { a: edge.a, b: edge.b, clearance_m });
     })
     .expect("the settings are sound");
@@ -37,25 +42,41 @@ fn main() {
     // The file that a board reads in place.
     let origin = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
     let (starts, goals, tested_clearance_m) = (10, 10, clearance_m);
-    let header =
-        RoadmapHeader { origin, edge_min_m, edge_max_m, tested_clearance_m, max_clearance_m, starts, goals };
-    let mut file = vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).expect("it is small")];
+    let header = RoadmapHeader {
+        origin,
+        edge_min_m,
+        edge_max_m,
+        tested_clearance_m,
+        max_clearance_m,
+        starts,
+        goals,
+    };
+    let mut file =
+        vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).expect("it is small")];
     roadmap::write(&header, &points, &edges, &mut file).expect("it fits");
     let view = RoadmapView::parse(&file).expect("it was just written");
 
     let task = |id| VehicleTask { id, required_clearance_m: clearance_m, climb_m: 2.0, goal: None };
     let vehicles: Vec<_> = (1..=10).map(task).collect();
-    let (descents_m, mode, gates_most) = (&[2.0; 10], Mode::Unlabelled(Objective::TotalDistance), 64);
+    let (descents_m, mode, gates_most) =
+        (&[2.0; 10], Mode::Unlabelled(Objective::TotalDistance), 64);
     let (separation_m, parked_separation_m, cruise_mps, vertical_mps) = (2.0, 1.6, 2.0, 1.0);
     let schedule = ScheduleConfig { separation_m, parked_separation_m, cruise_mps, vertical_mps };
-    let request = PlanRequest { vehicles: &vehicles, descents_m, mode, schedule, max_gates: gates_most };
+    let request =
+        PlanRequest { vehicles: &vehicles, descents_m, mode, schedule, max_gates: gates_most };
     let mut workspace = Box::new(PlanWorkspace::<512, 10, 2048>::new());
     let (mut swarm, mut own) = (SwarmPlan::<10, 64>::new(), VehiclePlan::<64, 64>::new());
-    plan::plan_swarm(&view, &request, &mut workspace, &mut swarm).expect("every goal can be reached");
+    plan::plan_swarm(&view, &request, &mut workspace, &mut swarm)
+        .expect("every goal can be reached");
     for (i, flight) in swarm.flights.iter().enumerate() {
-        plan::vehicle_plan(&swarm, i, &schedule, &mut workspace.schedule, &mut own).expect("the gates fit");
-        let (id, goal, length_m, gates) = (flight.id, own.task.goal(), own.path.length_m(), own.gates.len());
-        println!("{id:2}: goal {goal:?}, {length_m:.1} m, {gates} gates, departs at {:.1} s", own.depart_s);
+        plan::vehicle_plan(&swarm, i, &schedule, &mut workspace.schedule, &mut own)
+            .expect("the gates fit");
+        let (id, goal, length_m, gates) =
+            (flight.id, own.task.goal(), own.path.length_m(), own.gates.len());
+        println!(
+            "{id:2}: goal {goal:?}, {length_m:.1} m, {gates} gates, departs at {:.1} s",
+            own.depart_s
+        );
     }
     println!("plan CRC-32 {:08x}, {:.1} m in all", swarm.crc, swarm.total_m());
 }

@@ -1,14 +1,17 @@
-//! Which vehicle flies to which task: the linear sum assignment and the bottleneck assignment, on dense cost matrices.
+//! Which vehicle flies to which task: the linear sum assignment and the bottleneck assignment, on
+//! dense cost matrices.
 //!
-//! Source: R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear assignment
-//! problems", Computing 38 (1987): column reduction with reduction transfer, augmenting row reduction, then one shortest
-//! augmenting path for each row still free. P3D §3.3 names it the unlabelled allocation. O(n³) at worst.
+//! Source: R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse
+//! linear assignment problems", Computing 38 (1987): column reduction with reduction transfer,
+//! augmenting row reduction, then one shortest augmenting path for each row still free. P3D §3.3
+//! names it the unlabelled allocation. O(n³) at worst.
 //!
-//! Beyond the paper: fewer rows than columns or the other way round, and pairs that cannot be (`f32::INFINITY`). The
-//! answer has the most pairs there can be and, among those, the least total. No large number stands in for infinity.
-//! Where every row of the shorter side can be served, Jonker–Volgenant answers; where one cannot, it begins again with
-//! shortest augmenting paths from *all* free rows at once. Each of those keeps the matching the cheapest of its size,
-//! so when no path is left it is the largest and the cheapest of that size.
+//! Beyond the paper: fewer rows than columns or the other way round, and pairs that cannot be
+//! (`f32::INFINITY`). The answer has the most pairs there can be and, among those, the least total.
+//! No large number stands in for infinity. Where every row of the shorter side can be served,
+//! Jonker–Volgenant answers; where one cannot, it begins again with shortest augmenting paths from *all*
+//! free rows at once. Each of those keeps the matching the cheapest of its size, so when no path is
+//! left it is the largest and the cheapest of that size.
 //!
 //! Costs are f32 in any unit (metres, seconds), sums and dual prices f64.
 
@@ -67,7 +70,11 @@ impl<const N: usize> AssignmentWorkspace<N> {
         }
     }
 
-    fn split_borrows(&mut self, rows: usize, cols: usize) -> (MatchingState<'_>, AugmentingPaths<'_>) {
+    fn split_borrows(
+        &mut self,
+        rows: usize,
+        cols: usize,
+    ) -> (MatchingState<'_>, AugmentingPaths<'_>) {
         let state = MatchingState {
             price: &mut self.price[..cols],
             row_of: &mut self.row_of[..cols],
@@ -92,9 +99,11 @@ impl<const N: usize> Default for AssignmentWorkspace<N> {
     }
 }
 
-/// The assignment with the most pairs and, among those, the least total cost (mission objective "total").
+/// The assignment with the most pairs and, among those, the least total cost (mission objective
+/// "total").
 ///
-/// `costs` is row-major, `rows` × `cols`; infinity marks a pair that cannot be. `out[row]` becomes the row's column.
+/// `costs` is row-major, `rows` × `cols`; infinity marks a pair that cannot be. `out[row]` becomes
+/// the row's column.
 pub fn assign<const N: usize>(
     costs: &[f32],
     rows: usize,
@@ -107,12 +116,13 @@ pub fn assign<const N: usize>(
     Ok(write_assignment(&costs, &ws.col_of, out))
 }
 
-/// The assignment with the most pairs, among those the least largest cost, and among those the least total (mission
-/// objective "makespan"). Arguments as [`assign`].
+/// The assignment with the most pairs, among those the least largest cost, and among those the
+/// least total (mission objective "makespan"). Arguments as [`assign`].
 ///
-/// The least largest cost comes from augmenting paths that minimise their largest edge, from all free rows at once: a
-/// larger matching needs an edge out of what is reached below the present bound, so the bound is raised no further than
-/// it must be (O. Gross, "The bottleneck assignment problem", 1959).
+/// The least largest cost comes from augmenting paths that minimise their largest edge, from all
+/// free rows at once: a larger matching needs an edge out of what is reached below the present
+/// bound, so the bound is raised no further than it must be (O. Gross, "The bottleneck assignment
+/// problem", 1959).
 pub fn assign_bottleneck<const N: usize>(
     costs: &[f32],
     rows: usize,
@@ -151,8 +161,9 @@ fn check_inputs<'a>(
 fn solve<const N: usize>(costs: &CostMatrix<'_>, ws: &mut AssignmentWorkspace<N>) {
     let (mut state, mut paths) = ws.split_borrows(costs.rows, costs.cols);
     state.reset();
-    let complete = reduce::reduce_to_free_rows(costs, &mut state, &mut paths)
-        .is_some_and(|left| (0..left).all(|k| augment::augment_from_row(costs, &mut state, &mut paths, k)));
+    let complete = reduce::reduce_to_free_rows(costs, &mut state, &mut paths).is_some_and(|left| {
+        (0..left).all(|k| augment::augment_from_row(costs, &mut state, &mut paths, k))
+    });
     if !complete {
         state.reset();
         while augment::augment_from_free_rows(costs, &mut state, &mut paths) {}
@@ -162,7 +173,9 @@ fn solve<const N: usize>(costs: &CostMatrix<'_>, ws: &mut AssignmentWorkspace<N>
 fn write_assignment(costs: &CostMatrix<'_>, col_of: &[u16], out: &mut [Option<u16>]) -> Assignment {
     out.fill(None);
     let mut result = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
-    for (row, &col) in col_of[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED) {
+    for (row, &col) in
+        col_of[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED)
+    {
         let cost = costs.cost_at(row as u16, col);
         let (from, to) = if costs.transposed { (usize::from(col), row as u16) } else { (row, col) };
         out[from] = Some(to);

@@ -21,8 +21,8 @@
 //! | `divide.rs` | what is left after a loss, as a path of its own |
 //! | `losses.rs` | that divided among those that fly on, as flights from where they hold |
 //!
-//! Places are metres, east and north, in the mission frame: [`Flat`]. A lane is two points; its waypoints follow from
-//! lane and index and are not stored.
+//! Places are metres, east and north, in the mission frame: [`Flat`]. A lane is two points; its
+//! waypoints follow from lane and index and are not stored.
 
 pub mod area;
 pub mod around;
@@ -54,7 +54,8 @@ pub enum CoverageError {
     Area(area::AreaError),
     /// The setting of this name is outside its range.
     Setting(&'static str),
-    /// Lanes further apart than a footprint is wide, or waypoints further than it is long, leave gaps.
+    /// Lanes further apart than a footprint is wide, or waypoints further than it is long, leave
+    /// gaps.
     Gaps,
     /// The path has more lanes, or more pieces of one lane, than the memory holds.
     LanesFull,

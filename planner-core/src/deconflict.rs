@@ -1,8 +1,10 @@
 //! Keeping apart in flight: how fast, and how far, a vehicle may go given its neighbours.
 //!
-//! [`Method::Algorithm2`] is P3D §3.4 as printed, kept for comparison. [`Method::Priority`] keeps the order of the swarm's
-//! schedule: before each stretch that conflicts with one an earlier-labelled vehicle has yet to leave, it stops (the
-//! gates of [`crate::schedule`]); a vehicle that is out of the plan opens its gates, and is flown around ([`crate::detour`]). A neighbour that flies no plan we know is an obstacle to stop in front of.
+//! [`Method::Algorithm2`] is P3D §3.4 as printed, kept for comparison. [`Method::Priority`] keeps
+//! the order of the swarm's schedule: before each stretch that conflicts with one an
+//! earlier-labelled vehicle has yet to leave, it stops (the gates of [`crate::schedule`]); a
+//! vehicle that is out of the plan opens its gates, and is flown around ([`crate::detour`]). A
+//! neighbour that flies no plan we know is an obstacle to stop in front of.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -59,7 +61,8 @@ pub struct Neighbour {
     pub velocity: Point,
     /// Seconds since this was heard.
     pub age_s: f32,
-    /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it flies another plan.
+    /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it
+    /// flies another plan.
     pub progress_m: Option<f32>,
     /// Whether it is on the ground, or has to be assumed there.
     pub grounded: bool,
@@ -133,15 +136,17 @@ pub fn advise<const W: usize>(
     }
 }
 
-/// P3D Algorithm 2, lines 12–17: within the safety distance of a higher-ranked vehicle `h` the nominal speed is divided
-/// by `(h + 1) · 1.5`; of several the last (highest) counts, as the loop overwrites. Restored when the neighbour leaves.
+/// P3D Algorithm 2, lines 12–17: within the safety distance of a higher-ranked vehicle `h` the
+/// nominal speed is divided by `(h + 1) · 1.5`; of several the last (highest) counts, as the loop
+/// overwrites. Restored when the neighbour leaves.
 fn advise_by_algorithm2(
     cfg: &DeconflictConfig,
     rank: u16,
     position: &Point,
     neighbours: &[Neighbour],
 ) -> Advice {
-    let near = |n: &&Neighbour| n.rank > rank && (n.position - position).length() < cfg.safety_distance_m;
+    let near =
+        |n: &&Neighbour| n.rank > rank && (n.position - position).length() < cfg.safety_distance_m;
     match neighbours.iter().filter(near).max_by_key(|n| n.rank) {
         Some(n) => Advice {
             speed_scale: 1.0 / ((f32::from(n.rank) + 1.0) * 1.5),
@@ -166,8 +171,9 @@ fn advise_by_priority<const W: usize>(
         }
     };
     // A gate beyond twice the braking distance asks for nothing yet.
-    let horizon_m =
-        own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + cfg.cruise_mps * PATH_SAMPLE_S;
+    let horizon_m = own.along_m
+        + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2
+        + cfg.cruise_mps * PATH_SAMPLE_S;
     let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - GATE_OVERSHOOT_M)..];
     for gate in ahead.iter().take_while(|gate| gate.at_m <= horizon_m) {
         let passed = find_neighbour(neighbours, gate.id).is_some_and(|n| {
@@ -205,13 +211,15 @@ struct PathAhead {
 impl PathAhead {
     fn new<const W: usize>(cfg: &DeconflictConfig, own: &OwnVehicle<'_, W>) -> Self {
         let step_m = cfg.cruise_mps * PATH_SAMPLE_S;
-        let points = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(MAX_PATH_SAMPLES);
+        let points =
+            own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(MAX_PATH_SAMPLES);
         Self { points: points.collect(), step_m }
     }
 
-    /// Distance along the own path to where it first comes within the safety distance of a neighbour that flies on as last
-    /// heard; `None` if not within the look-ahead, or if flying on only takes us further apart. Squares are compared: a board
-    /// takes its square roots by software. From far apart the next looks are left out that are too early for both to meet.
+    /// Distance along the own path to where it first comes within the safety distance of a
+    /// neighbour that flies on as last heard; `None` if not within the look-ahead, or if flying on
+    /// only takes us further apart. Squares are compared: a board takes its square roots by
+    /// software. From far apart the next looks are left out that are too early for both to meet.
     fn distance_to_conflict_m<const W: usize>(
         &self,
         cfg: &DeconflictConfig,
@@ -249,7 +257,8 @@ impl PathAhead {
     }
 }
 
-/// Square of the least distance from the origin on the way from one place to another, if it is at neither of them.
+/// Square of the least distance from the origin on the way from one place to another, if it is at
+/// neither of them.
 fn min_squared_distance(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
     let ahead = to.dot(&step);
@@ -357,9 +366,16 @@ mod tests {
         assert_eq!((advice.stop_within_m, advice.waiting_for), (2.0, 2));
         heard[0].progress_m = Some(9.0);
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
-        assert_eq!((advice.stop_within_m, advice.waiting_for), (2.5, 7), "an unheard vehicle has not passed");
-        heard[0] =
-            Neighbour { out_of_plan: true, grounded: true, ..neighbour(7, 1, Point::new(9.0, 9.0, 0.0)) };
+        assert_eq!(
+            (advice.stop_within_m, advice.waiting_for),
+            (2.5, 7),
+            "an unheard vehicle has not passed"
+        );
+        heard[0] = Neighbour {
+            out_of_plan: true,
+            grounded: true,
+            ..neighbour(7, 1, Point::new(9.0, 9.0, 0.0))
+        };
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates[2..], &heard);
         assert_eq!(advice, Advice::FREE, "a vehicle out of the plan will never pass");
     }
@@ -370,7 +386,11 @@ mod tests {
         let ahead = [neighbour(9, 5, Point::new(5.0, 0.2, 0.0))];
         let advice = advise(&cfg(Method::Priority), &own(&path), &[], &ahead);
         assert_eq!(advice.waiting_for, 9);
-        assert!(advice.stop_within_m <= 3.5 && advice.stop_within_m > 2.5, "{}", advice.stop_within_m);
+        assert!(
+            advice.stop_within_m <= 3.5 && advice.stop_within_m > 2.5,
+            "{}",
+            advice.stop_within_m
+        );
         let behind = [neighbour(9, 5, Point::new(-1.0, 0.0, 0.0))];
         assert_eq!(advise(&cfg(Method::Priority), &own(&path), &[], &behind), Advice::FREE);
     }

@@ -1,13 +1,15 @@
-//! One vehicle's detour around a vehicle that left the plan and lies, stands or hovers off its schedule. Over a
-//! field, where there is no roadmap, [`crate::coverage::around`] plans it.
+//! One vehicle's detour around a vehicle that left the plan and lies, stands or hovers off its
+//! schedule. Over a field, where there is no roadmap, [`crate::coverage::around`] plans it.
 //!
-//! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so there is no time in it: the
-//! shortest path on the roadmap from where the vehicle hovers to its goal that keeps clear of every [`KeepOutZone`]. It begins with
-//! the rest of the current leg, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
-//! something already than it should be, it only comes no nearer. A column ends at the ground, as far as the roadmap says where
-//! that is.
+//! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so
+//! there is no time in it: the shortest path on the roadmap from where the vehicle hovers to its
+//! goal that keeps clear of every [`KeepOutZone`]. It begins with the rest of the current leg,
+//! forward or back, which is known to be clear of walls. Where the vehicle is nearer to something
+//! already than it should be, it only comes no nearer. A column ends at the ground, as far as the
+//! roadmap says where that is.
 //!
-//! ENU metres. Cost: two A*, each edge checked against every [`KeepOutZone`]; each of these against every node.
+//! ENU metres. Cost: two A*, each edge checked against every [`KeepOutZone`]; each of these against
+//! every node.
 
 use core::ops::Range;
 
@@ -47,12 +49,14 @@ pub enum ZoneKind {
     Static,
     /// A vehicle at `from` that descends to `to`: not to be rested below, nor flown up to.
     Descending,
-    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is kept clear.
+    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is
+    /// kept clear.
     Grounded,
 }
 
 impl KeepOutZone {
-    /// Whether its ends are finite and its radius is finite and not negative; the error names the first that is not.
+    /// Whether its ends are finite and its radius is finite and not negative; the error names the
+    /// first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         check_finite("from", &self.from)?;
         check_finite("to", &self.to)?;
@@ -135,7 +139,8 @@ impl BoundingBox {
         Self { low: from.inf(to) - radius, high: from.sup(to) + radius }
     }
 
-    /// Beyond which of its six sides a place is, a bit for each: what is between two places beyond the same side is too.
+    /// Beyond which of its six sides a place is, a bit for each: what is between two places beyond
+    /// the same side is too.
     fn outer_faces(&self, p: &Point) -> u8 {
         let (low, high) = (&self.low, &self.high);
         u8::from(p.x < low.x)
@@ -147,8 +152,9 @@ impl BoundingBox {
     }
 }
 
-/// Whether a path between two arc lengths, `ahead`, comes too near: with the climb if that begins before 0, and with the descent if
-/// it ends beyond the path. Nearer than `here`, where the vehicle is, has to be: what it leaves is not in its way.
+/// Whether a path between two arc lengths, `ahead`, comes too near: with the climb if that begins
+/// before 0, and with the descent if it ends beyond the path. Nearer than `here`, where the vehicle
+/// is, has to be: what it leaves is not in its way.
 pub fn is_path_blocked<const W: usize>(
     path: &Path<W>,
     ahead: Range<f32>,
@@ -157,11 +163,14 @@ pub fn is_path_blocked<const W: usize>(
     here: &Point,
     obstacle: &KeepOutZone,
 ) -> bool {
-    let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else { return false };
+    let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else {
+        return false;
+    };
     let obstacle = obstacle.shrunk_to(here, HOVER_SWAY_M);
     let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
     let (along_m, until_m) = (ahead.start, ahead.end);
-    let climbs = along_m < 0.0 && obstacle.intersects(&(first.position - up(climb_m)), &first.position);
+    let climbs =
+        along_m < 0.0 && obstacle.intersects(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
     let next = count_legs_begun(path, along_m);
     let descends = until_m > path.length_m() && obstacle.intersects(&last.position, &ground);
@@ -220,11 +229,13 @@ pub enum Goal {
 /// The detour to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetourRequest {
-    /// Whether it is not the goal that is sought but the nearest node to rest at, away from all there is to keep off.
+    /// Whether it is not the goal that is sought but the nearest node to rest at, away from all
+    /// there is to keep off.
     pub aside: bool,
     /// Place where the vehicle hovers, on a leg whose ends follow.
     pub here: Point,
-    /// The ends of that leg; nodes of the roadmap, but that one may be where an earlier detour began.
+    /// The ends of that leg; nodes of the roadmap, but that one may be where an earlier detour
+    /// began.
     pub leg: [Point; 2],
     /// Clearance of that leg, metres.
     pub leg_clearance_m: f32,
@@ -239,8 +250,8 @@ pub struct DetourRequest {
 }
 
 impl DetourRequest {
-    /// Whether its places are finite, and its height and clearances are finite and not negative; the error names the
-    /// first that is not.
+    /// Whether its places are finite, and its height and clearances are finite and not negative;
+    /// the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         check_finite("here", &self.here)?;
         check_finite("leg", &self.leg[0])?;
@@ -283,8 +294,8 @@ pub enum DetourError {
 /// Greatest length of a path to a landing place aside, and greatest distance of that place, metres.
 const MAX_SIDESTEP_M: f32 = 20.0;
 
-/// The shortest path to the goal, or aside, that keeps clear of all `obstacles`, written to `out`. Of an obstacle that
-/// is nearer already the distance is shortened; `nodes` is scratch.
+/// The shortest path to the goal, or aside, that keeps clear of all `obstacles`, written to `out`.
+/// Of an obstacle that is nearer already the distance is shortened; `nodes` is scratch.
 pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -303,7 +314,9 @@ pub fn plan_detour<const N: usize, const W: usize>(
     let clear = |a: &Point, b: &Point| {
         !obstacles.iter().any(|obstacle| obstacle.impassable_part(&here).intersects(a, b))
     };
-    let Goal::Node(number) = request.goal else { return Err(DetourError::Search(SearchError::NoPath)) };
+    let Goal::Node(number) = request.goal else {
+        return Err(DetourError::Search(SearchError::NoPath));
+    };
     let goal = view.header().starts.saturating_add(number);
     if number >= view.header().goals {
         return Err(DetourError::Search(SearchError::BadNode(goal)));
@@ -315,16 +328,20 @@ pub fn plan_detour<const N: usize, const W: usize>(
     let passable = |from: u16, edge: &HalfEdge| {
         let to = view.node(edge.target);
         let near = !request.aside || (to - here).length() < MAX_SIDESTEP_M;
-        near && view.has_clearance(edge, request.required_clearance_m) && clear(&view.node(from), &to)
+        near && view.has_clearance(edge, request.required_clearance_m)
+            && clear(&view.node(from), &to)
     };
     let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
         if !request.aside {
             return search::astar(view, entry, goal, passable, ws, nodes);
         }
         search::dijkstra_all(view, entry, passable, ws)?;
-        let rest = |node: &u16| !obstacles.iter().any(|obstacle| obstacle.contains(&view.node(*node)));
-        let reached = (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < MAX_SIDESTEP_M);
-        let nearest = reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)));
+        let rest =
+            |node: &u16| !obstacles.iter().any(|obstacle| obstacle.contains(&view.node(*node)));
+        let reached =
+            (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < MAX_SIDESTEP_M);
+        let nearest =
+            reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)));
         let nearest = nearest.ok_or(SearchError::NoPath)?;
         ws.path_to(nearest, nodes)?;
         Ok(ws.distance_m(nearest))
@@ -332,7 +349,8 @@ pub fn plan_detour<const N: usize, const W: usize>(
     let mut best = f32::INFINITY;
     let mut failed = Err(DetourError::Search(SearchError::NoPath));
     for end in request.leg.iter().filter(|end| clear(&here, end)) {
-        let Some(entry) = (0..view.node_count() as u16).find(|&node| view.node(node) == *end) else {
+        let Some(entry) = (0..view.node_count() as u16).find(|&node| view.node(node) == *end)
+        else {
             continue;
         };
         let length_m = match search(entry, nodes) {
@@ -358,7 +376,8 @@ pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     }
 }
 
-/// As [`plan_detour`], as the plan of one vehicle: without gates, since all others stand while it is flown.
+/// As [`plan_detour`], as the plan of one vehicle: without gates, since all others stand while it
+/// is flown.
 pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,

@@ -1,10 +1,12 @@
 //! Heights that vehicles fly above: the field, a grid of nodes read in place from `field.bin`.
 //!
-//! Little endian: magic `FLKFIELD`, version u16, columns u16, rows u16, 0 u16, east and north of the first node f32, metres from
-//! node to node f32, then one i16 a node, decimetres up in the mission frame, rows from south to north, and a CRC-32 of all
-//! before it. Between nodes heights are bilinear, beyond the border they are those of the border. The desk raises nodes to the
-//! highest ground that a vehicle's error and half a step of [`follow`] may reach, and flattens what is too steep; so a
-//! path that keeps above the field at samples half a node apart keeps above the ground everywhere.
+//! Little endian: magic `FLKFIELD`, version u16, columns u16, rows u16, 0 u16, east and north of
+//! the first node f32, metres from node to node f32, then one i16 a node, decimetres up in the
+//! mission frame, rows from south to north, and a CRC-32 of all before it. Between nodes heights
+//! are bilinear, beyond the border they are those of the border. The desk raises nodes to the
+//! highest ground that a vehicle's error and half a step of [`follow`] may reach, and flattens what
+//! is too steep; so a path that keeps above the field at samples half a node apart keeps above the
+//! ground everywhere.
 
 pub mod follow;
 
@@ -87,7 +89,9 @@ impl<'a> FieldView<'a> {
                 FileError::Length
             });
         }
-        let Some((nodes, crc)) = rest.split_last_chunk::<CRC_LEN>() else { return Err(FileError::Truncated) };
+        let Some((nodes, crc)) = rest.split_last_chunk::<CRC_LEN>() else {
+            return Err(FileError::Truncated);
+        };
         let crc = u32::from_le_bytes(*crc);
         if CRC32.checksum(&bytes[..bytes.len() - CRC_LEN]) != crc {
             return Err(FileError::Crc);

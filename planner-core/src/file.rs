@@ -1,4 +1,5 @@
-//! What can be wrong with any of our files: a magic number, a version, lengths, a header and a CRC-32 are common to all.
+//! What can be wrong with any of our files: a magic number, a version, lengths, a header and a
+//! CRC-32 are common to all.
 
 use core::fmt;
 
@@ -8,7 +9,8 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// xor 0xFFFFFFFF. One set of tables serves every file and record.
 pub static CRC32: Crc<u32, CrcTable> = Crc::<u32, CrcTable>::new(&CRC_32_ISO_HDLC);
 
-/// Lookup tables: one (1 kB) on a board; sixteen (16 kB) on a desk, which process sixteen bytes at once.
+/// Lookup tables: one (1 kB) on a board; sixteen (16 kB) on a desk, which process sixteen bytes at
+/// once.
 #[cfg(target_os = "none")]
 type CrcTable = crc::Table<1>;
 #[cfg(not(target_os = "none"))]

@@ -1,6 +1,8 @@
-//! Plan types: a path, the gates along it, a vehicle's flight and what its companion needs of the swarm's plan.
+//! Plan types: a path, the gates along it, a vehicle's flight and what its companion needs of the
+//! swarm's plan.
 //!
-//! They hold data and answer for geometry alone. Metres, seconds, ENU in the mission frame; arc length runs along the path.
+//! They hold data and answer for geometry alone. Metres, seconds, ENU in the mission frame; arc
+//! length runs along the path.
 
 mod done;
 mod photographs;
@@ -21,10 +23,11 @@ pub struct Waypoint {
     pub clearance_m: f32,
     /// Arc length from the first waypoint, metres.
     pub along_m: f32,
-    /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its order matters in flight.
+    /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its
+    /// order matters in flight.
     pub arrive_s: f32,
-    /// Time of the departure, seconds: later than `arrive_s` where the schedule lets another vehicle
-    /// pass.
+    /// Time of the departure, seconds: later than `arrive_s` where the schedule lets another
+    /// vehicle pass.
     pub leave_s: f32,
 }
 
@@ -40,8 +43,8 @@ pub enum PathError {
     TooLong,
 }
 
-/// A polyline through free space, from the point above the pad to the goal. Arc length runs from 0 at the first
-/// waypoint; take-off lies before 0, landing beyond [`Path::length_m`].
+/// A polyline through free space, from the point above the pad to the goal. Arc length runs from 0
+/// at the first waypoint; take-off lies before 0, landing beyond [`Path::length_m`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Path<const W: usize> {
     waypoints: Vec<Waypoint, W>,
@@ -58,7 +61,8 @@ impl<const W: usize> Path<W> {
         self.waypoints.len().checked_sub(1)
     }
 
-    /// Labels every waypoint without a stop: the first at `first_s`, each other one `seconds` of its leg later.
+    /// Labels every waypoint without a stop: the first at `first_s`, each other one `seconds` of
+    /// its leg later.
     pub fn label_times_by(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
         let mut before: Option<(Point, f32)> = None;
         for waypoint in &mut self.waypoints {
@@ -69,7 +73,8 @@ impl<const W: usize> Path<W> {
         }
     }
 
-    /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of the two.
+    /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of
+    /// the two.
     #[inline(never)]
     pub fn push(&mut self, position: Point, clearance_m: f32) -> Result<(), PathError> {
         if !(position.iter().all(|c| c.is_finite()) && clearance_m.is_finite()) {
@@ -93,7 +98,8 @@ impl<const W: usize> Path<W> {
         self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
     }
 
-    /// Labels every waypoint without a stop: the first at `first_s`, the others after their arc length at `speed_mps`.
+    /// Labels every waypoint without a stop: the first at `first_s`, the others after their arc
+    /// length at `speed_mps`.
     pub fn label_times(&mut self, first_s: f32, speed_mps: f32) {
         for waypoint in &mut self.waypoints {
             waypoint.arrive_s = first_s + waypoint.along_m / speed_mps;
@@ -125,8 +131,8 @@ impl<const W: usize> Path<W> {
         self.point_on(self.leg_at(along_m), along_m)
     }
 
-    /// The points at `from_m`, `from_m + step_m` and so on (a positive step), each as [`Self::point_at`] has it, in one
-    /// walk along the path; none on an empty path.
+    /// The points at `from_m`, `from_m + step_m` and so on (a positive step), each as
+    /// [`Self::point_at`] has it, in one walk along the path; none on an empty path.
     pub fn points_from(&self, from_m: f32, step_m: f32) -> impl Iterator<Item = Point> {
         let mut leg = self.leg_at(from_m);
         let mut steps = 0u16;
@@ -140,7 +146,8 @@ impl<const W: usize> Path<W> {
         })
     }
 
-    /// Index of the waypoint that ends the leg on which an arc length lies; beyond the last waypoint there is none.
+    /// Index of the waypoint that ends the leg on which an arc length lies; beyond the last
+    /// waypoint there is none.
     fn leg_at(&self, along_m: f32) -> usize {
         self.waypoints.partition_point(|w| w.along_m < along_m)
     }
@@ -157,8 +164,8 @@ impl<const W: usize> Path<W> {
         Some(from.position + (to.position - from.position) * share)
     }
 
-    /// Arc length of the point of the path nearest to `position` within `window_m` of `near_m`: how far a vehicle has
-    /// come, without jumping to another stretch that passes close by.
+    /// Arc length of the point of the path nearest to `position` within `window_m` of `near_m`: how
+    /// far a vehicle has come, without jumping to another stretch that passes close by.
     pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
         let (low, high) = (near_m - window_m, near_m + window_m);
         let mut best = (f32::INFINITY, near_m);
@@ -187,7 +194,8 @@ pub const PROGRESS_ERROR_M: f32 = 0.25;
 
 /// Task of a vehicle on its flight.
 ///
-/// Every task's flight is one path: what differs is what happens along it, which the task says by arc length.
+/// Every task's flight is one path: what differs is what happens along it, which the task says by
+/// arc length.
 // A tag of its own, so that one that stays is all zeros and a static of plans costs .bss alone.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -238,19 +246,23 @@ pub struct Flight<const W: usize> {
     pub descent_m: f32,
     /// Scheduled take-off, seconds after the start at nominal speeds.
     pub depart_s: f32,
-    /// Longest timed segment of this flight, metres: [`crate::schedule::MAX_TIMED_SEGMENT_M`], or more on a flight that is long.
+    /// Longest timed segment of this flight, metres: [`crate::schedule::MAX_TIMED_SEGMENT_M`], or
+    /// more on a flight that is long.
     pub segment_m: f32,
 }
 
 /// "Before my arc length `at_m`, vehicle `id` must have come past `until_m` of its own path."
 ///
 /// Progress is what opens a gate, so a vehicle must report it by these rules:
-/// - On its pad it reports −climb. In the climb it reports what is left of it, negative; in the descent the path's length and
-///   how far it has come down.
-/// - It reports no more than the reference that it follows has come to, and at most [`PROGRESS_ERROR_M`] less once it stands.
-/// - It reports more than the path's length and the descent only when it stands on the ground, disarmed.
+/// - On its pad it reports −climb. In the climb it reports what is left of it, negative; in the
+///   descent the path's length and how far it has come down.
+/// - It reports no more than the reference that it follows has come to, and at most
+///   [`PROGRESS_ERROR_M`] less once it stands.
+/// - It reports more than the path's length and the descent only when it stands on the ground,
+///   disarmed.
 ///
-/// A vehicle that waits at its assigned place reports enough progress to open every gate for the part behind it.
+/// A vehicle that waits at its assigned place reports enough progress to open every gate for the
+/// part behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
     /// Place of the gate, metres along the own path; −climb is the pad.
@@ -272,11 +284,13 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub climb_m: f32,
     /// Height of the goal above the ground there, metres.
     pub descent_m: f32,
-    /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad instead of in the air.
+    /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad
+    /// instead of in the air.
     pub depart_s: f32,
     /// Places to wait at, and for which vehicle.
     pub gates: Vec<Gate, G>,
-    /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every gate.
+    /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every
+    /// gate.
     pub plan_crc: u32,
 }
 
@@ -310,9 +324,15 @@ pub(crate) mod tests {
     #[test]
     fn a_walk_along_the_path_sees_what_single_looks_see() {
         let path = corner_path(0.8);
-        for (from_m, step_m) in [(0.0, 0.5), (-1.0, 0.7), (5.9, 0.1), (6.0, 3.0), (11.0, 0.4), (20.0, 1.0)] {
+        for (from_m, step_m) in
+            [(0.0, 0.5), (-1.0, 0.7), (5.9, 0.1), (6.0, 3.0), (11.0, 0.4), (20.0, 1.0)]
+        {
             for (k, point) in path.points_from(from_m, step_m).take(20).enumerate() {
-                assert_eq!(Some(point), path.point_at(from_m + k as f32 * step_m), "{from_m} {step_m} {k}");
+                assert_eq!(
+                    Some(point),
+                    path.point_at(from_m + k as f32 * step_m),
+                    "{from_m} {step_m} {k}"
+                );
             }
         }
         assert_eq!(Path::<4>::new().points_from(0.0, 1.0).next(), None);

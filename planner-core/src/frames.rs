@@ -1,9 +1,11 @@
-//! Coordinate frames: WGS84, the mission's ENU tangent plane, and each autopilot's own NED projection.
+//! Coordinate frames: WGS84, the mission's ENU tangent plane, and each autopilot's own NED
+//! projection.
 //!
-//! The mission frame is ENU metres on the plane tangent to the WGS84 ellipsoid at the mission origin. An autopilot's
-//! local frame is NED metres about its own EKF origin, but *not* a tangent plane: PX4 projects azimuthally on a sphere,
-//! ArduPilot scales degrees. Two kilometres from the origin they differ from WGS84 by metres, so every conversion goes
-//! through latitude and longitude with the projection of the current autopilot. f64 throughout: degrees at 1e-9.
+//! The mission frame is ENU metres on the plane tangent to the WGS84 ellipsoid at the mission
+//! origin. An autopilot's local frame is NED metres about its own EKF origin, but *not* a tangent
+//! plane: PX4 projects azimuthally on a sphere, ArduPilot scales degrees. Two kilometres from the
+//! origin they differ from WGS84 by metres, so every conversion goes through latitude and longitude
+//! with the projection of the current autopilot. f64 throughout: degrees at 1e-9.
 
 use libm::{asin, atan2, cos, fabs, sin, sqrt};
 use nalgebra::Vector3;
@@ -25,7 +27,8 @@ pub struct Geodetic {
     pub lat_deg: f64,
     /// Longitude, degrees, east positive.
     pub lon_deg: f64,
-    /// Altitude, metres above mean sea level (the geoid is taken as the ellipsoid, as autopilots do for differences).
+    /// Altitude, metres above mean sea level (the geoid is taken as the ellipsoid, as autopilots do
+    /// for differences).
     pub alt_m: f64,
 }
 
@@ -75,8 +78,8 @@ pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
     Point::new(east as f32, north as f32, up as f32)
 }
 
-/// The geodetic position of ENU metres about `origin`. Inverse of [`geodetic_to_enu`] to the rounding of f32: half a
-/// millimetre within 8 km, 4 mm at 100 km.
+/// The geodetic position of ENU metres about `origin`. Inverse of [`geodetic_to_enu`] to the
+/// rounding of f32: half a millimetre within 8 km, 4 mm at 100 km.
 pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     let (e, n, u) = (f64::from(enu.x), f64::from(enu.y), f64::from(enu.z));
     let turn = origin.sin_cos();
@@ -88,7 +91,8 @@ pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     ecef_to_geodetic(x, y, z)
 }
 
-/// Five fixed-point rounds of the latitude equation: converged below 1e-12 rad for altitudes within ±100 km.
+/// Five fixed-point rounds of the latitude equation: converged below 1e-12 rad for altitudes within
+/// ±100 km.
 fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
     let p = sqrt(x * x + y * y);
     let mut lat = atan2(z, p * (1.0 - WGS84_E2));
@@ -105,9 +109,9 @@ fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
     Geodetic { lat_deg: lat.to_degrees(), lon_deg: atan2(y, x).to_degrees(), alt_m: alt }
 }
 
-/// Great-circle distance in metres by the haversine formula (CPP eq. 9), on a sphere of 6 371 000 m; altitudes are
-/// ignored. Against WGS84 it is up to 0.56 % too long (along a meridian at the equator) and up to 0.45 % too short (near
-/// the poles).
+/// Great-circle distance in metres by the haversine formula (CPP eq. 9), on a sphere of 6 371 000
+/// m; altitudes are ignored. Against WGS84 it is up to 0.56 % too long (along a meridian at the
+/// equator) and up to 0.45 % too short (near the poles).
 pub fn haversine_m(a: &Geodetic, b: &Geodetic) -> f64 {
     let (lat_a, lat_b) = (a.lat_deg.to_radians(), b.lat_deg.to_radians());
     let half_dlat = sin((lat_b - lat_a) / 2.0);
@@ -126,7 +130,11 @@ pub enum Projection {
 }
 
 /// NED metres of `position` about an autopilot's EKF `origin`, as that autopilot computes them.
-pub fn geodetic_to_ned(projection: Projection, origin: &Geodetic, position: &Geodetic) -> Vector3<f64> {
+pub fn geodetic_to_ned(
+    projection: Projection,
+    origin: &Geodetic,
+    position: &Geodetic,
+) -> Vector3<f64> {
     let down = origin.alt_m - position.alt_m;
     match projection {
         Projection::Px4 => {
@@ -147,7 +155,8 @@ pub fn geodetic_to_ned(projection: Projection, origin: &Geodetic, position: &Geo
     }
 }
 
-/// The geodetic position an autopilot means by NED metres about its EKF `origin`. Inverse of [`geodetic_to_ned`].
+/// The geodetic position an autopilot means by NED metres about its EKF `origin`. Inverse of
+/// [`geodetic_to_ned`].
 pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<f64>) -> Geodetic {
     let alt_m = origin.alt_m - ned.z;
     match projection {
@@ -159,7 +168,8 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
             }
             let (lat0, lon0) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
             let lat = asin((cos(c) * sin(lat0) + north * sin(c) * cos(lat0) / c).clamp(-1.0, 1.0));
-            let lon = lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
+            let lon =
+                lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
             Geodetic { lat_deg: lat.to_degrees(), lon_deg: wrap_deg(lon.to_degrees()), alt_m }
         }
         Projection::ArduPilot => {
@@ -172,8 +182,8 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
     }
 }
 
-/// A longitude or a difference of two, brought into [-180, 180]: the antimeridian runs through nobody's building, but a
-/// difference of 359.9999 degrees would send a vehicle around the world.
+/// A longitude or a difference of two, brought into [-180, 180]: the antimeridian runs through
+/// nobody's building, but a difference of 359.9999 degrees would send a vehicle around the world.
 fn wrap_deg(degrees: f64) -> f64 {
     if fabs(degrees) <= 180.0 { degrees } else { libm::remainder(degrees, 360.0) }
 }

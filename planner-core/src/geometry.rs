@@ -4,7 +4,8 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::Point;
 
-/// Length of a vector by [`fpu::sqrtf`]: nalgebra's `norm` to the bit, at a third of its instructions on a board.
+/// Length of a vector by [`fpu::sqrtf`]: nalgebra's `norm` to the bit, at a third of its
+/// instructions on a board.
 pub trait Length {
     /// Euclidean length, in the vector's unit.
     fn length(&self) -> f32;
@@ -24,8 +25,8 @@ impl Length for Vector2<f32> {
     }
 }
 
-/// The value clamped to the bounds. `f32::clamp` panics where the bounds are none, and a board carries the code
-/// that would print them: 25 kB.
+/// The value clamped to the bounds. `f32::clamp` panics where the bounds are none, and a board
+/// carries the code that would print them: 25 kB.
 pub(crate) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }
@@ -45,8 +46,8 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
     (r + d1 * s - d2 * t).norm_squared()
 }
 
-/// Squared distance from a segment to a point: what [`segments_distance_sq`] gives for a second segment without length, bit
-/// by bit. One copy of it: a board has little room.
+/// Squared distance from a segment to a point: what [`segments_distance_sq`] gives for a second
+/// segment without length, bit by bit. One copy of it: a board has little room.
 #[inline(never)]
 pub(crate) fn point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
     let (d, r) = (p.1 - p.0, p.0 - q);

@@ -1,9 +1,11 @@
 //! Planning for a swarm of UAVs: maths over borrowed memory.
 //!
-//! No allocation, no I/O, no clock, no protocol. Lengths are metres, times seconds, angles degrees where a name says
-//! `_deg` and radians otherwise. Points are ENU (east, north, up) in the mission frame.
+//! No allocation, no I/O, no clock, no protocol. Lengths are metres, times seconds, angles degrees
+//! where a name says `_deg` and radians otherwise. Points are ENU (east, north, up) in the mission
+//! frame.
 //!
-//! The caller owns all memory. A map is a slice of words, and a function that needs scratch memory takes a workspace:
+//! The caller owns all memory. A map is a slice of words, and a function that needs scratch memory
+//! takes a workspace:
 //!
 //! ```
 //! use planner_core::Point;
@@ -24,7 +26,8 @@
 //! # Ok::<(), planner_core::voxel::GridError>(())
 //! ```
 //!
-//! `examples/ten_uavs.rs` continues from there: roadmap, assignment, paths, schedule and gates of ten UAVs.
+//! `examples/ten_uavs.rs` continues from there: roadmap, assignment, paths, schedule and gates of
+//! ten UAVs.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,13 +1,15 @@
 //! The plan of a whole swarm: which vehicle flies to which goal, along which path, in which order.
 //!
-//! Every companion computes this for the whole swarm from the mission's starts and goals, never from live positions, so all
-//! agree; the CRC of the plan is what they compare. P3D §3.3: one roadmap, a shortest path per vehicle (labelled) or the
-//! assignment of least total length over all pairs (unlabelled); what the paper leaves out is the order at shared stretches,
-//! which [`crate::schedule`] settles.
+//! Every companion computes this for the whole swarm from the mission's starts and goals, never
+//! from live positions, so all agree; the CRC of the plan is what they compare. P3D §3.3: one
+//! roadmap, a shortest path per vehicle (labelled) or the assignment of least total length over all
+//! pairs (unlabelled); what the paper leaves out is the order at shared stretches, which
+//! [`crate::schedule`] settles.
 //!
-//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A*, up to a dozen searches
-//! of the schedule (one for each departure looked at) and one pass over all scheduled pieces per vehicle; twice that for more than
-//! `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be planned with a handover.
+//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three
+//! A*, up to a dozen searches of the schedule (one for each departure looked at) and one pass over
+//! all scheduled pieces per vehicle; twice that for more than `MAX_VEHICLES_WITHOUT_HANDOVER`
+//! vehicles that cannot be planned with a handover.
 
 mod departures;
 mod order;
@@ -22,11 +24,13 @@ use crate::assignment;
 use crate::file::CRC32;
 use crate::flight::{Flight, Path, VehiclePlan};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
+use crate::schedule::{
+    self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
+};
 use crate::search;
 
-/// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`]. Vehicles and goals that cannot be served are
-/// left out, the rest is served as well as can be.
+/// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`].
+/// Vehicles and goals that cannot be served are left out, the rest is served as well as can be.
 pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -42,8 +46,9 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize
 /// The goal of each vehicle of a request, `None` for one that stays on its pad.
 pub type Goals<const V: usize> = Vec<Option<u16>, V>;
 
-/// First step: the length of the shortest path from every start to every goal, into the workspace; labelled, only to
-/// the vehicle's own goal. One search a vehicle, or one cost matrix where all are of one size.
+/// First step: the length of the shortest path from every start to every goal, into the workspace;
+/// labelled, only to the vehicle's own goal. One search a vehicle, or one cost matrix where all are
+/// of one size.
 pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -64,8 +69,11 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     let costs = &mut ws.costs.as_flattened_mut()[..starts * goals];
     let Some(first) = request.vehicles.first() else { return Ok(()) };
     let labelled = request.mode == Mode::Labelled;
-    if !labelled && request.vehicles.iter().all(|v| v.required_clearance_m == first.required_clearance_m) {
-        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, first.required_clearance_m);
+    if !labelled
+        && request.vehicles.iter().all(|v| v.required_clearance_m == first.required_clearance_m)
+    {
+        let passable =
+            |_: u16, edge: &HalfEdge| view.has_clearance(edge, first.required_clearance_m);
         return search::cost_matrix(view, &nodes, &targets, passable, &mut ws.search, costs)
             .map_err(|e| PlanError::Search(first.id, e));
     }
@@ -78,14 +86,16 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
             (true, None) => continue,
         };
         let (targets, row) = (&targets[wanted.clone()], &mut row[wanted]);
-        let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, vehicle.required_clearance_m);
+        let passable =
+            |_: u16, edge: &HalfEdge| view.has_clearance(edge, vehicle.required_clearance_m);
         search::dijkstra_row(view, i as u16, targets, passable, &mut ws.search, row)
             .map_err(|e| PlanError::Search(vehicle.id, e))?;
     }
     Ok(())
 }
 
-/// Second step: which vehicle flies to which goal, from the costs left in the workspace by [`compute_costs`].
+/// Second step: which vehicle flies to which goal, from the costs left in the workspace by
+/// [`compute_costs`].
 pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
@@ -125,7 +135,9 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
 ) -> Result<(), PlanError> {
     let header = view.header();
     let counts = [usize::from(header.starts), usize::from(header.goals)];
-    if assigned.len() != request.vehicles.len() || counts != [assigned.len(), request.descents_m.len()] {
+    if assigned.len() != request.vehicles.len()
+        || counts != [assigned.len(), request.descents_m.len()]
+    {
         return Err(PlanError::Terminals);
     }
     request.check()?;
@@ -134,7 +146,9 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
         let mut path = Path::new();
         path.push(view.node(i as u16), 0.0).map_err(|e| PlanError::Path(vehicle.id, e))?;
         let descent_m = match goal {
-            Some(goal) => *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?,
+            Some(goal) => {
+                *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?
+            }
             None => 0.0,
         };
         let (id, climb_m) = (vehicle.id, vehicle.climb_m);
@@ -150,7 +164,8 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
         // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
-    let handover_s = if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
+    let handover_s =
+        if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
     let mut planned = schedule_in_order(view, request, handover_s, ws, out);
     if handover_s > 0.0 && planned.is_err() {
         // Better late than not at all.
@@ -161,16 +176,18 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
     Ok(())
 }
 
-/// A place is planned to be free only so long after its vehicle has left it, seconds: until another one that waits for it flies in at
-/// full speed. A vehicle is up to a second behind the reference that stops it at gates, its report goes out five times a
-/// second, and one that has to stop brakes before. Without it each vehicle is later than the one before, and those that
-/// leave their pads in time wait in the air. Gates know nothing of it.
+/// A place is planned to be free only so long after its vehicle has left it, seconds: until another
+/// one that waits for it flies in at full speed. A vehicle is up to a second behind the reference
+/// that stops it at gates, its report goes out five times a second, and one that has to stop brakes
+/// before. Without it each vehicle is later than the one before, and those that leave their pads in
+/// time wait in the air. Gates know nothing of it.
 const HANDOVER_S: f32 = 2.0;
 /// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: no vehicle of theirs
 /// waits for many that wait themselves, and all land earlier.
 const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 
-/// The paths, their order, and whether each vehicle has room for its gates. A place is free `handover_s` after its vehicle has left it.
+/// The paths, their order, and whether each vehicle has room for its gates. A place is free
+/// `handover_s` after its vehicle has left it.
 #[inline(never)]
 fn schedule_in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
@@ -222,7 +239,8 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
 /// CRC-32 over all that gates follow from.
 fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V, W>) -> u32 {
     let mut digest = CRC32.digest();
-    let mut numbers = |numbers: &[f32]| numbers.iter().for_each(|c| digest.update(&c.to_le_bytes()));
+    let mut numbers =
+        |numbers: &[f32]| numbers.iter().for_each(|c| digest.update(&c.to_le_bytes()));
     numbers(&[cfg.separation_m, cfg.parked_separation_m, cfg.cruise_mps, cfg.vertical_mps]);
     for flight in &plan.flights {
         numbers(&[flight.climb_m, flight.descent_m, flight.depart_s, flight.segment_m]);

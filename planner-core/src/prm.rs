@@ -1,17 +1,19 @@
-//! The probabilistic roadmap of P3D §3.2, Algorithm 1: terminals and random free nodes, joined where a straight flight
-//! is clear.
+//! The probabilistic roadmap of P3D §3.2, Algorithm 1: terminals and random free nodes, joined
+//! where a straight flight is clear.
 //!
-//! Starts and goals are nodes, then `nodes` random points of free space (the paper's counter leaves the terminals out). Two
-//! nodes are joined iff `edge_min_m ≤ length ≤ edge_max_m` and the segment between them is clear with the margin
-//! ([`segment_is_clear`]). The edges are the same set as an all-pairs loop finds ([`connect_all_pairs`]); what differs is the way:
+//! Starts and goals are nodes, then `nodes` random points of free space (the paper's counter leaves
+//! the terminals out). Two nodes are joined iff `edge_min_m ≤ length ≤ edge_max_m` and the segment
+//! between them is clear with the margin ([`segment_is_clear`]). The edges are the same set as an
+//! all-pairs loop finds ([`connect_all_pairs`]); what differs is the way:
 //!
 //! 1. nodes are sorted into cubes ([`Workspace`]), so that only near pairs are measured;
-//! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`): a neighbour inside it is clear,
-//!    and a ray that leaves it mostly does so into a wall. Both answers are taken only where f32 cannot be wrong;
+//! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
+//!    a neighbour inside it is clear, and a ray that leaves it mostly does so into a wall. Both
+//!    answers are taken only where f32 cannot be wrong;
 //! 3. of what is left the part outside the box goes to the exact check.
 //!
-//! Cost: O(nodes · neighbours); 2300 nodes make some 80 000 pairs in range. Memory: 14 bytes a node, 2 a cube.
-//! Metres, mission frame, f32.
+//! Cost: O(nodes · neighbours); 2300 nodes make some 80 000 pairs in range. Memory: 14 bytes a
+//! node, 2 a cube. Metres, mission frame, f32.
 
 mod config;
 mod free_box;
@@ -25,18 +27,21 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use self::config::LengthRange;
-pub use self::config::{Config, Edge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length};
+pub use self::config::{
+    Config, Edge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length,
+};
 use self::free_box::NodeVisibility;
 pub use self::neighbours::Workspace;
 use crate::Point;
 use crate::segment::{point_clearance, segment_clearance, segment_is_clear};
 use crate::voxel::VoxelGrid;
 
-/// Writes the terminals and then `config.nodes` random free points into `nodes`; returns how many in all.
+/// Writes the terminals and then `config.nodes` random free points into `nodes`; returns how many
+/// in all.
 ///
-/// A random node lies in a cell that is not an obstacle, nor set in `never_sample` (unknown space that rays may
-/// pass), and farther than `clearance_m` from every obstacle: one nearer could have no edge. A terminal only has to be
-/// outside obstacles: whether it can be joined, the edges say.
+/// A random node lies in a cell that is not an obstacle, nor set in `never_sample` (unknown space
+/// that rays may pass), and farther than `clearance_m` from every obstacle: one nearer could have
+/// no edge. A terminal only has to be outside obstacles: whether it can be joined, the edges say.
 pub fn sample_nodes(
     grid: &VoxelGrid<'_>,
     never_sample: Option<&VoxelGrid<'_>>,
@@ -63,18 +68,25 @@ pub fn sample_nodes(
             && (config.clearance_m == 0.0 || segment_is_clear(grid, p, p, config.clearance_m))
     };
     for (found, node) in nodes[terminals.len()..total].iter_mut().enumerate() {
-        let draw =
-            |draws: &mut SampleSequence| Some(min + draws.next().component_mul(&size)).filter(&is_free);
-        let tries = if config.sampling == Sampling::Bridge && found % 2 == 1 { TRIES_PER_BRIDGE } else { 0 };
-        let bridge = (0..tries)
-            .find_map(|_| draw(&mut draws).filter(|p| passes_bridge_test(grid, config, p, draws.next())));
+        let draw = |draws: &mut SampleSequence| {
+            Some(min + draws.next().component_mul(&size)).filter(&is_free)
+        };
+        let tries = if config.sampling == Sampling::Bridge && found % 2 == 1 {
+            TRIES_PER_BRIDGE
+        } else {
+            0
+        };
+        let bridge = (0..tries).find_map(|_| {
+            draw(&mut draws).filter(|p| passes_bridge_test(grid, config, p, draws.next()))
+        });
         let free = bridge.or_else(|| (0..TRIES_PER_NODE).find_map(|_| draw(&mut draws)));
         *node = free.ok_or(PrmError::NoFreeSpace(found))?;
     }
     Ok(total)
 }
 
-/// Whether a point keeps the clearance that edges keep; where they keep none, whether it is outside obstacles.
+/// Whether a point keeps the clearance that edges keep; where they keep none, whether it is outside
+/// obstacles.
 fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
     match config.clearance_m > 0.0 {
         true => segment_is_clear(grid, p, p, config.clearance_m),
@@ -82,9 +94,10 @@ fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
     }
 }
 
-/// The bridge test: whether the points on either side of a clear one, at the same random offset, are both not clear.
-/// `draw` is of the unit cube. The offset is at most twice the clearance on each axis: a passage that is as wide
-/// leaves half of its width to fly in; where no clearance is asked for, an eighth of the longest edge.
+/// The bridge test: whether the points on either side of a clear one, at the same random offset,
+/// are both not clear. `draw` is of the unit cube. The offset is at most twice the clearance on
+/// each axis: a passage that is as wide leaves half of its width to fly in; where no clearance is
+/// asked for, an eighth of the longest edge.
 fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> bool {
     let reach_m = (2.0 * config.clearance_m).max(config.edge_max_m / 8.0);
     let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
@@ -143,7 +156,8 @@ fn radical_inverse(mut index: u32, base: u32) -> f32 {
     value.min(1.0 - f32::EPSILON)
 }
 
-/// Joins all nodes; returns the number of edges written. Their order is fixed by the nodes, but not ascending.
+/// Joins all nodes; returns the number of edges written. Their order is fixed by the nodes, but not
+/// ascending.
 pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
@@ -161,9 +175,9 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     Ok(count)
 }
 
-/// Finds the edges that begin at the places `range` of an indexed workspace and gives each to `found`; an error from there
-/// ends the work. The ranges 0..n and n..m give the edges of 0..m in the same order, so that cores can share the work
-/// without changing the result.
+/// Finds the edges that begin at the places `range` of an indexed workspace and gives each to
+/// `found`; an error from there ends the work. The ranges 0..n and n..m give the edges of 0..m in
+/// the same order, so that cores can share the work without changing the result.
 pub fn connect_range<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &Workspace<NODES, CUBES>,
@@ -174,9 +188,10 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
     connect_range_with(grid, workspace, config, range, |_| None, |edge, _| found(edge))
 }
 
-/// As [`connect_range`], where `hint` may know already whether the segment between two nodes is clear. It must answer as
-/// [`segment_is_clear`] does, or not at all; it is asked only where the answer is not at hand, and just before `found`. With
-/// an edge `found` is given a distance in metres that it keeps to obstacles, to 2⁻¹¹ cell, or 0 where none is at hand.
+/// As [`connect_range`], where `hint` may know already whether the segment between two nodes is
+/// clear. It must answer as [`segment_is_clear`] does, or not at all; it is asked only where the
+/// answer is not at hand, and just before `found`. With an edge `found` is given a distance in
+/// metres that it keeps to obstacles, to 2⁻¹¹ cell, or 0 where none is at hand.
 pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &Workspace<NODES, CUBES>,
@@ -195,13 +210,16 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
         };
         workspace.for_each_in_range(place, config, |places| {
             let hint = |other| hint(edge(other));
-            sight.for_each_visible(workspace, places, hint, |other, room_m| found(edge(other), room_m))
+            sight.for_each_visible(workspace, places, hint, |other, room_m| {
+                found(edge(other), room_m)
+            })
         })?;
     }
     Ok(())
 }
 
-/// The edges of Algorithm 1 as printed, every pair in turn: the reference for [`connect`]. O(nodes²).
+/// The edges of Algorithm 1 as printed, every pair in turn: the reference for [`connect`].
+/// O(nodes²).
 pub fn connect_all_pairs(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
@@ -225,9 +243,14 @@ pub fn connect_all_pairs(
     Ok(())
 }
 
-/// Distance from an edge to the nearest obstacle, metres, at most `max_m`: what the roadmap file keeps with it.
-/// `None` where the edge names no node.
-pub fn edge_clearance(grid: &VoxelGrid<'_>, nodes: &[Point], edge: Edge, max_m: f32) -> Option<f32> {
+/// Distance from an edge to the nearest obstacle, metres, at most `max_m`: what the roadmap file
+/// keeps with it. `None` where the edge names no node.
+pub fn edge_clearance(
+    grid: &VoxelGrid<'_>,
+    nodes: &[Point],
+    edge: Edge,
+    max_m: f32,
+) -> Option<f32> {
     let (a, b) = (nodes.get(usize::from(edge.a))?, nodes.get(usize::from(edge.b))?);
     Some(if edge.a == edge.b {
         point_clearance(grid, a, max_m)

@@ -1,21 +1,24 @@
 //! The roadmap file: a graph of free nodes and clear edges, read in place from flash.
 //!
-//! Little-endian, versioned, closed by a CRC-32; byte by byte in `planner-core/README.md`. Nodes are mission-frame
-//! points, edges are stored from both ends (half-edges) in compressed sparse rows, neighbours in ascending order. A
-//! half-edge takes four bytes: its length follows from the nodes, its clearance is kept in whole millimetres rounded
-//! down, so that 4096 nodes and 65536 half-edges take 320 kB, 32 kB more with landmarks. One roadmap built at a small margin serves vehicles of any
-//! size, because each edge carries the clearance it really has (P3D Table 1 from a single build).
+//! Little-endian, versioned, closed by a CRC-32; byte by byte in `planner-core/README.md`. Nodes
+//! are mission-frame points, edges are stored from both ends (half-edges) in compressed sparse
+//! rows, neighbours in ascending order. A half-edge takes four bytes: its length follows from the
+//! nodes, its clearance is kept in whole millimetres rounded down, so that 4096 nodes and 65536
+//! half-edges take 320 kB, 32 kB more with landmarks. One roadmap built at a small margin serves
+//! vehicles of any size, because each edge carries the clearance it really has (P3D Table 1 from a
+//! single build).
 //!
-//! A roadmap may carry the lengths of the ways from each node to two landmarks, eight bytes a node. By the triangle
-//! inequality their differences bound the way between any two nodes from below, in a building better than the straight line
-//! does (ALT: Goldberg and Harrelson 2005, "Computing the Shortest Path: A* Search Meets Graph Theory").
+//! A roadmap may carry the lengths of the ways from each node to two landmarks, eight bytes a node.
+//! By the triangle inequality their differences bound the way between any two nodes from below, in
+//! a building better than the straight line does (ALT: Goldberg and Harrelson 2005, "Computing the
+//! Shortest Path: A* Search Meets Graph Theory").
 //!
-//! It may carry each node's height over the ground too, four bytes a node, so that a board without a map knows where something
-//! that falls comes to rest ([`RoadmapView::ground_range_near`]).
+//! It may carry each node's height over the ground too, four bytes a node, so that a board without
+//! a map knows where something that falls comes to rest ([`RoadmapView::ground_range_near`]).
 //!
-//! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards no accessor can meet
-//! an offset or a target out of range, and A* finds shortest ways, whatever the bytes were. Whether an edge is as clear as
-//! it says only the map can tell.
+//! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards
+//! no accessor can meet an offset or a target out of range, and A* finds shortest ways, whatever
+//! the bytes were. Whether an edge is as clear as it says only the map can tell.
 
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -40,7 +43,8 @@ pub const HEADER_LEN: usize = 72;
 pub const MAX_NODES: usize = u16::MAX as usize;
 /// Largest coordinate magnitude, metres: up to there f32 distinguishes places a millimetre apart.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
-/// Longest edge a roadmap may have, metres. The schedule checks each metre of an edge, so this bounds its work.
+/// Longest edge a roadmap may have, metres. The schedule checks each metre of an edge, so this
+/// bounds its work.
 pub const MAX_EDGE_M: f32 = 100.0;
 /// Longest path from a node to a landmark, metres: up to this length a sum of edges is right to 4
 /// mm an edge.
@@ -65,7 +69,8 @@ pub enum RoadmapError {
     Node(u16),
     /// The row of this node is out of order or beyond the half-edges.
     Offset(u16),
-    /// A half-edge of this node leads to itself or to no node, or its row is not in ascending order.
+    /// A half-edge of this node leads to itself or to no node, or its row is not in ascending
+    /// order.
     Target(u16),
     /// A half-edge of this node has no opposite with the same clearance.
     OneWay(u16),
@@ -73,11 +78,14 @@ pub enum RoadmapError {
     ZeroLength(u16),
     /// An edge of this node is shorter or longer than the header says.
     EdgeLength(u16),
-    /// An edge of this node has less clearance than the header says that it was tested at, or more than can be stored.
+    /// An edge of this node has less clearance than the header says that it was tested at, or more
+    /// than can be stored.
     EdgeClearance(u16),
-    /// A way from this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the one that a search over all edges finds.
+    /// A way from this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the one
+    /// that a search over all edges finds.
     Landmark(u16),
-    /// The height of this node over the ground is NaN, negative or beyond [`MAX_LANDMARK_DISTANCE_M`], or this node has none and others do.
+    /// The height of this node over the ground is NaN, negative or beyond
+    /// [`MAX_LANDMARK_DISTANCE_M`], or this node has none and others do.
     Height(u16),
     /// The roadmap has more nodes than the workspace the landmarks are searched in.
     WorkspaceTooSmall,
@@ -113,8 +121,8 @@ pub struct RoadmapHeader {
     pub edge_min_m: f32,
     /// Longest edge the builder allowed (P3D `Dmax`), metres.
     pub edge_max_m: f32,
-    /// Clearance every edge was tested to exceed, metres: no vehicle that needs more than this may skip
-    /// [`HalfEdge::clearance_m`].
+    /// Clearance every edge was tested to exceed, metres: no vehicle that needs more than this may
+    /// skip [`HalfEdge::clearance_m`].
     pub tested_clearance_m: f32,
     /// Value at which stored clearances saturate, metres: an edge with this value has at least that
     /// much.
@@ -155,12 +163,15 @@ impl RoadmapHeader {
         square >= self.edge_min_m * self.edge_min_m && square <= self.edge_max_m * self.edge_max_m
     }
 
-    /// Least and greatest clearance of an edge, metres, as a half-edge carries it. A millimetre less than tested is
-    /// rounding: the test is exact, the distance is not.
+    /// Least and greatest clearance of an edge, metres, as a half-edge carries it. A millimetre
+    /// less than tested is rounding: the test is exact, the distance is not.
     fn clearances(&self) -> (f32, f32) {
         let metres = |millimetres: u16| f32::from(millimetres) / 1000.0;
         let most = millimetres_down(self.max_clearance_m);
-        (metres(millimetres_down(self.tested_clearance_m).min(most).saturating_sub(1)), metres(most))
+        (
+            metres(millimetres_down(self.tested_clearance_m).min(most).saturating_sub(1)),
+            metres(most),
+        )
     }
 }
 
@@ -175,8 +186,8 @@ fn millimetres_down(metres: f32) -> u16 {
 pub struct HalfEdge {
     /// The node it leads to.
     pub target: u16,
-    /// Distance from the segment to the nearest obstacle, metres, rounded down to a millimetre; at least this much if it
-    /// equals [`RoadmapHeader::max_clearance_m`].
+    /// Distance from the segment to the nearest obstacle, metres, rounded down to a millimetre; at
+    /// least this much if it equals [`RoadmapHeader::max_clearance_m`].
     pub clearance_m: f32,
 }
 
@@ -220,7 +231,8 @@ pub struct RoadmapView<'a> {
 }
 
 impl<'a> RoadmapView<'a> {
-    /// Checks a roadmap at the start of `bytes`; what follows its length is ignored, so a whole flash slot can be given.
+    /// Checks a roadmap at the start of `bytes`; what follows its length is ignored, so a whole
+    /// flash slot can be given.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RoadmapError> {
         let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(FileError::Truncated)?;
         let total = declared_len(head)?;
@@ -252,8 +264,8 @@ impl<'a> RoadmapView<'a> {
         Ok(view)
     }
 
-    /// The parts of a body that is as long as its counts say, of nodes, half-edges and landmarks; what is left is heights.
-    /// Nothing is checked.
+    /// The parts of a body that is as long as its counts say, of nodes, half-edges and landmarks;
+    /// what is left is heights. Nothing is checked.
     fn from_body(header: RoadmapHeader, crc: u32, body: &'a [u8], counts: [usize; 3]) -> Self {
         let [node_count, half_edge_count, landmarks] = counts;
         let (nodes, rest) = body.split_at(node_count * NODE_LEN);
@@ -284,7 +296,10 @@ impl<'a> RoadmapView<'a> {
     /// Bytes the roadmap takes, CRC included.
     pub fn byte_len(&self) -> usize {
         let words = self.offsets.len() + self.half_edges.len() + self.heights.len() + 1;
-        HEADER_LEN + self.nodes.len() * NODE_LEN + words * WORD_LEN + self.landmarks.len() * LANDMARKS_LEN
+        HEADER_LEN
+            + self.nodes.len() * NODE_LEN
+            + words * WORD_LEN
+            + self.landmarks.len() * LANDMARKS_LEN
     }
 
     /// Whether it carries the ways to landmarks.
@@ -292,14 +307,15 @@ impl<'a> RoadmapView<'a> {
         !self.landmarks.is_empty()
     }
 
-    /// Lengths in metres of the shortest ways from a node to the landmarks, over all edges; 0 where there is none. All 0
-    /// if the roadmap has no landmarks.
+    /// Lengths in metres of the shortest ways from a node to the landmarks, over all edges; 0 where
+    /// there is none. All 0 if the roadmap has no landmarks.
     #[inline]
     pub(crate) fn landmark_distances_m(&self, node: u16) -> [f32; LANDMARKS] {
         match self.landmarks.get(usize::from(node)) {
-            Some(b) => {
-                [f32::from_le_bytes([b[0], b[1], b[2], b[3]]), f32::from_le_bytes([b[4], b[5], b[6], b[7]])]
-            }
+            Some(b) => [
+                f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+                f32::from_le_bytes([b[4], b[5], b[6], b[7]]),
+            ],
             None => [0.0; LANDMARKS],
         }
     }
@@ -349,8 +365,9 @@ impl<'a> RoadmapView<'a> {
         fpu::sqrtf((self.node(b) - self.node(a)).norm_squared())
     }
 
-    /// Whether a vehicle that needs `required_m` (radius + margin) may fly `edge`. An edge with exactly the required
-    /// clearance is blocked, as touching is; up to the tested clearance every edge of the roadmap is clear.
+    /// Whether a vehicle that needs `required_m` (radius + margin) may fly `edge`. An edge with
+    /// exactly the required clearance is blocked, as touching is; up to the tested clearance every
+    /// edge of the roadmap is clear.
     #[inline]
     pub fn has_clearance(&self, edge: &HalfEdge, required_m: f32) -> bool {
         edge.clearance_m > required_m || required_m <= self.header.tested_clearance_m
@@ -362,7 +379,8 @@ impl<'a> RoadmapView<'a> {
         let at = usize::from(node);
         match self.offsets.get(at..at + 2) {
             Some([from, to]) => {
-                let (from, to) = (u32::from_le_bytes(*from) as usize, u32::from_le_bytes(*to) as usize);
+                let (from, to) =
+                    (u32::from_le_bytes(*from) as usize, u32::from_le_bytes(*to) as usize);
                 (from, self.half_edges.get(from..to).unwrap_or(&[]))
             }
             _ => (0, &[]),

@@ -1,16 +1,20 @@
-//! The safety filter's geometry: where can a vehicle be until it has stopped, and do two such sets meet?
+//! The safety filter's geometry: where can a vehicle be until it has stopped, and do two such sets
+//! meet?
 //!
-//! The set of this vehicle ([`ReachableSet::along`], [`ReachableSet::vertical`]) is what it can no longer take back: [`REACTION_S`] at
-//! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`NeighbourMotion::reachable_set`]) follows
-//! from what was last heard and from nothing else: no gate, no progress, no advice.
+//! The set of this vehicle ([`ReachableSet::along`], [`ReachableSet::vertical`]) is what it can no
+//! longer take back: [`REACTION_S`] at its present speed, then a stop at its limits along its
+//! reference. The set of a neighbour ([`NeighbourMotion::reachable_set`]) follows from what was
+//! last heard and from nothing else: no gate, no progress, no advice.
 //!
-//! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A motion that does not reduce a
-//! distance that is already too small never does. A vehicle that stops as soon as its set conflicts stays inside the
-//! set of the step before, which did not: that is the safety argument (`docs/safety.md`).
+//! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A
+//! motion that does not reduce a distance that is already too small never does. A vehicle that
+//! stops as soon as its set conflicts stays inside the set of the step before, which did not: that
+//! is the safety argument (`docs/safety.md`).
 //!
-//! ENU metres. Sets are not compared by time, so an order in which two vehicles pass is no reason to come near. Cost:
-//! the segments of one set times those of the other; [`NeighbourMotion::reach_m`] is a cheap bound for the many that are far. The
-//! own set is prepared once ([`OwnSet`]), so that most segments of the others are seen to be apart without a distance.
+//! ENU metres. Sets are not compared by time, so an order in which two vehicles pass is no reason
+//! to come near. Cost: the segments of one set times those of the other;
+//! [`NeighbourMotion::reach_m`] is a cheap bound for the many that are far. The own set is prepared
+//! once ([`OwnSet`]), so that most segments of the others are seen to be apart without a distance.
 
 mod own;
 
@@ -99,7 +103,8 @@ impl ReachableSet {
             let leg_m = sqrtf(leg.norm_squared());
             let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
             if !self.push(end) {
-                // The set has no memory for more corners: assume any place within the remaining length.
+                // The set has no memory for more corners: assume any place within the remaining
+                // length.
                 self.widened_by_m = left_m.max(0.0);
                 return;
             }
@@ -170,8 +175,8 @@ pub enum PlaceOnPoints {
     On {
         /// Number of the point at which the leg ends on which it is at first.
         leg: u8,
-        /// Points that turn back lead past it again: as far along them it may be already, decimetres, rounded up. Two bytes,
-        /// since there is one for each contact.
+        /// Points that turn back lead past it again: as far along them it may be already,
+        /// decimetres, rounded up. Two bytes, since there is one for each contact.
         more_dm: u16,
     },
 }
@@ -180,7 +185,8 @@ pub enum PlaceOnPoints {
 const RETURN_TOLERANCE_M: f32 = 0.05;
 
 impl PlaceOnPoints {
-    /// Looks for the places on the points at which it may be: the first one, and how far from there the last one is.
+    /// Looks for the places on the points at which it may be: the first one, and how far from there
+    /// the last one is.
     #[inline(never)]
     pub fn find(position: &Point, points: &[Point]) -> Self {
         let (mut found, mut more_m): (Option<u8>, f32) = (None, 0.0);
@@ -195,7 +201,10 @@ impl PlaceOnPoints {
             let (apart_m, upto_m) = (away_m(&place), sqrtf((place - from).norm_squared()));
             if !left && apart_m < least_m {
                 (found, least_m, along_m) = (Some(i as u8), apart_m, -upto_m);
-            } else if left && apart_m < OFF_REPORTED_PATH_M && apart_m + RETURN_TOLERANCE_M < start_m {
+            } else if left
+                && apart_m < OFF_REPORTED_PATH_M
+                && apart_m + RETURN_TOLERANCE_M < start_m
+            {
                 more_m = along_m + upto_m;
             }
             along_m += sqrtf((to - from).norm_squared());
@@ -204,7 +213,10 @@ impl PlaceOnPoints {
             from = to;
         }
         // The cast saturates.
-        found.map_or(Self::Beside, |leg| Self::On { leg, more_dm: libm::ceilf(10.0 * more_m) as u16 })
+        found.map_or(Self::Beside, |leg| Self::On {
+            leg,
+            more_dm: libm::ceilf(10.0 * more_m) as u16,
+        })
     }
 
     /// The place on the points, and the points after it; none where the vehicle is beside them.
@@ -212,7 +224,8 @@ impl PlaceOnPoints {
         let Self::On { leg, .. } = *self else { return None };
         let leg = usize::from(leg);
         let to = points.get(leg)?;
-        // No leg ends at the first point: it is the place itself, and would take the room of another one.
+        // No leg ends at the first point: it is the place itself, and would take the room of
+        // another one.
         let ahead = &points[leg.max(1).min(points.len())..];
         Some((nearest(position, &points[leg.saturating_sub(1)], to), ahead))
     }
@@ -268,7 +281,9 @@ impl NeighbourMotion<'_> {
             return self.reach_any_direction_m(bounds);
         }
         let along_m = self.distance_until_stop_m(bounds, ahead_s);
-        let Some(first) = self.points.first() else { return along_m + self.lateral_reach_m(bounds) };
+        let Some(first) = self.points.first() else {
+            return along_m + self.lateral_reach_m(bounds);
+        };
         let away = (first - self.position).abs();
         // No less than the distance, and no square root.
         let first_m = away.x + away.y + away.z;
@@ -308,7 +323,9 @@ impl NeighbourMotion<'_> {
         let most_mps = self.speed_mps.max(bounds.speed_max_mps);
         let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
-        speed_mps * (self.data_age_s() + REACTION_S + MAX_LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
+        speed_mps * (self.data_age_s() + REACTION_S + MAX_LAG_S)
+            + stop_m
+            + ahead_s * bounds.speed_max_mps
     }
 
     #[inline]
@@ -338,7 +355,10 @@ impl NeighbourMotion<'_> {
         let joint = self.place_on_points();
         if let Some((nearest, ahead)) = joint.ahead(&self.position, self.points) {
             let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
-            set.extend_along(ahead, joint.flown_beyond_m() + self.distance_until_stop_m(bounds, ahead_s));
+            set.extend_along(
+                ahead,
+                joint.flown_beyond_m() + self.distance_until_stop_m(bounds, ahead_s),
+            );
         } else {
             let share = if self.speed_mps > 0.0 {
                 self.distance_until_stop_m(bounds, 0.0) / self.speed_mps

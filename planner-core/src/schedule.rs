@@ -1,18 +1,22 @@
 //! Conflict-free schedules: which vehicle passes first where two paths come close.
 //!
-//! A flight is cut into timed segments of at most [`MAX_TIMED_SEGMENT_M`] metres, from the pad over the path to the ground below the goal.
-//! Vehicles are scheduled one after the other (prioritised planning, Erdmann and Lozano-Pérez 1987); each waits on its pad
-//! for the smallest delay that keeps its segments out of reach of those already scheduled at that time. Waiting on
-//! the pad always suffices when each path avoids the pads and landing places of the others (a "well-formed" problem,
-//! Čáp et al. 2015).
+//! A flight is cut into timed segments of at most [`MAX_TIMED_SEGMENT_M`] metres, from the pad over
+//! the path to the ground below the goal. Vehicles are scheduled one after the other (prioritised
+//! planning, Erdmann and Lozano-Pérez 1987); each waits on its pad for the smallest delay that
+//! keeps its segments out of reach of those already scheduled at that time. Waiting on the pad
+//! always suffices when each path avoids the pads and landing places of the others (a "well-formed"
+//! problem, Čáp et al. 2015).
 //!
-//! In flight only the *order* of the schedule counts. For each pair of conflicting segments the later vehicle gets a
+//! In flight only the *order* of the schedule counts. For each pair of conflicting segments the
+//! later vehicle gets a
 //! [`Gate`]: it enters its segment once the earlier one has left its own. Why this keeps vehicles apart and lets all of them
 //! arrive is in `docs/schedule.md`, claim by claim.
 //!
-//! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or step aside on its way.
+//! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or
+//! step aside on its way.
 //!
-//! Cost: segments of one path × segments of all others, each a distance between two lines behind a cheap bound.
+//! Cost: segments of one path × segments of all others, each a distance between two lines behind a
+//! cheap bound.
 
 mod blocks;
 mod config;
@@ -25,7 +29,9 @@ pub(crate) mod tests;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
-use self::blocks::{Bits, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices};
+use self::blocks::{
+    Bits, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
+};
 pub use self::config::{ScheduleConfig, ScheduleError};
 pub use self::pieces::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
 use self::pieces::{TimedSegment, cut_into_segments, is_conflict};
@@ -66,7 +72,8 @@ fn add_forbidden_interval(forbidden: &mut Forbidden, mut low: f32, mut high: f32
     }
     if forbidden.push((low, high)).is_err() {
         let gap = |&(l, h): &(f32, f32)| fmaxf(l - high, low - h);
-        let nearest = (0..forbidden.len()).min_by(|&a, &b| gap(&forbidden[a]).total_cmp(&gap(&forbidden[b])));
+        let nearest =
+            (0..forbidden.len()).min_by(|&a, &b| gap(&forbidden[a]).total_cmp(&gap(&forbidden[b])));
         if let Some(i) = nearest {
             let (l, h) = forbidden.swap_remove(i);
             add_forbidden_interval(forbidden, fminf(low, l), fmaxf(high, h));
@@ -74,8 +81,8 @@ fn add_forbidden_interval(forbidden: &mut Forbidden, mut low: f32, mut high: f32
     }
 }
 
-/// The smallest take-off time ≥ `not_before_s` at which `flight`, labelled, keeps clear of every flight in `scheduled`,
-/// seconds. A place is free as soon as its vehicle has left it.
+/// The smallest take-off time ≥ `not_before_s` at which `flight`, labelled, keeps clear of every
+/// flight in `scheduled`, seconds. A place is free as soon as its vehicle has left it.
 pub fn earliest_departure<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -97,8 +104,9 @@ pub(crate) fn departure_with_handover<'a, const W: usize>(
     departure_and_conflicts(cfg, flight, times, &mut scheduled, ws, &mut |_, _| {})
 }
 
-/// As [`departure_with_handover`]. `met` is called for each of `scheduled`, by its place among them, with the numbers of timed segments
-/// of `flight` and of that one that are in conflict with the other's: neither has more gates for the other.
+/// As [`departure_with_handover`]. `met` is called for each of `scheduled`, by its place among
+/// them, with the numbers of timed segments of `flight` and of that one that are in conflict with
+/// the other's: neither has more gates for the other.
 #[inline(never)]
 pub(crate) fn departure_and_conflicts<const W: usize>(
     cfg: &ScheduleConfig,
@@ -114,7 +122,8 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
     forbidden.clear();
     let mut near_own = Vec::<u16, MAX_TIMED_SEGMENTS>::new();
     for (nth, other) in scheduled.enumerate() {
-        let (mut own_in_conflict, mut others_in_conflict) = ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
+        let (mut own_in_conflict, mut others_in_conflict) =
+            ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
         for (part, near) in blocks.parts_near(cfg, other) {
             part.check_count(other.segment_m, MAX_TIMED_SEGMENTS)?;
             let mut compare = |some: &[TimedSegment]| {
@@ -150,8 +159,9 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
     first_allowed(forbidden, not_before_s).ok_or(ScheduleError::Blocked)
 }
 
-/// The differences of take-off times, of `a` after `b`, between which the two flights may meet: one interval, seconds; the
-/// first end is the greater one where they never meet. A place is free `handover_s` after its vehicle has left it.
+/// The differences of take-off times, of `a` after `b`, between which the two flights may meet: one
+/// interval, seconds; the first end is the greater one where they never meet. A place is free
+/// `handover_s` after its vehicle has left it.
 pub(crate) fn forbidden_differences<const W: usize>(
     cfg: &ScheduleConfig,
     a: &Flight<W>,
@@ -202,9 +212,10 @@ fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
 
 /// The progress at which a vehicle counts as out of a timed segment, metres.
 ///
-/// It may have to wait where the segment ends, for a vehicle that it would block if that still counted as inside. The next
-/// segment begins there and is either in conflict too, and then counts by itself, or clear, and then so is the place between
-/// them. A vehicle has left its pad when it is off it, however low its climb ends, and its descent when it stands on the ground.
+/// It may have to wait where the segment ends, for a vehicle that it would block if that still
+/// counted as inside. The next segment begins there and is either in conflict too, and then counts
+/// by itself, or clear, and then so is the place between them. A vehicle has left its pad when it
+/// is off it, however low its climb ends, and its descent when it stands on the ground.
 fn cleared_at_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     if q.to_m < flight.path.length_m() + flight.descent_m {
         fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_M - flight.climb_m)
@@ -213,11 +224,12 @@ fn cleared_at_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     }
 }
 
-/// Where flight `index` waits for the others, in the order along its path. A gate that an earlier one for the same vehicle
-/// implies is left out.
+/// Where flight `index` waits for the others, in the order along its path. A gate that an earlier
+/// one for the same vehicle implies is left out.
 ///
-/// More than `G` are made fewer: a gate then stands for those that follow within 4, 8 or 16 m of it (`GATE_MERGE_M`), or for
-/// all behind it. Only gates are merged that the schedule has open by the time of the first, so the order of labels stays as it is.
+/// More than `G` are made fewer: a gate then stands for those that follow within 4, 8 or 16 m of it
+/// (`GATE_MERGE_M`), or for all behind it. Only gates are merged that the schedule has open by the
+/// time of the first, so the order of labels stays as it is.
 pub fn gates<const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -233,7 +245,8 @@ pub fn gates<const W: usize, const G: usize>(
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
-/// Distance within which gates of flight `index` have to be merged so that at most `most` remain, metres.
+/// Distance within which gates of flight `index` have to be merged so that at most `most` remain,
+/// metres.
 pub(crate) fn gate_merge_distance_m<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -281,7 +294,8 @@ fn for_each_gate<const W: usize>(
     ws: &mut ScheduleWorkspace,
     mut found: impl FnMut(Gate),
 ) -> Result<(), ScheduleError> {
-    // The vehicle hovers where the segment before ends and the one after begins, so those conflict wherever a hover does.
+    // The vehicle hovers where the segment before ends and the one after begins, so those conflict
+    // wherever a hover does.
     let moves = |piece: &&TimedSegment| piece.parked || piece.to_m > piece.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
@@ -300,7 +314,9 @@ fn for_each_gate<const W: usize>(
                 other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && is_conflict(cfg, p, q)
             };
             let (mut until_m, mut open_s) = (highest, f32::NEG_INFINITY);
-            for q in segments_in_blocks(near, &ws.other).map(|(_, q)| q).filter(moves).filter(earlier) {
+            for q in
+                segments_in_blocks(near, &ws.other).map(|(_, q)| q).filter(moves).filter(earlier)
+            {
                 let left_m = cleared_at_m(q, other);
                 if left_m > until_m {
                     (until_m, open_s) = (left_m, other.depart_s + q.to_s);
@@ -312,7 +328,8 @@ fn for_each_gate<const W: usize>(
             highest = until_m;
             match &mut last {
                 Some((gate, passed_s))
-                    if p.from_m <= gate.at_m || (p.from_m <= gate.at_m + merged_m && open_s <= *passed_s) =>
+                    if p.from_m <= gate.at_m
+                        || (p.from_m <= gate.at_m + merged_m && open_s <= *passed_s) =>
                 {
                     gate.until_m = until_m;
                 }

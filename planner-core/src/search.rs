@@ -1,13 +1,17 @@
-//! Shortest paths on a roadmap: A* for one pair, one Dijkstra row for a vehicle's costs to many goals.
+//! Shortest paths on a roadmap: A* for one pair, one Dijkstra row for a vehicle's costs to many
+//! goals.
 //!
-//! Source: P3D §3.3 (A* per pair, cost matrix for the allocation); the heuristic is the greater of the straight distance and
-//! what the roadmap's landmarks tell, both admissible and consistent: an edge is as long as the straight line between its
-//! nodes, and no way to a landmark differs between its ends by more. Blocked edges only lengthen ways. Metres, f32. Cost O(half-edges +
-//! nodes · log nodes), each node settled once; memory is the caller's [`SearchWorkspace`].
+//! Source: P3D §3.3 (A* per pair, cost matrix for the allocation); the heuristic is the greater of
+//! the straight distance and what the roadmap's landmarks tell, both admissible and consistent: an
+//! edge is as long as the straight line between its nodes, and no way to a landmark differs between
+//! its ends by more. Blocked edges only lengthen ways. Metres, f32. Cost O(half-edges + nodes · log
+//! nodes), each node settled once; memory is the caller's [`SearchWorkspace`].
 //!
-//! Edge lengths are not stored but follow from the nodes. Most half-edges never need theirs: the target is settled or
-//! already reached too cheaply for any edge of that squared length, so a square root is taken only when it may change a
-//! distance. A host that searches often keeps the lengths at hand ([`RoadmapWithLengths`]). Ties go to the lower node index, so the same roadmap gives the same path everywhere.
+//! Edge lengths are not stored but follow from the nodes. Most half-edges never need theirs: the
+//! target is settled or already reached too cheaply for any edge of that squared length, so a
+//! square root is taken only when it may change a distance. A host that searches often keeps the
+//! lengths at hand ([`RoadmapWithLengths`]). Ties go to the lower node index, so the same roadmap
+//! gives the same path everywhere.
 
 use heapless::Vec;
 
@@ -40,7 +44,8 @@ pub enum SearchError {
     OutputLength,
 }
 
-/// Scratch memory for roadmaps of up to `N` nodes: 16 bytes a node. All-zero when new, so a static costs .bss only.
+/// Scratch memory for roadmaps of up to `N` nodes: 16 bytes a node. All-zero when new, so a static
+/// costs .bss only.
 pub struct SearchWorkspace<const N: usize> {
     distance: [f32; N],
     parent: [u16; N],
@@ -54,7 +59,8 @@ impl<const N: usize> SearchWorkspace<N> {
         Self { distance: [0.0; N], parent: [0; N], heap: Heap::new() }
     }
 
-    /// Length in metres of the shortest way from the last search's source to `node`; infinite if it was not settled.
+    /// Length in metres of the shortest way from the last search's source to `node`; infinite if it
+    /// was not settled.
     pub fn distance_m(&self, node: u16) -> f32 {
         match self.distance.get(usize::from(node)) {
             Some(&distance) if self.heap.entry_index(node) == SETTLED => distance,
@@ -62,9 +68,13 @@ impl<const N: usize> SearchWorkspace<N> {
         }
     }
 
-    /// Writes the nodes from the last search's source to `node`, both included. Only the parents are read, so a path
-    /// may be taken out for every target of a [`dijkstra_row`].
-    pub fn path_to<const P: usize>(&self, node: u16, out: &mut Vec<u16, P>) -> Result<(), SearchError> {
+    /// Writes the nodes from the last search's source to `node`, both included. Only the parents
+    /// are read, so a path may be taken out for every target of a [`dijkstra_row`].
+    pub fn path_to<const P: usize>(
+        &self,
+        node: u16,
+        out: &mut Vec<u16, P>,
+    ) -> Result<(), SearchError> {
         out.clear();
         if usize::from(node) >= N || self.heap.entry_index(node) != SETTLED {
             return Err(SearchError::NoPath);
@@ -89,8 +99,8 @@ impl<const N: usize> Default for SearchWorkspace<N> {
     }
 }
 
-/// A roadmap to search: as it lies in flash ([`RoadmapView`]), or with its edge lengths at hand ([`RoadmapWithLengths`]). Both
-/// give the same paths and lengths, bit for bit.
+/// A roadmap to search: as it lies in flash ([`RoadmapView`]), or with its edge lengths at hand
+/// ([`RoadmapWithLengths`]). Both give the same paths and lengths, bit for bit.
 pub trait Graph {
     /// The roadmap.
     fn view(&self) -> &RoadmapView<'_>;
@@ -98,11 +108,12 @@ pub trait Graph {
     /// Length in metres of half-edge `k`, which leads from `here` to `target`.
     fn length(&self, k: usize, here: &Point, target: u16) -> f32;
 
-    /// Which of these half-edges may shorten the way to their targets, `reached` being the way to `here`: their places in
-    /// `half_edges` go to `out`, their number is returned. `first` is the index of the first. None that does is left out.
+    /// Which of these half-edges may shorten the way to their targets, `reached` being the way to
+    /// `here`: their places in `half_edges` go to `out`, their number is returned. `first` is the
+    /// index of the first. None that does is left out.
     ///
-    /// Most do not: the target is settled, or reached more cheaply. They are distinguished by selects, since which they are
-    /// cannot be predicted.
+    /// Most do not: the target is settled, or reached more cheaply. They are distinguished by
+    /// selects, since which they are cannot be predicted.
     fn find_improvements<const N: usize>(
         &self,
         first: usize,
@@ -134,8 +145,8 @@ impl Graph for RoadmapView<'_> {
         distance: &[f32; N],
         out: &mut Improvements,
     ) -> usize {
-        // A little more room than there is, so that rounding never hides a gain: the exact comparison comes later. 1e-6
-        // is eight times the rounding of the three products.
+        // A little more room than there is, so that rounding never hides a gain: the exact
+        // comparison comes later. 1e-6 is eight times the rounding of the three products.
         /// Factor by which rounding may raise a lower bound of the distance to the target.
         const BOUND_ROUNDING: f32 = 1.0 + 1e-6;
         let mut count = 0_u8;
@@ -143,13 +154,15 @@ impl Graph for RoadmapView<'_> {
             let room = distance[target_index::<N>(half_edge)] - reached;
             let squared = (self.node(target_of(half_edge)) - here).norm_squared();
             out[usize::from(count)] = place as u8;
-            count = count.wrapping_add(u8::from(squared <= room * libm::fabsf(room) * BOUND_ROUNDING));
+            count =
+                count.wrapping_add(u8::from(squared <= room * libm::fabsf(room) * BOUND_ROUNDING));
         }
         usize::from(count)
     }
 }
 
-/// A roadmap with the lengths of its half-edges in memory, 4 bytes each: for hosts, where many searches follow.
+/// A roadmap with the lengths of its half-edges in memory, 4 bytes each: for hosts, where many
+/// searches follow.
 #[derive(Clone, Copy, Debug)]
 pub struct RoadmapWithLengths<'a> {
     view: RoadmapView<'a>,
@@ -159,7 +172,8 @@ pub struct RoadmapWithLengths<'a> {
 impl<'a> RoadmapWithLengths<'a> {
     /// Fills `lengths`, which holds one number for each half-edge or more.
     pub fn new(view: RoadmapView<'a>, lengths: &'a mut [f32]) -> Result<Self, SearchError> {
-        let lengths = lengths.get_mut(..view.half_edge_count()).ok_or(SearchError::WorkspaceTooSmall)?;
+        let lengths =
+            lengths.get_mut(..view.half_edge_count()).ok_or(SearchError::WorkspaceTooSmall)?;
         for node in 0..view.node_count() as u16 {
             let (first, row) = view.half_edges_of(node);
             for (length, half_edge) in lengths[first..].iter_mut().zip(row) {
@@ -201,10 +215,11 @@ impl Graph for RoadmapWithLengths<'_> {
     }
 }
 
-/// The shortest passable path from `from` to `to`. Returns its length in metres and leaves its nodes, ends included, in
-/// `out_nodes`.
+/// The shortest passable path from `from` to `to`. Returns its length in metres and leaves its
+/// nodes, ends included, in `out_nodes`.
 ///
-/// `passable(node, edge)` says whether `edge` may be flown out of `node`: size by clearance, blocked nodes and edges.
+/// `passable(node, edge)` says whether `edge` may be flown out of `node`: size by clearance,
+/// blocked nodes and edges.
 pub fn astar<const N: usize, const P: usize>(
     graph: &impl Graph,
     from: u16,
@@ -219,8 +234,8 @@ pub fn astar<const N: usize, const P: usize>(
     Ok(ws.distance_m(to))
 }
 
-/// The shortest passable paths from `from` to every node that can be reached: [`SearchWorkspace::distance_m`] and
-/// [`SearchWorkspace::path_to`] tell them.
+/// The shortest passable paths from `from` to every node that can be reached:
+/// [`SearchWorkspace::distance_m`] and [`SearchWorkspace::path_to`] tell them.
 pub fn dijkstra_all<const N: usize>(
     graph: &impl Graph,
     from: u16,
@@ -235,11 +250,12 @@ pub fn dijkstra_all<const N: usize>(
     Ok(())
 }
 
-/// Lengths in metres of the shortest passable paths from `from` to each of `targets`, into `out`; infinite where there is
-/// none. One row of the cost matrix; stops when all targets are settled.
+/// Lengths in metres of the shortest passable paths from `from` to each of `targets`, into `out`;
+/// infinite where there is none. One row of the cost matrix; stops when all targets are settled.
 ///
-/// For few targets the search is drawn to them one after another: what A* settled for one target stays settled, its
-/// distance is final, and only the waiting nodes are ordered again for the next. For many it is Dijkstra's.
+/// For few targets the search is drawn to them one after another: what A* settled for one target
+/// stays settled, its distance is final, and only the waiting nodes are ordered again for the next.
+/// For many it is Dijkstra's.
 pub fn dijkstra_row<const N: usize>(
     graph: &impl Graph,
     from: u16,
@@ -272,12 +288,12 @@ pub(crate) fn shortest_path_tree<const N: usize>(
     Ok(())
 }
 
-/// The cost matrix of an allocation: lengths in metres of the shortest passable paths from each of `starts` to each of
-/// `goals`, row-major into `out`; infinite where there is none.
+/// The cost matrix of an allocation: lengths in metres of the shortest passable paths from each of
+/// `starts` to each of `goals`, row-major into `out`; infinite where there is none.
 ///
-/// Searched from the starts or, against the direction of flight, from the goals, whichever is likely less work: a search
-/// drawn to targets that lie close together settles few nodes beside those on the way. `passable` is always asked about
-/// the direction of flight.
+/// Searched from the starts or, against the direction of flight, from the goals, whichever is
+/// likely less work: a search drawn to targets that lie close together settles few nodes beside
+/// those on the way. `passable` is always asked about the direction of flight.
 pub fn cost_matrix<const N: usize>(
     graph: &impl Graph,
     starts: &[u16],
@@ -307,7 +323,8 @@ pub fn cost_matrix<const N: usize>(
         }
         return Ok(());
     }
-    let in_flight = |node: u16, edge: &HalfEdge| passable(edge.target, &HalfEdge { target: node, ..*edge });
+    let in_flight =
+        |node: u16, edge: &HalfEdge| passable(edge.target, &HalfEdge { target: node, ..*edge });
     for (column, &goal) in goals.iter().enumerate() {
         search(graph, goal, starts, in_flight, ws)?;
         for (row, &start) in starts.iter().enumerate() {
@@ -412,9 +429,11 @@ fn relax_edges<const N: usize>(
         let first = first + chunk * HALF_EDGE_CHUNK;
         let count = graph.find_improvements(first, half_edges, &here, reached, distance, gains);
         for &place in gains.iter().take(count) {
-            let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
+            let (k, target) =
+                (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
             let length = reached + graph.length(k, &here, target);
-            let gain = length < distance[usize::from(target)] && ws.heap.entry_index(target) != SETTLED;
+            let gain =
+                length < distance[usize::from(target)] && ws.heap.entry_index(target) != SETTLED;
             if gain && passable(node, &view.half_edge(k)) {
                 distance[usize::from(target)] = length;
                 ws.parent[usize::from(target)] = node;

@@ -1,7 +1,9 @@
-//! Sorting in place, in little code: the standard library's sort takes some 9 kB of a board's flash for each type and order.
+//! Sorting in place, in little code: the standard library's sort takes some 9 kB of a board's flash
+//! for each type and order.
 //!
-//! Heapsort (Williams 1964). Not stable: where two elements may compare equal and still differ, the order says which is
-//! first, or it does not matter. n log n comparisons, and as many again to build the heap.
+//! Heapsort (Williams 1964). Not stable: where two elements may compare equal and still differ, the
+//! order says which is first, or it does not matter. n log n comparisons, and as many again to
+//! build the heap.
 
 use core::cmp::Ordering;
 

@@ -1,11 +1,13 @@
 //! The reference point that moves along a path.
 //!
-//! The reference is what the autopilot is sent: it runs along the path no faster than corners, walls and other vehicles
-//! allow, and waits for a vehicle that lags. A corner of angle θ taken at speed v asks the vehicle for a sudden change of
-//! velocity Δv = 2·v·sin(θ/2). A velocity loop that answers within the time τ sweeps Δv·τ beside the path until it has
-//! made up for it, so v = e / (τ·2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs
-//! leaves. Between corners the acceleration goes along as feed-forward, so that braking is followed without a lag.
-//! (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre away.)
+//! The reference is what the autopilot is sent: it runs along the path no faster than corners,
+//! walls and other vehicles allow, and waits for a vehicle that lags. A corner of angle θ taken at
+//! speed v asks the vehicle for a sudden change of velocity Δv = 2·v·sin(θ/2). A velocity loop that
+//! answers within the time τ sweeps Δv·τ beside the path until it has made up for it, so v = e /
+//! (τ·2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs
+//! leaves. Between corners the acceleration goes along as feed-forward, so that braking is followed
+//! without a lag. (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre
+//! away.)
 
 use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
@@ -27,24 +29,26 @@ pub struct TrackConfig {
     pub accel_mps2: f32,
     /// Acceleration upwards and downwards, m/s².
     pub accel_z_mps2: f32,
-    /// Time in which the autopilot answers to a change of velocity in a corner, seconds. PX4's velocity loop takes 0.55 s
-    /// (`MPC_XY_VEL_P_ACC` = 1.8 1/s) for a sudden one; sent smoothly, with its acceleration, it leaves less to make up for.
+    /// Time in which the autopilot answers to a change of velocity in a corner, seconds. PX4's
+    /// velocity loop takes 0.55 s (`MPC_XY_VEL_P_ACC` = 1.8 1/s) for a sudden one; sent smoothly,
+    /// with its acceleration, it leaves less to make up for.
     pub response_s: f32,
     /// Body radius, metres: what of an edge's clearance is already taken.
     pub radius_m: f32,
-    /// Smallest deviation to allow for where the clearance leaves less, metres: what the autopilot achieves at a crawl.
+    /// Smallest deviation to allow for where the clearance leaves less, metres: what the autopilot
+    /// achieves at a crawl.
     pub deviation_min_m: f32,
     /// Largest deviation to allow for in the open, metres.
     pub deviation_max_m: f32,
-    /// The reference is to slow from half this distance ahead of the vehicle and stop at it, metres; between walls it is
-    /// four times the deviation allowed there, so that a vehicle that lags does not cut the corner. In the open it grows with
-    /// the speed.
+    /// The reference is to slow from half this distance ahead of the vehicle and stop at it,
+    /// metres; between walls it is four times the deviation allowed there, so that a vehicle that
+    /// lags does not cut the corner. In the open it grows with the speed.
     pub lead_max_m: f32,
 }
 
 impl TrackConfig {
-    /// Whether all are positive and finite, and the bounds of the deviation in their order; the error names the first
-    /// that is not.
+    /// Whether all are positive and finite, and the bounds of the deviation in their order; the
+    /// error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         all_positive(&[
             ("cruise_mps", self.cruise_mps),
@@ -108,8 +112,8 @@ pub struct Reference {
 /// Least lead of the reference ahead of the vehicle, metres: the distance by which an autopilot
 /// lags at walking speed.
 const MIN_LEAD_M: f32 = 0.4;
-/// Further lead in the open for speed above [`WALKING_SPEED_MPS`], as seconds of flight: the time by which
-/// setpoint, response and report are late, and twice that before the reference slows.
+/// Further lead in the open for speed above [`WALKING_SPEED_MPS`], as seconds of flight: the time
+/// by which setpoint, response and report are late, and twice that before the reference slows.
 const LEAD_S: f32 = 0.8;
 /// Walking speed, m/s: at this speed [`MIN_LEAD_M`] covers an autopilot's lag.
 const WALKING_SPEED_MPS: f32 = 2.0;
@@ -139,15 +143,16 @@ fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
     (speed, fminf(accel, fmaxf(cfg.accel_mps2, cfg.accel_z_mps2)))
 }
 
-/// Square of the greatest speed through waypoint `i`, at which `before` and `after` meet. Squares: a board takes its
-/// square roots by software.
+/// Square of the greatest speed through waypoint `i`, at which `before` and `after` meet. Squares:
+/// a board takes its square roots by software.
 fn corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &Point) -> f32 {
     let change_sq = (after - before).norm_squared();
     let sweep = allowed_deviation_m(cfg, clearance_m) / cfg.response_s;
     fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
 }
 
-/// Greatest speed that can be braked to rest within `room / (2 · accel)` metres if braking begins after `later_s`.
+/// Greatest speed that can be braked to rest within `room / (2 · accel)` metres if braking begins
+/// after `later_s`.
 fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
     let lost = accel * later_s;
     sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
@@ -203,10 +208,11 @@ impl PathAhead<'_> {
     }
 }
 
-/// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an empty path.
+/// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an
+/// empty path.
 ///
-/// `advice` is what the neighbours leave. The speed changes by no more than the acceleration of the leg: a stop that is
-/// advised too late is overrun. Work: one pass over the waypoints.
+/// `advice` is what the neighbours leave. The speed changes by no more than the acceleration of the
+/// leg: a stop that is advised too late is overrun. Work: one pass over the waypoints.
 pub fn advance<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
@@ -227,9 +233,11 @@ pub fn advance<const W: usize>(
     let before = along_leg(leg);
     let (top_mps, accel) = limits_along(cfg, &before);
     // NaN stops.
-    let top_mps = if advice.speed_scale > 0.0 { top_mps * fminf(advice.speed_scale, 1.0) } else { 0.0 };
+    let top_mps =
+        if advice.speed_scale > 0.0 { top_mps * fminf(advice.speed_scale, 1.0) } else { 0.0 };
     let stop_m = if advice.stop_within_m > 0.0 { advice.stop_within_m } else { 0.0 };
-    let ahead = PathAhead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
+    let ahead =
+        PathAhead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
     let braking_sq = ahead.braking_sq(cfg);
     let speed_before = tracker.speed_mps;
     // No faster than the leg's acceleration can brake from, beginning with the next step.
@@ -308,8 +316,12 @@ mod tests {
 
     #[test]
     fn speed_changes_by_no_more_than_each_axis_allows() {
-        let cfg =
-            TrackConfig { accel_z_mps2: 1.0, climb_mps: 1.0, descend_mps: 0.7, ..TrackConfig::default() };
+        let cfg = TrackConfig {
+            accel_z_mps2: 1.0,
+            climb_mps: 1.0,
+            descend_mps: 0.7,
+            ..TrackConfig::default()
+        };
         let mut path = Path::<8>::new();
         for (x, z) in [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (6.0, 1.0), (9.0, 1.2)] {
             path.push(Point::new(x, 0.0, z), 0.8).unwrap();
@@ -320,7 +332,8 @@ mod tests {
             let before = tracker;
             let reference = advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.05).unwrap();
             let leg = path.waypoints().iter().filter(|w| w.along_m <= before.along_m).count();
-            let same = path.waypoints().iter().filter(|w| w.along_m <= tracker.along_m).count() == leg;
+            let same =
+                path.waypoints().iter().filter(|w| w.along_m <= tracker.along_m).count() == leg;
             let velocity = (reference.position - last) / 0.05;
             let change = (tracker.speed_mps - before.speed_mps).abs() / 0.05;
             let whole = path
@@ -331,7 +344,10 @@ mod tests {
                 assert!((-0.71..1.01).contains(&velocity.z), "{velocity:?}");
                 let ahead = path.point_at(tracker.along_m + 1e-2).unwrap() - reference.position;
                 let up = (ahead.z / 1e-2).abs().min(1.0);
-                assert!(change * up < 1.0 + 0.02 && change * (1.0 - up * up).sqrt() < 1.52, "{tracker:?}");
+                assert!(
+                    change * up < 1.0 + 0.02 && change * (1.0 - up * up).sqrt() < 1.52,
+                    "{tracker:?}"
+                );
             }
             (last, steps) = (reference.position, steps + 1);
             if reference.finished || steps > 1000 {

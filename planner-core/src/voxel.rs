@@ -1,8 +1,8 @@
 //! Bit-packed voxel map: one bit a cell, stored as bricks of 4 × 4 × 4 cells in one 64-bit word.
 //!
-//! A brick answers "is anything here?" with one load, so a query over empty space steps four cells at a time. The
-//! building at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell `(i, j, k)` covers the closed cube from
-//! `min + (i, j, k) · resolution` to `min + (i + 1, j + 1, k + 1) · resolution`.
+//! A brick answers "is anything here?" with one load, so a query over empty space steps four cells
+//! at a time. The building at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell `(i, j, k)` covers the
+//! closed cube from `min + (i, j, k) · resolution` to `min + (i + 1, j + 1, k + 1) · resolution`.
 
 use crate::Point;
 
@@ -12,7 +12,8 @@ pub const BRICK_CELLS: u32 = 4;
 /// Reason why a grid was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridError {
-    /// A dimension is zero or beyond [`MAX_DIM`], or all together are more words than 32 bits can index.
+    /// A dimension is zero or beyond [`MAX_DIM`], or all together are more words than 32 bits can
+    /// index.
     Dimensions,
     /// The word slice is not [`GridShape::brick_count`] long.
     WordCount,
@@ -51,7 +52,8 @@ impl GridShape {
     /// Maximum corner, metres.
     pub fn max(&self) -> Point {
         self.min
-            + Point::new(self.dims[0] as f32, self.dims[1] as f32, self.dims[2] as f32) * self.resolution_m
+            + Point::new(self.dims[0] as f32, self.dims[1] as f32, self.dims[2] as f32)
+                * self.resolution_m
     }
 
     /// The cell that holds `p` (its lower faces included), or `None` outside the grid or for NaN.
@@ -73,11 +75,13 @@ impl GridShape {
         self.min + Point::new(half(cell[0]), half(cell[1]), half(cell[2]))
     }
 
-    /// Word index and bit mask of a cell inside the grid; of one outside the word is another one's or none.
+    /// Word index and bit mask of a cell inside the grid; of one outside the word is another one's
+    /// or none.
     #[inline]
     pub fn address(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
         let [bx, by, _] = self.bricks();
-        let word = (k / 4).wrapping_mul(by).wrapping_add(j / 4).wrapping_mul(bx).wrapping_add(i / 4) as usize;
+        let word = (k / 4).wrapping_mul(by).wrapping_add(j / 4).wrapping_mul(bx).wrapping_add(i / 4)
+            as usize;
         (word, 1 << ((k % 4) * 16 + (j % 4) * 4 + i % 4))
     }
 

@@ -1,11 +1,15 @@
-//! The camera that the autopilot triggers: by distance flown (DO_SET_CAM_TRIGG_DIST, 206) or at once (DO_DIGICAM_CONTROL, 203).
+//! The camera that the autopilot triggers: by distance flown (DO_SET_CAM_TRIGG_DIST, 206) or at
+//! once (DO_DIGICAM_CONTROL, 203).
 //!
-//! Each firmware looks as it does. PX4's `camera_trigger` (TRIG_MODE 4) runs every 50 ms: then it takes up a command,
-//! photographs where it is switched on, and where it is the distance or more from there. ArduPilot's `AP_Camera` runs every
-//! 20 ms, counts from where it is switched on or from the picture before, and photographs at once what is asked for at once.
-//! Both measure across, on the estimate, from the last picture: pictures are a little more than the distance apart, by what
-//! is flown between two looks. Then CAMERA_IMAGE_CAPTURED (263, PX4, counted from 0) or CAMERA_FEEDBACK (180, ArduPilot, from
-//! 1) goes out through every port, with the estimated place. Source: `camera_trigger.cpp`, `AP_Camera_Backend.cpp`.
+//! Each firmware looks as it does. PX4's `camera_trigger` (TRIG_MODE 4) runs every 50 ms: then it
+//! takes up a command, photographs where it is switched on, and where it is the distance or more
+//! from there. ArduPilot's `AP_Camera` runs every 20 ms, counts from where it is switched on or
+//! from the picture before, and photographs at once what is asked for at once. Both measure across,
+//! on the estimate, from the last picture: pictures are a little more than the distance apart, by
+//! what is flown between two looks. Then CAMERA_IMAGE_CAPTURED (263, PX4, counted from 0) or
+//! CAMERA_FEEDBACK (180, ArduPilot, from
+//! 1) goes out through every port, with the estimated place. Source: `camera_trigger.cpp`,
+//!    `AP_Camera_Backend.cpp`.
 //!
 //! Where the vehicle truly was is kept for a referee ([`super::Autopilot::take_photos`]).
 
@@ -51,7 +55,8 @@ pub struct CameraTrigger {
 }
 
 impl CameraTrigger {
-    /// DO_SET_CAM_TRIGG_DIST: metres in parameter 1, 0 and less stop it; parameter 3 asks for one picture at once.
+    /// DO_SET_CAM_TRIGG_DIST: metres in parameter 1, 0 and less stop it; parameter 3 asks for one
+    /// picture at once.
     pub(super) fn handle_trigger_distance(&mut self, command: &Command) {
         let distance_m = command.param[0];
         self.distance_m = (distance_m > 0.0).then_some(distance_m);
@@ -84,7 +89,8 @@ impl CameraTrigger {
         self.next_poll_us
     }
 
-    /// One step: the message to announce, if a picture was taken. `estimate` is none without a position.
+    /// One step: the message to announce, if a picture was taken. `estimate` is none without a
+    /// position.
     pub(super) fn update(
         &mut self,
         personality: AutopilotKind,
@@ -103,7 +109,8 @@ impl CameraTrigger {
         if let (Some(distance_m), Some(at)) = (self.distance_m, estimate)
             && looks
         {
-            let far = self.last.map(|last| libm::hypotf(at.x - last[0], at.y - last[1]) >= distance_m);
+            let far =
+                self.last.map(|last| libm::hypotf(at.x - last[0], at.y - last[1]) >= distance_m);
             // PX4 photographs where it begins, ArduPilot only counts from there.
             let due = far.unwrap_or(px4);
             if due || far.is_none() {
@@ -134,9 +141,13 @@ impl Snapshot {
                 payload[8..12].copy_from_slice(&self.boot_ms().to_le_bytes());
                 let relative_mm = libm::roundf(1e3 * relative_m) as i32;
                 let index = self.pictures.saturating_sub(1) as i32;
-                for (at, value) in
-                    [(12, latitude), (16, longitude), (20, altitude_mm), (24, relative_mm), (44, index)]
-                {
+                for (at, value) in [
+                    (12, latitude),
+                    (16, longitude),
+                    (20, altitude_mm),
+                    (24, relative_mm),
+                    (44, index),
+                ] {
                     payload[at..at + 4].copy_from_slice(&value.to_le_bytes());
                 }
                 for (k, q) in self.attitude().quaternion.iter().enumerate() {

@@ -8,7 +8,8 @@ use super::vehicle::VehicleLimits;
 use crate::{AutopilotKind, Estimator};
 
 impl AutopilotKind {
-    /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its recorded flights.
+    /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its
+    /// recorded flights.
     pub(super) fn drag_share(self) -> f32 {
         match self {
             Self::Px4 => 1.0,
@@ -60,7 +61,8 @@ pub struct Config {
     pub position_noise_m: f32,
     /// How good its estimate is.
     pub estimator: Estimator,
-    /// Whether PX4 lands by a distance sensor, as the recorded ones did: it crawls over its last metre.
+    /// Whether PX4 lands by a distance sensor, as the recorded ones did: it crawls over its last
+    /// metre.
     pub distance_sensor: bool,
     /// Seed of gusts and noise.
     pub seed: u64,
@@ -122,7 +124,9 @@ impl Config {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     /// A latitude, longitude or altitude out of range.
-    #[error("{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude")]
+    #[error(
+        "{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude"
+    )]
     Place(&'static str),
     /// A number that is not finite, or not positive where it must be.
     #[error("{0} must be finite and not negative")]

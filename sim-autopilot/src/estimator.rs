@@ -1,9 +1,11 @@
-//! What the estimator of an autopilot has wrong: a seeded model for each kind of receiver and firmware.
+//! What the estimator of an autopilot has wrong: a seeded model for each kind of receiver and
+//! firmware.
 //!
-//! An EKF's position error e follows its velocity error v and is pulled back by the receiver: e' = v − e / T. v is a
-//! first-order Gauss–Markov process with standard deviation σ and time constant τ, so e has the deviation
-//! σ T √(τ / (τ + T)). Above that lies a height that is wrong by the same amount for a whole flight, as the altitude of the EKF origin
-//! of a recorded PX4 was. The parameters are fitted to the recorded flights (`data/flights` of the shared data): truth less
+//! An EKF's position error e follows its velocity error v and is pulled back by the receiver: e' =
+//! v − e / T. v is a first-order Gauss–Markov process with standard deviation σ and time constant
+//! τ, so e has the deviation σ T √(τ / (τ + T)). Above that lies a height that is wrong by the same
+//! amount for a whole flight, as the altitude of the EKF origin of a recorded PX4 was. The
+//! parameters are fitted to the recorded flights (`data/flights` of the shared data): truth less
 //! estimate has these ranges there, from arming to disarming, metres and m/s.
 //!
 //! | | PX4 | ArduCopter |
@@ -30,8 +32,8 @@ impl Estimator {
     }
 }
 
-/// Standard deviation of the velocity's error (m/s), its time constant (s), the time in which the receiver pulls the
-/// position back (s), and what the position's error never exceeds (m).
+/// Standard deviation of the velocity's error (m/s), its time constant (s), the time in which the
+/// receiver pulls the position back (s), and what the position's error never exceeds (m).
 #[derive(Clone, Copy, Debug)]
 struct ErrorModel {
     sigma_mps: f32,
@@ -45,7 +47,10 @@ impl ErrorModel {
 }
 
 /// Across, up, and the most that a height is wrong for good, below and above.
-fn error_models(estimator: Estimator, autopilot: AutopilotKind) -> (ErrorModel, ErrorModel, [f32; 2]) {
+fn error_models(
+    estimator: Estimator,
+    autopilot: AutopilotKind,
+) -> (ErrorModel, ErrorModel, [f32; 2]) {
     match (estimator, autopilot) {
         (Estimator::Perfect, _) => (ErrorModel::NONE, ErrorModel::NONE, [0.0, 0.0]),
         (Estimator::Rtk, _) => (
@@ -86,7 +91,8 @@ impl EstimateErrors {
     pub fn new(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
         let (across, up, height_m) = error_models(estimator, autopilot);
-        // The sum of uniform numbers that a Gaussian is made of has its bound at 3.46; half of that is beyond any likely one.
+        // The sum of uniform numbers that a Gaussian is made of has its bound at 3.46; half of that
+        // is beyond any likely one.
         let share = (0.5 + random.sample() / 3.5).clamp(0.0, 1.0);
         let mut errors = Self {
             random,
@@ -134,7 +140,8 @@ impl EstimateErrors {
 mod tests {
     use super::*;
 
-    /// RMS and greatest of the error over a flight of a minute and its drift in 10 s, across and up, and RMS of velocity.
+    /// RMS and greatest of the error over a flight of a minute and its drift in 10 s, across and
+    /// up, and RMS of velocity.
     struct Flight {
         across: [f32; 4],
         up: [f32; 4],
@@ -154,7 +161,8 @@ mod tests {
             let squares: f32 = values.iter().map(|v| v * v).sum();
             [(squares / values.len() as f32).sqrt(), values.iter().fold(0.0, |a: f32, b| a.max(*b))]
         };
-        let drifts: Vec<Point> = positions.iter().zip(&positions[500..]).map(|(a, b)| b - a).collect();
+        let drifts: Vec<Point> =
+            positions.iter().zip(&positions[500..]).map(|(a, b)| b - a).collect();
         let both = |of: &dyn Fn(&Point) -> f32| {
             let (e, d) = (positions.iter().map(of).collect(), drifts.iter().map(of).collect());
             let ([a, b], [c, d]) = (stats(e), stats(d));
@@ -202,7 +210,11 @@ mod tests {
                     flights.iter().map(|f| f.across[k]).collect(),
                     across[k],
                 );
-                holds(&format!("{autopilot:?} up {what}"), flights.iter().map(|f| f.up[k]).collect(), up[k]);
+                holds(
+                    &format!("{autopilot:?} up {what}"),
+                    flights.iter().map(|f| f.up[k]).collect(),
+                    up[k],
+                );
             }
             for k in 0..2 {
                 let what = ["across", "up"][k];

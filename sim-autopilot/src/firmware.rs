@@ -98,7 +98,12 @@ impl Firmware {
         }
     }
 
-    pub(super) fn handle_command(&mut self, platform: &mut Platform, from: Sender, command: &Command) {
+    pub(super) fn handle_command(
+        &mut self,
+        platform: &mut Platform,
+        from: Sender,
+        command: &Command,
+    ) {
         match self {
             Self::Px4(px4) => px4.handle_command(platform, from, command),
             Self::Copter(copter) => copter.handle_command(platform, from, command),
@@ -118,7 +123,12 @@ impl Firmware {
     }
 
     /// SET_POSITION_TARGET_LOCAL_NED (84) or _GLOBAL_INT (86).
-    pub(super) fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
+    pub(super) fn handle_setpoint(
+        &mut self,
+        platform: &Platform,
+        id: u32,
+        fields: &PayloadReader<'_>,
+    ) {
         match self {
             Self::Px4(px4) => px4.handle_setpoint(platform, id, fields),
             Self::Copter(copter) => copter.handle_setpoint(platform, id, fields),
@@ -168,7 +178,9 @@ impl Firmware {
     /// Sets an integer parameter; false where there is none of that name.
     pub(super) fn set_integer(&mut self, name: &str, value: i32) -> bool {
         let params = self.params();
-        let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else { return false };
+        let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else {
+            return false;
+        };
         let Some(new) = old.with_integer(value) else { return false };
         let wire = params.to_wire(new);
         self.set_param(name, wire, new.wire_type());

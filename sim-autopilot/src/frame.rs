@@ -1,10 +1,13 @@
-//! MAVLink framing of the simulated autopilots. It shares no code with the companion's: a bug in one shall not hide in the other.
+//! MAVLink framing of the simulated autopilots. It shares no code with the companion's: a bug in
+//! one shall not hide in the other.
 //!
-//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate gives message types, CRC seeds and the checksum; its
-//! reader wants a stream that it may wait for, and bytes here come whenever the simulation has some.
+//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate gives message types, CRC
+//! seeds and the checksum; its reader wants a stream that it may wait for, and bytes here come
+//! whenever the simulation has some.
 //!
-//! Of candidates that overlap, the first with the right checksum is the frame; a wrong one costs its start byte. A frame that
-//! is not complete [`PARTIAL_LIFETIME_US`] after its first byte is given up.
+//! Of candidates that overlap, the first with the right checksum is the frame; a wrong one costs
+//! its start byte. A frame that is not complete [`PARTIAL_LIFETIME_US`] after its first byte is
+//! given up.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
@@ -79,15 +82,23 @@ pub fn crc_seed(message_id: u32) -> Option<u8> {
     (seed != 0 || message_id == SEED_ZERO).then_some(seed)
 }
 
-/// Appends a message to `out` as a V2 frame; the sender is its system, component and sequence number.
+/// Appends a message to `out` as a V2 frame; the sender is its system, component and sequence
+/// number.
 pub fn write_message<M: MessageData>(sender: (u8, u8, u8), message: &M, out: &mut Vec<u8>) {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
     write_raw(sender, M::ID, M::EXTRA_CRC, &payload[..len], out);
 }
 
-/// As [`write_message`], of a payload of at most 255 bytes that the caller laid out; zeros at its end are cut, but for one.
-pub fn write_raw(sender: (u8, u8, u8), message_id: u32, seed: u8, payload: &[u8], out: &mut Vec<u8>) {
+/// As [`write_message`], of a payload of at most 255 bytes that the caller laid out; zeros at its
+/// end are cut, but for one.
+pub fn write_raw(
+    sender: (u8, u8, u8),
+    message_id: u32,
+    seed: u8,
+    payload: &[u8],
+    out: &mut Vec<u8>,
+) {
     let cut = payload.iter().rev().take_while(|&&byte| byte == 0).count();
     let len = (payload.len() - cut).max(payload.len().min(1));
     let (system, component, sequence) = sender;

@@ -1,8 +1,10 @@
-//! From the mission's ENU to what the autopilot believes and says, and back, without trigonometry in every step.
+//! From the mission's ENU to what the autopilot believes and says, and back, without trigonometry
+//! in every step.
 //!
-//! The exact way goes through latitude and longitude with the autopilot's own projection (`planner_core::frames`). It is
-//! smooth: within 100 m its best linear map errs by d² / 2R < 1 mm. So the map is linearised about a point near the
-//! vehicle, renewed when the vehicle has moved 50 m away, and setpoints farther than 100 m take the exact way.
+//! The exact way goes through latitude and longitude with the autopilot's own projection
+//! (`planner_core::frames`). It is smooth: within 100 m its best linear map errs by d² / 2R < 1 mm.
+//! So the map is linearised about a point near the vehicle, renewed when the vehicle has moved 50 m
+//! away, and setpoints farther than 100 m take the exact way.
 
 use nalgebra::{Matrix3, Vector3};
 use planner_core::Point;
@@ -16,7 +18,8 @@ const LINEAR_WITHIN_M: f64 = 100.0;
 /// in f32.
 const SLOPE_HALF_SPAN_M: f64 = 64.0;
 
-/// One autopilot's local frame: its EKF origin, its projection, and the mission frame it is seen from.
+/// One autopilot's local frame: its EKF origin, its projection, and the mission frame it is seen
+/// from.
 #[derive(Clone, Debug)]
 pub struct LocalFrame {
     projection: Projection,
@@ -128,7 +131,8 @@ impl LocalFrame {
         // Whole metres are exact in f32, which the conversions take.
         self.centre = near.map(libm::round);
         self.centre_ned = self.exact_ned(&self.centre);
-        self.centre_geodetic = frames::enu_to_geodetic(&self.world_origin, &self.centre.cast::<f32>());
+        self.centre_geodetic =
+            frames::enu_to_geodetic(&self.world_origin, &self.centre.cast::<f32>());
         for axis in 0..3 {
             let mut offset = Vector3::zeros();
             offset[axis] = SLOPE_HALF_SPAN_M;
@@ -139,10 +143,12 @@ impl LocalFrame {
             );
             let a = frames::enu_to_geodetic(&self.world_origin, &ahead.cast::<f32>());
             let b = frames::enu_to_geodetic(&self.world_origin, &behind.cast::<f32>());
-            let slope = Vector3::new(a.lat_deg - b.lat_deg, a.lon_deg - b.lon_deg, a.alt_m - b.alt_m);
+            let slope =
+                Vector3::new(a.lat_deg - b.lat_deg, a.lon_deg - b.lon_deg, a.alt_m - b.alt_m);
             self.geodetic_slope.set_column(axis, &(slope / (2.0 * SLOPE_HALF_SPAN_M)));
         }
-        // The map is a rotation by far less than a degree and a scale near 1: it has an inverse wherever it is finite.
+        // The map is a rotation by far less than a degree and a scale near 1: it has an inverse
+        // wherever it is finite.
         self.enu_slope = self.ned_slope.try_inverse().unwrap_or_else(Matrix3::identity);
     }
 }
@@ -182,7 +188,8 @@ mod tests {
     fn a_far_setpoint_takes_the_exact_way() {
         let frame = LocalFrame::new(Projection::Px4, WORLD, EKF, Vector3::zeros());
         let ned = Vector3::new(2500.0, 1800.0, -40.0);
-        let exact = frames::geodetic_to_enu(&WORLD, &frames::ned_to_geodetic(Projection::Px4, &EKF, &ned));
+        let exact =
+            frames::geodetic_to_enu(&WORLD, &frames::ned_to_geodetic(Projection::Px4, &EKF, &ned));
         assert!((frame.enu_from_ned(&ned) - exact.cast::<f64>()).norm() < 1e-6);
     }
 

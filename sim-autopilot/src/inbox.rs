@@ -1,7 +1,8 @@
 //! What the simulated autopilot does with each message that comes in.
 //!
-//! Read by field ([`PayloadReader`]): offsets are those of the wire order. What is for another system or component, or of an id
-//! not listed here, changes nothing and is not answered, as on PX4 and ArduPilot.
+//! Read by field ([`PayloadReader`]): offsets are those of the wire order. What is for another
+//! system or component, or of an id not listed here, changes nothing and is not answered, as on PX4
+//! and ArduPilot.
 
 use mavlink::dialects::ardupilotmega as dialect;
 
@@ -19,14 +20,19 @@ impl Autopilot {
         let from = Sender { port, system: frame.system, component: frame.component };
         let for_us = |system: usize, component: usize| {
             let (system, component) = (fields.u8(system), fields.u8(component));
-            (system == 0 || system == system_id) && (component == 0 || component == AUTOPILOT_COMPONENT)
+            (system == 0 || system == system_id)
+                && (component == 0 || component == AUTOPILOT_COMPONENT)
         };
         let (firmware, platform) = (&mut self.firmware, &mut self.platform);
         match frame.message_id {
             0 => firmware.handle_heartbeat(platform, from),
             4 if fields.u8(12) == 0 && fields.u8(13) == 0 => {
-                let answer =
-                    telemetry::ping_payload(fields.u64(0), fields.u32(8), from.system, from.component);
+                let answer = telemetry::ping_payload(
+                    fields.u64(0),
+                    fields.u32(8),
+                    from.system,
+                    from.component,
+                );
                 platform.ports[port].send_raw(4, &answer);
             }
             11 if fields.u8(4) == system_id => firmware.handle_set_mode(platform, from, &fields),
@@ -46,10 +52,14 @@ impl Autopilot {
             76 if for_us(30, 31) => {
                 firmware.handle_command(platform, from, &Command::from_command_long(&fields));
             }
-            84 | 86 if for_us(50, 51) => firmware.handle_setpoint(platform, frame.message_id, &fields),
+            84 | 86 if for_us(50, 51) => {
+                firmware.handle_setpoint(platform, frame.message_id, &fields)
+            }
             111 if fields.i64(0) == 0 => {
-                let message =
-                    dialect::TIMESYNC_DATA { tc1: platform.time_us as i64 * 1000, ts1: fields.i64(8) };
+                let message = dialect::TIMESYNC_DATA {
+                    tc1: platform.time_us as i64 * 1000,
+                    ts1: fields.i64(8),
+                };
                 platform.ports[port].send(&message);
             }
             _ => {}
@@ -77,7 +87,8 @@ impl Autopilot {
     fn send_named_param(&mut self, port: usize, name: Option<&str>) {
         let params = self.firmware.params();
         if let Some(index) = name.and_then(|name| params.index(name)) {
-            let reported = if params.encoding() == Encoding::Cast { u16::MAX } else { index as u16 };
+            let reported =
+                if params.encoding() == Encoding::Cast { u16::MAX } else { index as u16 };
             self.send_param(port, index, reported);
         }
     }

@@ -1,8 +1,9 @@
 //! An uploaded mission as it is flown: AUTO.MISSION of PX4, AUTO of ArduCopter.
 //!
-//! The items NAV_DELAY (93), NAV_TAKEOFF (22), NAV_WAYPOINT (16), NAV_LAND (21) and NAV_RETURN_TO_LAUNCH (20) are flown,
-//! one after the other; DO_CHANGE_SPEED (178), DO_DIGICAM_CONTROL (203) and DO_SET_CAM_TRIGG_DIST (206) are done at once
-//! when the item before them is done. Every other item is passed over. ArduPilot's item 0 is home and not flown.
+//! The items NAV_DELAY (93), NAV_TAKEOFF (22), NAV_WAYPOINT (16), NAV_LAND (21) and
+//! NAV_RETURN_TO_LAUNCH (20) are flown, one after the other; DO_CHANGE_SPEED (178),
+//! DO_DIGICAM_CONTROL (203) and DO_SET_CAM_TRIGG_DIST (206) are done at once when the item before
+//! them is done. Every other item is passed over. ArduPilot's item 0 is home and not flown.
 //!
 //! Item numbers as they were uploaded; ENU metres in the mission frame; microseconds since boot.
 
@@ -55,9 +56,15 @@ impl MissionLeg {
     }
 }
 
-/// Height, and change of it, on the straight line between two items abreast of a vehicle. Both fly along it: PX4's
-/// `PositionSmoothing` makes one velocity of all three axes towards its end, ArduCopter's `AC_WPNav` one S-curve.
-pub(super) fn interpolate_height(from: &Point, at: &Point, here: &Point, velocity: &Point) -> (f32, f32) {
+/// Height, and change of it, on the straight line between two items abreast of a vehicle. Both fly
+/// along it: PX4's `PositionSmoothing` makes one velocity of all three axes towards its end,
+/// ArduCopter's `AC_WPNav` one S-curve.
+pub(super) fn interpolate_height(
+    from: &Point,
+    at: &Point,
+    here: &Point,
+    velocity: &Point,
+) -> (f32, f32) {
     let (way, up) = ((at - from).xy(), at.z - from.z);
     let length = way.norm();
     if length < REACHED_M {
@@ -98,13 +105,18 @@ impl Platform {
         legs.next() == Some(NAV_TAKEOFF)
     }
 
-    /// Executes the commands that are due and returns the leg to fly; `None` once the mission is complete. The next
-    /// call begins with the first item again.
-    pub(super) fn fly_mission(&mut self, sensors: &SensorReadings, landed: bool) -> Option<MissionLeg> {
+    /// Executes the commands that are due and returns the leg to fly; `None` once the mission is
+    /// complete. The next call begins with the first item again.
+    pub(super) fn fly_mission(
+        &mut self,
+        sensors: &SensorReadings,
+        landed: bool,
+    ) -> Option<MissionLeg> {
         let first = self.first_item();
         let progress = &mut self.missions.progress;
         progress.current = progress.current.max(first);
-        while let Some(item) = self.missions.items().get(usize::from(self.missions.progress.current)).copied()
+        while let Some(item) =
+            self.missions.items().get(usize::from(self.missions.progress.current)).copied()
         {
             match self.leg_of_item(&item) {
                 Some(leg) => {
@@ -197,8 +209,9 @@ impl Platform {
 
     fn is_done(&mut self, leg: &MissionLeg, sensors: &SensorReadings, landed: bool) -> bool {
         let progress = &mut self.missions.progress;
-        let since =
-            |us: Option<u64>| sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6;
+        let since = |us: Option<u64>| {
+            sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6
+        };
         match *leg {
             MissionLeg::Wait(s) => since(progress.since_us) >= s,
             MissionLeg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_HEIGHT_M,
@@ -206,8 +219,12 @@ impl Platform {
                 let off = at - sensors.position;
                 // NaN is no heading to wait for.
                 let turned = wrap_pi(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
-                let turned = turned || heading.is_nan() || self.config.autopilot == AutopilotKind::Ardupilot;
-                if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_HEIGHT_M && turned {
+                let turned =
+                    turned || heading.is_nan() || self.config.autopilot == AutopilotKind::Ardupilot;
+                if libm::hypotf(off.x, off.y) <= reached_m
+                    && off.z.abs() <= REACHED_HEIGHT_M
+                    && turned
+                {
                     progress.inside_us.get_or_insert(sensors.now_us);
                 }
                 let stayed = progress.inside_us.is_some() && since(progress.inside_us) >= stay_s;

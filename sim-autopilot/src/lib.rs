@@ -1,11 +1,13 @@
 //! A simulated autopilot: bytes of MAVLink and fixed time steps in, bytes and motion out.
 //!
-//! It flies as PX4 1.17 or ArduCopter 4.6 was seen to fly and says what that was seen to say. Nothing in it reads a clock or
-//! blocks: the same bytes at the same steps give the same flight, bit for bit, from the same seed.
+//! It flies as PX4 1.17 or ArduCopter 4.6 was seen to fly and says what that was seen to say.
+//! Nothing in it reads a clock or blocks: the same bytes at the same steps give the same flight,
+//! bit for bit, from the same seed.
 //!
-//! Drain contract: call [`Autopilot::handle_bytes`] whenever bytes have arrived, [`Autopilot::step`] once for each
-//! 4 ms of simulated time, and [`Autopilot::poll_transmit`] until it returns 0. Physics are in the mission's ENU frame;
-//! what is said and heard is NED about the vehicle's own EKF origin in its firmware's projection ([`geodesy`]).
+//! Drain contract: call [`Autopilot::handle_bytes`] whenever bytes have arrived,
+//! [`Autopilot::step`] once for each 4 ms of simulated time, and [`Autopilot::poll_transmit`] until
+//! it returns 0. Physics are in the mission's ENU frame; what is said and heard is NED about the
+//! vehicle's own EKF origin in its firmware's projection ([`geodesy`]).
 //!
 //! ```
 //! use sim_autopilot::{Autopilot, Config};
@@ -95,7 +97,8 @@ impl Autopilot {
         self.platform.vehicle.state()
     }
 
-    /// Every picture taken since the last call, as it truly was taken: a camera fixed level to the body looks down from there.
+    /// Every picture taken since the last call, as it truly was taken: a camera fixed level to the
+    /// body looks down from there.
     pub fn take_photos(&mut self) -> Vec<Photo> {
         self.platform.camera.take_photos()
     }
@@ -153,7 +156,8 @@ impl Autopilot {
         }
     }
 
-    /// Moves bytes to send at port 0 into `out`, whole frames only; the bytes moved. 280 bytes fit any frame.
+    /// Moves bytes to send at port 0 into `out`, whole frames only; the bytes moved. 280 bytes fit
+    /// any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
         self.poll_transmit_from(0, out)
     }
@@ -186,7 +190,8 @@ impl Autopilot {
         if self.platform.config.ground_port { self.poll_transmit_from(last, out) } else { 0 }
     }
 
-    /// Advances time by `dt_s` (0.004) over ground at `ground_up_m` below the vehicle, in the mission frame.
+    /// Advances time by `dt_s` (0.004) over ground at `ground_up_m` below the vehicle, in the
+    /// mission frame.
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
         self.platform.advance_time(dt_s, ground_up_m);
         let was_armed = self.firmware.armed();
@@ -276,8 +281,11 @@ impl Autopilot {
             None => [nan, nan, Vector3::new(0.0, 0.0, 100.0)],
         };
         let heading_rate = truth.heading_rate;
-        let noise =
-            if platform.config.position_noise_m > 0.0 { platform.config.position_noise_m } else { 0.0 };
+        let noise = if platform.config.position_noise_m > 0.0 {
+            platform.config.position_noise_m
+        } else {
+            0.0
+        };
         let gps = if noise > 0.0 {
             (
                 noise * platform.disturbance.sensor_noise(),
@@ -311,8 +319,8 @@ impl Autopilot {
         }
     }
 
-    /// Restarts: parameters, missions, charge and EKF origin stay, streams are forgotten, the motors stop. In the air it
-    /// falls.
+    /// Restarts: parameters, missions, charge and EKF origin stay, streams are forgotten, the
+    /// motors stop. In the air it falls.
     pub fn reboot(&mut self) {
         let platform = &self.platform;
         let mut fresh = platform.config.clone();
@@ -333,8 +341,8 @@ impl Autopilot {
 
 /// Faults: what a scenario may do to a vehicle.
 impl Autopilot {
-    /// The pilot's switch, by HEARTBEAT's `custom_mode`: changes the mode without asking whether it can run. False where
-    /// the firmware has no such mode.
+    /// The pilot's switch, by HEARTBEAT's `custom_mode`: changes the mode without asking whether it
+    /// can run. False where the firmware has no such mode.
     pub fn set_pilot_mode(&mut self, mode: impl Into<u32>) -> bool {
         let sensors = self.platform.sensors();
         self.firmware.force_mode(mode.into(), &sensors)
@@ -366,8 +374,8 @@ impl Autopilot {
         self.platform.position_offset += offset;
     }
 
-    /// Sets the errors of the estimate, estimated minus true, ENU metres and m/s, and how fast that of the height changes: a
-    /// replay imposes those that were recorded.
+    /// Sets the errors of the estimate, estimated minus true, ENU metres and m/s, and how fast that
+    /// of the height changes: a replay imposes those that were recorded.
     pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
         (self.platform.position_offset, self.platform.velocity_bias) = (*position, *velocity);
         self.platform.height_error_rate = height_rate;
@@ -391,8 +399,9 @@ impl Autopilot {
         self.set_ekf_origin(origin);
     }
 
-    /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights under a ceiling: its default
-    /// is to climb and return. ArduCopter has no such parameter and brakes.
+    /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights
+    /// under a ceiling: its default is to climb and return. ArduCopter has no such parameter and
+    /// brakes.
     pub fn land_on_stream_loss(&mut self) {
         if self.platform.config.autopilot == AutopilotKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
@@ -404,7 +413,11 @@ impl Autopilot {
     /// # Errors
     /// There is none of this name.
     pub fn set_parameter(&mut self, name: &'static str, value: i32) -> Result<(), ConfigError> {
-        if self.firmware.set_integer(name, value) { Ok(()) } else { Err(ConfigError::Parameter(name)) }
+        if self.firmware.set_integer(name, value) {
+            Ok(())
+        } else {
+            Err(ConfigError::Parameter(name))
+        }
     }
 
     /// Takes the GPS fix away or gives it back; without it no position control flies.

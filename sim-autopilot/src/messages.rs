@@ -23,12 +23,24 @@ const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343
 const PREARM: u32 = 0x1000_0000;
 const POSITION_SENSORS: u32 = 0x4000;
 
-/// Messages newer than many dialects: id, CRC seed and payload as PX4 1.17 was recorded to send them. What they say does not
-/// change; that they come, and that not everybody knows them, is what counts.
+/// Messages newer than many dialects: id, CRC seed and payload as PX4 1.17 was recorded to send
+/// them. What they say does not change; that they come, and that not everybody knows them, is what
+/// counts.
 const RECORDED: [(u32, u8, &[u8]); 5] = [
     (8, 117, &[0xA0, 0x6F, 0x6D, 0, 0, 0, 0, 0, 0x29, 0x60, 0, 0, 0, 0, 0, 0, 0xAB, 9]),
-    (380, 232, &[0, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255]),
-    (410, 160, &[0x27, 0x37, 0x1D, 1, 0x5C, 0x18, 0, 0, 0x0D, 0, 0, 0, 0x88, 0, 0x0A, 0x0C, 2, 0x38]),
+    (
+        380,
+        232,
+        &[
+            0, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255,
+            255,
+        ],
+    ),
+    (
+        410,
+        160,
+        &[0x27, 0x37, 0x1D, 1, 0x5C, 0x18, 0, 0, 0x0D, 0, 0, 0, 0x88, 0, 0x0A, 0x0C, 2, 0x38],
+    ),
     (411, 106, &[13]),
     (441, 169, &[0, 0, 0, 0, 255, 255, 255, 255, 4, 0, 0, 0, 0, 255, 255, 255, 255]),
 ];
@@ -45,7 +57,8 @@ impl Snapshot {
         if self.armed { (0.5 * self.specific_force.norm() / GRAVITY).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// Pressure of the standard atmosphere, hPa, to first order about sea level and exact enough below 2 km.
+    /// Pressure of the standard atmosphere, hPa, to first order about sea level and exact enough
+    /// below 2 km.
     pub(super) fn pressure(&self) -> f32 {
         let ratio = 1.0 - 2.255_77e-5 * self.geodetic.alt_m as f32;
         1013.25 * libm::powf(ratio.max(0.1), 5.255_88)
@@ -54,13 +67,15 @@ impl Snapshot {
     pub(super) fn send_heartbeat(&self, port: &mut Port) {
         let status = &self.status;
         let [a, b, c, d] = status.custom_mode.to_le_bytes();
-        // Laid out by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 or _ARDUPILOTMEGA, protocol version 3.
+        // Laid out by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 or _ARDUPILOTMEGA, protocol
+        // version 3.
         let autopilot = if self.is_px4() { 12 } else { 3 };
         port.send_raw(0, &[a, b, c, d, 2, autopilot, status.flags, status.system_status, 3]);
     }
 
     pub(super) fn send_sys_status(&self, port: &mut Port) {
-        let [present, enabled, mut health] = if self.is_px4() { PX4_SENSORS } else { ARDUPILOT_SENSORS };
+        let [present, enabled, mut health] =
+            if self.is_px4() { PX4_SENSORS } else { ARDUPILOT_SENSORS };
         if self.status.armable {
             health |= PREARM;
         }
@@ -277,7 +292,9 @@ impl Snapshot {
         // Diagonals only, upper triangle row by row; what is not known is NaN.
         let mut pose_covariance = [f32::NAN; 21];
         let mut velocity_covariance = [f32::NAN; 21];
-        for (at, variance) in [(0, 0.043), (6, 0.043), (11, 0.08), (15, 4e-4), (18, 4e-4), (20, 0.03)] {
+        for (at, variance) in
+            [(0, 0.043), (6, 0.043), (11, 0.08), (15, 4e-4), (18, 4e-4), (20, 0.03)]
+        {
             pose_covariance[at] = variance;
         }
         for (at, variance) in [(0, 0.009), (6, 0.009), (11, 0.005)] {

@@ -1,7 +1,9 @@
-//! The mission protocol: plans, geofences and rally points are stored and given back; plans are also flown (`itinerary`).
+//! The mission protocol: plans, geofences and rally points are stored and given back; plans are
+//! also flown (`itinerary`).
 //!
-//! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK. Download: REQUEST_LIST →
-//! COUNT, then each item as it is asked for. Source: MAVLink guide, "Mission Protocol".
+//! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK.
+//! Download: REQUEST_LIST → COUNT, then each item as it is asked for. Source: MAVLink guide,
+//! "Mission Protocol".
 
 use super::port::{Port, Sender};
 use super::wire::PayloadReader;
@@ -186,7 +188,8 @@ impl Missions {
         let Some(upload) = &mut self.upload else {
             return send_mission_ack(port, from, INVALID_SEQUENCE, kind);
         };
-        if upload.from.system_and_component() != from.system_and_component() || upload.kind != kind {
+        if upload.from.system_and_component() != from.system_and_component() || upload.kind != kind
+        {
             return send_mission_ack(port, from, INVALID_SEQUENCE, kind);
         }
         let sequence = usize::from(fields.u16(28));
@@ -227,7 +230,8 @@ fn send_mission_ack(port: &mut Port, from: Sender, result: u8, kind: u8) {
     port.send_raw(ACK, &[from.system, from.component, result, kind]);
 }
 
-/// An item of either kind as MISSION_ITEM_INT; `None` if a number in it is infinite, or a place is none on earth.
+/// An item of either kind as MISSION_ITEM_INT; `None` if a number in it is infinite, or a place is
+/// none on earth.
 fn read_item(id: u32, fields: &PayloadReader<'_>) -> Option<MissionItem> {
     let mut item = [0; 37];
     for (at, byte) in item.iter_mut().enumerate() {

@@ -1,10 +1,12 @@
 //! Seeded disturbances: gusts of wind and the errors of the estimator.
 //!
-//! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one of these along each axis with
-//! τ = L / V). They advance in slots of 20 ms and are held between: nothing they model moves faster.
+//! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one of these
+//! along each axis with τ = L / V). They advance in slots of 20 ms and are held between: nothing
+//! they model moves faster.
 //!
-//! A gust is given by its peak over the mean wind, as in weather reports and MIL-F-8785C's discrete gust, not by a
-//! standard deviation: the peak lies [`PEAK_FACTOR`] deviations out, and nothing goes beyond it.
+//! A gust is given by its peak over the mean wind, as in weather reports and MIL-F-8785C's discrete
+//! gust, not by a standard deviation: the peak lies [`PEAK_FACTOR`] deviations out, and nothing
+//! goes beyond it.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -15,8 +17,9 @@ use planner_core::Point;
 pub const SLOT_S: f32 = 0.02;
 /// Time constant of gusts: a turbulence length of 20 m met at 8 m/s.
 const GUST_TAU_S: f32 = 2.5;
-/// Peak of gusts over their standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO, Harper, Kepert and Ginger,
-/// Guidelines for converting between various wind averaging periods, 2010, §2).
+/// Peak of gusts over their standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO,
+/// Harper, Kepert and Ginger, Guidelines for converting between various wind averaging periods,
+/// 2010, §2).
 const PEAK_FACTOR: f32 = 3.0;
 /// Vertical gusts are half the horizontal ones near the ground (MIL-F-8785C, low altitude).
 const VERTICAL_SHARE: f32 = 0.5;
@@ -24,11 +27,12 @@ const VERTICAL_SHARE: f32 = 0.5;
 const BIAS_TAU_S: f32 = 60.0;
 /// Quick wander of the position estimate, seconds: what the filter lets through of GPS noise.
 const JITTER_TAU_S: f32 = 1.0;
-/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts 0.1 m/s where it is 0.5 m off.
+/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts 0.1 m/s where it is 0.5
+/// m off.
 const VELOCITY_SHARE: f32 = 0.2;
 
-/// Gaussian numbers from a seed. Four 16-bit uniforms are summed (Irwin–Hall): mean 0, variance 1, no tail past 3.5 σ,
-/// and no transcendental function that could differ between machines.
+/// Gaussian numbers from a seed. Four 16-bit uniforms are summed (Irwin–Hall): mean 0, variance 1,
+/// no tail past 3.5 σ, and no transcendental function that could differ between machines.
 #[derive(Clone, Debug)]
 pub struct Gaussian(Pcg64Mcg);
 
@@ -67,7 +71,8 @@ impl OrnsteinUhlenbeck {
     }
 
     fn advance(&mut self, random: &mut Gaussian) {
-        self.value = self.value * self.decay + random.sample_vector().component_mul(&self.noise_gain);
+        self.value =
+            self.value * self.decay + random.sample_vector().component_mul(&self.noise_gain);
     }
 }
 
@@ -88,20 +93,25 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// Mean wind (m/s, ENU), peak of gusts over it (m/s) and standard deviation of the position estimate (m); 0 switches
-    /// one off.
+    /// Mean wind (m/s, ENU), peak of gusts over it (m/s) and standard deviation of the position
+    /// estimate (m); 0 switches one off.
     pub fn new(mean_wind: Point, gust_peak_mps: f32, position_noise_m: f32, seed: u64) -> Self {
         let mut random = Gaussian::new(seed);
         let sigma = gust_peak_mps / PEAK_FACTOR;
         let sigma = Point::new(sigma, sigma, VERTICAL_SHARE * sigma);
-        let gust = (gust_peak_mps > 0.0).then(|| OrnsteinUhlenbeck::new(sigma, GUST_TAU_S, &mut random));
+        let gust =
+            (gust_peak_mps > 0.0).then(|| OrnsteinUhlenbeck::new(sigma, GUST_TAU_S, &mut random));
         let errors = (position_noise_m > 0.0).then(|| {
             let half = position_noise_m * core::f32::consts::FRAC_1_SQRT_2;
             let all = |s: f32| Point::new(s, s, s);
             [
                 OrnsteinUhlenbeck::new(all(half), BIAS_TAU_S, &mut random),
                 OrnsteinUhlenbeck::new(all(half), JITTER_TAU_S, &mut random),
-                OrnsteinUhlenbeck::new(all(VELOCITY_SHARE * position_noise_m), JITTER_TAU_S, &mut random),
+                OrnsteinUhlenbeck::new(
+                    all(VELOCITY_SHARE * position_noise_m),
+                    JITTER_TAU_S,
+                    &mut random,
+                ),
             ]
         });
         let mut new = Self {

@@ -1,8 +1,8 @@
 //! The parameter protocol's table: names, types and values of one vehicle, and how integers travel.
 //!
 //! PX4 puts the bytes of an integer into the float of PARAM_VALUE and PARAM_SET
-//! (`MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE`) and refuses another type than the parameter's own. ArduPilot casts
-//! integers, and casts what it is sent to its own type.
+//! (`MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE`) and refuses another type than the parameter's
+//! own. ArduPilot casts integers, and casts what it is sent to its own type.
 
 /// How integers travel in the float.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +82,8 @@ impl Params {
         encoding: Encoding,
         own: &[(&'static str, ParamValue)],
     ) -> Self {
-        let mut params = Self { table, encoding, values: table.iter().map(|&(_, value)| value).collect() };
+        let mut params =
+            Self { table, encoding, values: table.iter().map(|&(_, value)| value).collect() };
         for &(name, value) in own {
             let index = params.index(name).expect("a vehicle's own parameters are in its table");
             params.values[index] = value;
@@ -168,7 +169,9 @@ mod tests {
         assert_eq!(params.i32_value("LONG"), 7);
         assert_eq!(params.to_wire(Int(7)).to_bits(), 7);
         assert!(
-            !params.set("LONG", 4.0, 9) && !params.set("REAL", f32::NAN, 9) && !params.set("NONE", 1.0, 9)
+            !params.set("LONG", 4.0, 9)
+                && !params.set("REAL", f32::NAN, 9)
+                && !params.set("NONE", 1.0, 9)
         );
         assert_eq!((params.i32_value("LONG"), params.f32_value("REAL")), (7, 2.5));
     }

@@ -1,4 +1,5 @@
-//! What every simulated autopilot has, whatever its firmware: airframe, estimator, ports, home, stored missions.
+//! What every simulated autopilot has, whatever its firmware: airframe, estimator, ports, home,
+//! stored missions.
 
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
@@ -41,7 +42,8 @@ pub struct SensorReadings {
     pub heading: f32,
     /// The body touches the ground.
     pub touching: bool,
-    /// Height of the body over its resting place as the distance sensor shows it, metres; infinite without one.
+    /// Height of the body over its resting place as the distance sensor shows it, metres; infinite
+    /// without one.
     pub distance: f32,
     /// Home, ENU metres.
     pub home: Point,
@@ -117,7 +119,12 @@ impl Platform {
         Self {
             time_us: 0,
             next_noise_us: 0,
-            disturbance: Disturbance::new(config.wind, config.gust_mps, config.position_noise_m, seed),
+            disturbance: Disturbance::new(
+                config.wind,
+                config.gust_mps,
+                config.position_noise_m,
+                seed,
+            ),
             errors: EstimateErrors::new(config.estimator, config.autopilot, seed),
             position_offset: Point::zeros(),
             velocity_bias: Point::zeros(),
@@ -191,7 +198,8 @@ impl Platform {
         self.send_on_all_ports(HOME_POSITION);
     }
 
-    /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has looked.
+    /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has
+    /// looked.
     pub(super) fn handle_camera_command(&mut self, from: Sender, command: &Command) {
         self.execute_camera_command(command);
         let soon_us = self.time_us + ANSWER_DELAY_US;
@@ -199,7 +207,8 @@ impl Platform {
             AutopilotKind::Px4 => self.camera.next_poll_us().max(soon_us),
             AutopilotKind::Ardupilot => soon_us,
         };
-        let ack = PendingAck { command: command.id, result: ACCEPTED, to: from.system_and_component() };
+        let ack =
+            PendingAck { command: command.id, result: ACCEPTED, to: from.system_and_component() };
         self.ports[from.port].pending_acks.push((answer_us, ack));
     }
 
@@ -215,7 +224,11 @@ impl Platform {
     /// Takes the picture that is due, if one is, and says so.
     pub(super) fn update_camera(&mut self) {
         let state = self.vehicle.state();
-        let truth = Photo { time_us: self.time_us, position: state.position, heading_rad: state.heading_rad };
+        let truth = Photo {
+            time_us: self.time_us,
+            position: state.position,
+            heading_rad: state.heading_rad,
+        };
         let estimate = self.gps_ok.then(|| state.position + self.position_error());
         if let Some(message) = self.camera.update(self.config.autopilot, truth, estimate) {
             self.send_on_all_ports(message);
@@ -290,7 +303,8 @@ impl Platform {
         valid
     }
 
-    /// SET_MESSAGE_INTERVAL; 0 restores what `streams` says. `refused` is the firmware's answer to an id it has not.
+    /// SET_MESSAGE_INTERVAL; 0 restores what `streams` says. `refused` is the firmware's answer to
+    /// an id it has not.
     pub(super) fn set_interval(
         &mut self,
         from: Sender,
@@ -311,7 +325,8 @@ impl Platform {
     /// GET_MESSAGE_INTERVAL.
     pub(super) fn report_interval(&mut self, from: Sender, id: f32, refused: u8) -> u8 {
         let port = &mut self.ports[from.port];
-        let Some(stream) = message_id(id).and_then(|id| port.streams.iter().find(|stream| stream.id == id))
+        let Some(stream) =
+            message_id(id).and_then(|id| port.streams.iter().find(|stream| stream.id == id))
         else {
             return refused;
         };

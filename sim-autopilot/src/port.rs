@@ -1,4 +1,5 @@
-//! One MAVLink port of the simulated autopilot: framing, its own sequence numbers, stream settings and send queue.
+//! One MAVLink port of the simulated autopilot: framing, its own sequence numbers, stream settings
+//! and send queue.
 
 use mavlink::MessageData;
 
@@ -9,7 +10,8 @@ pub const AUTOPILOT_COMPONENT: u8 = 1;
 /// Most bytes that wait to be sent before telemetry is dropped, as PX4 drops it when its buffer is
 /// full.
 const MAX_QUEUED_TELEMETRY: usize = 4096;
-/// Rates of the port for a ground station: message id and interval in µs. A real one asks for about these itself.
+/// Rates of the port for a ground station: message id and interval in µs. A real one asks for about
+/// these itself.
 pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 1_000_000),   // SYS_STATUS
@@ -121,7 +123,8 @@ impl Port {
 
     /// A port with the same messages at a ground station's rates.
     pub fn for_ground(system_id: u8, streams: &[(u32, u32)]) -> Self {
-        let rate = |id| GROUND_STREAMS.iter().find(|ground| ground.0 == id).map_or(0, |ground| ground.1);
+        let rate =
+            |id| GROUND_STREAMS.iter().find(|ground| ground.0 == id).map_or(0, |ground| ground.1);
         let streams: Vec<_> = streams.iter().map(|&(id, _)| (id, rate(id))).collect();
         Self::new(system_id, &streams)
     }
@@ -157,7 +160,8 @@ impl Port {
 
     /// Whether the addressee of a message was heard on this port; 0 addresses all.
     pub fn is_route_to(&self, (system, component): (u8, u8)) -> bool {
-        let meant = |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
+        let meant =
+            |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
         self.heard.iter().any(meant)
     }
 
@@ -252,14 +256,17 @@ impl Port {
 
     /// Sets a stream's interval; false where there is no such stream.
     pub fn set_interval(&mut self, id: u32, interval_us: u32, now_us: u64) -> bool {
-        let Some(stream) = self.streams.iter_mut().find(|stream| stream.id == id) else { return false };
+        let Some(stream) = self.streams.iter_mut().find(|stream| stream.id == id) else {
+            return false;
+        };
         stream.interval_us = interval_us;
         stream.due_us = now_us;
         self.next_due_us = self.next_due_us.min(now_us);
         true
     }
 
-    /// Moves whole frames into `out`, as many as fit; the bytes moved. A buffer of 280 bytes fits any frame.
+    /// Moves whole frames into `out`, as many as fit; the bytes moved. A buffer of 280 bytes fits
+    /// any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
         let waiting = &self.queue[self.sent..];
         let mut len = 0;

@@ -1,8 +1,9 @@
-//! Passing on what is for others, from port to port, as ArduPilot always does and PX4 where `MAV_x_FORWARD` is set: so a ground
-//! station on one port reaches a companion on another.
+//! Passing on what is for others, from port to port, as ArduPilot always does and PX4 where
+//! `MAV_x_FORWARD` is set: so a ground station on one port reaches a companion on another.
 //!
-//! A port leads to every component that was heard on it. A message to one goes to the ports that lead there, a message to nobody
-//! in particular to all other ports on which a sender was heard; what is for this autopilot alone goes no further.
+//! A port leads to every component that was heard on it. A message to one goes to the ports that
+//! lead there, a message to nobody in particular to all other ports on which a sender was heard;
+//! what is for this autopilot alone goes no further.
 
 use super::frame::Frame;
 use super::port::{AUTOPILOT_COMPONENT, Port};

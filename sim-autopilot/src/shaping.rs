@@ -1,6 +1,7 @@
 //! How autopilots approach what is asked for within limits on acceleration and jerk.
 
-/// Rate at which an error is closed: proportional near zero, and no faster than can be stopped (`sqrt_controller`).
+/// Rate at which an error is closed: proportional near zero, and no faster than can be stopped
+/// (`sqrt_controller`).
 pub fn approach_rate(error: f32, gain: f32, limit: f32) -> f32 {
     let linear = limit / (gain * gain);
     if error.abs() <= linear {
@@ -24,7 +25,8 @@ pub struct JerkLimitedRate {
 impl JerkLimitedRate {
     /// One step of `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
-        let wanted = approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
+        let wanted =
+            approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
         self.change += (wanted - self.change).clamp(-jerk * dt, jerk * dt);
         self.rate += self.change * dt;
     }
@@ -49,6 +51,9 @@ mod tests {
             }
         }
         assert!(most <= 3.0 && fastest < 1.6, "{most} {fastest}");
-        assert!((0.9..1.8).contains(&arrived_s) && (ramp.rate - 1.5).abs() < 0.01, "{arrived_s} {ramp:?}");
+        assert!(
+            (0.9..1.8).contains(&arrived_s) && (ramp.rate - 1.5).abs() < 0.01,
+            "{arrived_s} {ramp:?}"
+        );
     }
 }

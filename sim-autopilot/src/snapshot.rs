@@ -31,7 +31,8 @@ pub struct Snapshot {
     pub velocity: Vector3<f64>,
     /// Estimated position.
     pub geodetic: Geodetic,
-    /// GPS receiver: position error north and east in metres beyond the estimate's, and whether it has a fix.
+    /// GPS receiver: position error north and east in metres beyond the estimate's, and whether it
+    /// has a fix.
     pub gps: (f32, f32, bool),
     /// Home, and in NED about the EKF origin.
     pub home: (Geodetic, Vector3<f64>),
@@ -66,7 +67,8 @@ pub struct Attitude {
 pub fn attitude_from_force(force: &Vector3<f32>, heading: f32) -> Attitude {
     let norm = force.norm().max(0.1);
     let (sin, cos) = libm::sincosf(heading);
-    // The body's z axis, down, in a frame turned by the heading: (cos φ sin θ, −sin φ, cos φ cos θ).
+    // The body's z axis, down, in a frame turned by the heading: (cos φ sin θ, −sin φ, cos φ cos
+    // θ).
     let (ahead, right) = (cos * force.x + sin * force.y, cos * force.y - sin * force.x);
     let axis = [-ahead / norm, -right / norm, -force.z / norm];
     let roll = libm::asinf((-axis[1]).clamp(-1.0, 1.0));

@@ -1,7 +1,8 @@
-//! What the simulated autopilot says. PX4's streams of an onboard link are here as 1.17 was seen to send them unasked;
-//! ArduCopter's are with its personality.
+//! What the simulated autopilot says. PX4's streams of an onboard link are here as 1.17 was seen to
+//! send them unasked; ArduCopter's are with its personality.
 //!
-//! A message is put together only when it is due, from a [`Snapshot`] taken once for all that are due in the same step.
+//! A message is put together only when it is due, from a [`Snapshot`] taken once for all that are
+//! due in the same step.
 
 use mavlink::dialects::ardupilotmega as dialect;
 
@@ -73,13 +74,15 @@ impl Snapshot {
             8 | 380 | 410 | 411 | 441 => messages::send_recorded(id, port),
             42 => {
                 let (current, total) = self.mission;
-                let [[a, b], [c, d]] = [current.min(total.saturating_sub(1)), total].map(u16::to_le_bytes);
+                let [[a, b], [c, d]] =
+                    [current.min(total.saturating_sub(1)), total].map(u16::to_le_bytes);
                 port.send_raw(42, &[a, b, c, d, 0, 0]);
             }
             111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
             AUTOPILOT_VERSION => self.send_version(port),
             245 => {
-                // Two bytes: vtol_state undefined or, as ArduCopter says, multicopter; and the landed state.
+                // Two bytes: vtol_state undefined or, as ArduCopter says, multicopter; and the
+                // landed state.
                 let vtol = if self.is_px4() { 0 } else { 3 };
                 port.send_raw(245, &[vtol, self.status.landed_state]);
             }
@@ -215,7 +218,11 @@ impl Snapshot {
             193 => self.send_ekf_status_report(port),
             230 => port.send(&dialect::ESTIMATOR_STATUS_DATA {
                 time_usec: self.time_us,
-                flags: dialect::EstimatorStatusFlags::from_bits_truncate(if self.gps.2 { 895 } else { 0x27 }),
+                flags: dialect::EstimatorStatusFlags::from_bits_truncate(if self.gps.2 {
+                    895
+                } else {
+                    0x27
+                }),
                 vel_ratio: 0.05,
                 pos_horiz_ratio: 0.03,
                 pos_vert_ratio: 0.01,

@@ -1,5 +1,5 @@
-//! One test for each thing PX4 was seen to do, in memory: here how it flies, in `protocol` what it says; in `ardupilot` what
-//! ArduCopter was seen to do.
+//! One test for each thing PX4 was seen to do, in memory: here how it flies, in `protocol` what it
+//! says; in `ardupilot` what ArduCopter was seen to do.
 
 mod ardupilot;
 mod camera;
@@ -20,7 +20,8 @@ const OFFBOARD: u32 = 0x0006_0000;
 const POSITION: u16 = 0xDF8;
 const VELOCITY: u16 = 0xDC7;
 
-/// A ground station on a bench: sends by field, keeps every frame that comes back with the time it came.
+/// A ground station on a bench: sends by field, keeps every frame that comes back with the time it
+/// came.
 struct Bench {
     autopilot: Autopilot,
     framer: Framer,
@@ -94,7 +95,11 @@ impl Bench {
     fn until(&mut self, limit: f64, mut done: impl FnMut(&Autopilot) -> bool) -> f64 {
         let start = self.now();
         while !done(&self.autopilot) {
-            assert!(self.now() - start < limit, "not within {limit} s: {:?}", self.autopilot.true_state());
+            assert!(
+                self.now() - start < limit,
+                "not within {limit} s: {:?}",
+                self.autopilot.true_state()
+            );
             self.run(0.004);
         }
         self.now() - start
@@ -185,7 +190,8 @@ fn it_arms_goes_offboard_follows_setpoints_and_lands() {
     bench.stream(20.0, setpoint(POSITION, 1, [10.0, 4.0, -5.0], [0.0; 3], 0.0));
     bench.run(12.0);
     let at = bench.autopilot.true_state().position;
-    // 10 m north and 4 m east of the EKF origin, which is the mission origin here; ground is 0 and rest 0.3.
+    // 10 m north and 4 m east of the EKF origin, which is the mission origin here; ground is 0 and
+    // rest 0.3.
     assert!((at - Point::new(4.0, 10.0, 5.0)).norm() < 0.2, "at {at}");
     assert_eq!(bench.set_mode(4.0, 6.0), [0, 0]);
     bench.run(1.5);
@@ -242,10 +248,15 @@ fn lost_setpoints_start_the_return_within_1_23_s_and_a_stream_ends_it_by_itself(
     assert!((1.0..=1.23).contains(&took), "failsafe after {took} s");
     bench.run(1.1);
     assert_eq!(bench.heartbeat(), (RETURN, 157, 5));
-    let gimbal =
-        |f: &Frame| (u16::from_le_bytes([f.padded()[28], f.padded()[29]]), f.padded()[30], f.padded()[31]);
+    let gimbal = |f: &Frame| {
+        (u16::from_le_bytes([f.padded()[28], f.padded()[29]]), f.padded()[30], f.padded()[31])
+    };
     let commands: Vec<_> = bench.of(76).map(|(_, frame)| gimbal(frame)).collect();
-    assert_eq!(commands, [(1001, 1, 0), (1000, 1, 0), (1001, 1, 0)], "gimbal commands to component 0");
+    assert_eq!(
+        commands,
+        [(1001, 1, 0), (1000, 1, 0), (1001, 1, 0)],
+        "gimbal commands to component 0"
+    );
     bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
     let back = bench.until(1.0, |a| !a.in_failsafe());
     assert!(back < 0.1, "back in Offboard after {back} s");
@@ -394,7 +405,10 @@ fn disarming_in_the_air_is_refused_unless_forced() {
     assert!(bench.autopilot.true_state().armed);
     assert_eq!(bench.command(400, [0.0, 21_196.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [0]);
     bench.run(2.0);
-    assert!(!bench.autopilot.true_state().armed && bench.autopilot.true_state().position.z < 0.31, "it fell");
+    assert!(
+        !bench.autopilot.true_state().armed && bench.autopilot.true_state().position.z < 0.31,
+        "it fell"
+    );
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! The multicopter itself: what its controller demands and how it moves.
 //!
-//! The controller is the cascade of PX4's `mc_pos_control`: position P, velocity PID (integral with anti-windup,
-//! derivative on measured acceleration), and the acceleration it asks for bounded by tilt and thrust. The airframe answers through
-//! a jerk limit and a first-order lag (attitude and motors together), and drag towards the wind. Because drag is not
-//! fed forward, a velocity asked for is flown 10–20 % slow until the integral has caught up, as PX4 was seen to do.
+//! The controller is the cascade of PX4's `mc_pos_control`: position P, velocity PID (integral with
+//! anti-windup, derivative on measured acceleration), and the acceleration it asks for bounded by
+//! tilt and thrust. The airframe answers through a jerk limit and a first-order lag (attitude and
+//! motors together), and drag towards the wind. Because drag is not fed forward, a velocity asked
+//! for is flown 10–20 % slow until the integral has caught up, as PX4 was seen to do.
 //!
 //! ENU, metres, seconds. One step is about a hundred floating-point operations; no trigonometry.
 
@@ -47,9 +48,11 @@ pub struct VehicleLimits {
 }
 
 impl Default for VehicleLimits {
-    /// PX4's quadrotor defaults, and the drag of its SIH (`SIH_KDV` 1 N s/m at `SIH_MASS` 1 kg), with which the recorded flights are
-    /// flown again to 0.2 m. No real vehicle has that much, so wind moves it half as much, and still rather too much: PX4's estimator assumes 0.17 1/s at 3 m/s (`EKF2_MCOEF` 0.15 1/s beside
-    /// `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured at 0.39 and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
+    /// PX4's quadrotor defaults, and the drag of its SIH (`SIH_KDV` 1 N s/m at `SIH_MASS` 1 kg),
+    /// with which the recorded flights are flown again to 0.2 m. No real vehicle has that much, so
+    /// wind moves it half as much, and still rather too much: PX4's estimator assumes 0.17 1/s at 3
+    /// m/s (`EKF2_MCOEF` 0.15 1/s beside `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured at 0.39
+    /// and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
     fn default() -> Self {
         Self {
             radius_m: 0.3,
@@ -110,11 +113,13 @@ pub struct Demand {
     pub climb_max: f32,
     /// Bound on sinking, m/s.
     pub descend_max: f32,
-    /// Acceleration up that is flown whatever else is asked for, m/s²; NaN leaves height to the cascade.
+    /// Acceleration up that is flown whatever else is asked for, m/s²; NaN leaves height to the
+    /// cascade.
     pub lift_off: f32,
     /// Least thrust as a share of the weight.
     pub thrust_min: f32,
-    /// Share of the change of the height in the rate of climb that is controlled, 0 to 1; the rest is the estimated velocity.
+    /// Share of the change of the height in the rate of climb that is controlled, 0 to 1; the rest
+    /// is the estimated velocity.
     pub height_rate_share: f32,
 }
 
@@ -221,14 +226,21 @@ impl Vehicle {
     }
 
     /// Runs the cascade for one step from the *estimated* position and velocity.
-    pub fn control(&mut self, demand: &Demand, gains: &Gains, position: &Point, velocity: &Point, dt: f32) {
+    pub fn control(
+        &mut self,
+        demand: &Demand,
+        gains: &Gains,
+        position: &Point,
+        velocity: &Point,
+        dt: f32,
+    ) {
         let mut wanted = Point::zeros();
         for axis in 0..3 {
             let gain = gains.position[usize::from(axis == 2)];
             let feed = demand.velocity[axis];
             let error = demand.position[axis] - position[axis];
-            wanted[axis] =
-                if error.is_nan() { 0.0 } else { error * gain } + if feed.is_nan() { 0.0 } else { feed };
+            wanted[axis] = if error.is_nan() { 0.0 } else { error * gain }
+                + if feed.is_nan() { 0.0 } else { feed };
         }
         let speed = libm::sqrtf(wanted.x * wanted.x + wanted.y * wanted.y);
         if speed > demand.speed_max {
@@ -256,7 +268,8 @@ impl Vehicle {
         // Thrust never reverses and gives at most twice the weight (hover at half throttle).
         let bounded_z = asked.z.clamp((demand.thrust_min - 1.0) * GRAVITY, GRAVITY);
         let across = libm::sqrtf(asked.x * asked.x + asked.y * asked.y);
-        let across_max = ((bounded_z + GRAVITY) * gains.tilt_tan).min(self.limits.acceleration_max_mps2);
+        let across_max =
+            ((bounded_z + GRAVITY) * gains.tilt_tan).min(self.limits.acceleration_max_mps2);
         let saturated_z = bounded_z != asked.z;
         let saturated_xy = across > across_max;
         asked.z = bounded_z;
@@ -269,8 +282,9 @@ impl Vehicle {
             // Anti-windup: while saturated only what shrinks the integral is added.
             if !saturated || error[axis] * asked[axis] < 0.0 {
                 let k = usize::from(axis == 2);
-                self.integral[axis] =
-                    (self.integral[axis] + gains.velocity_i[k] * error[axis] * dt).clamp(-GRAVITY, GRAVITY);
+                self.integral[axis] = (self.integral[axis]
+                    + gains.velocity_i[k] * error[axis] * dt)
+                    .clamp(-GRAVITY, GRAVITY);
             }
         }
         self.acceleration_setpoint = asked;
@@ -289,8 +303,8 @@ impl Vehicle {
         self.state.heading_rad = wrap_pi(self.state.heading_rad + self.state.heading_rate * dt);
     }
 
-    /// Moves the body for one step. `lift` is false while the motors idle or are off; the ground under the body lies at
-    /// `ground_up_m`.
+    /// Moves the body for one step. `lift` is false while the motors idle or are off; the ground
+    /// under the body lies at `ground_up_m`.
     pub fn advance(&mut self, lift: bool, wind: &Point, ground_up_m: f32, dt: f32) {
         let rest = f64::from(ground_up_m + self.limits.radius_m);
         let clearance = (self.position.z - rest) as f32;
@@ -299,9 +313,11 @@ impl Vehicle {
         let step = (target - self.thrust) * blend;
         let most = self.limits.jerk_max_mps3 * dt;
         let norm = step.norm_squared();
-        self.thrust += if lift && norm > most * most { step * (most / libm::sqrtf(norm)) } else { step };
+        self.thrust +=
+            if lift && norm > most * most { step * (most / libm::sqrtf(norm)) } else { step };
 
-        let push = wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE)) * self.limits.wind_per_s;
+        let push =
+            wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE)) * self.limits.wind_per_s;
         let mut acceleration = self.thrust + push - self.state.velocity * self.limits.drag_per_s;
         if clearance <= GROUND_CONTACT_M && acceleration.z <= 0.0 {
             // The ground carries what thrust does not, and friction holds the feet.
@@ -324,7 +340,8 @@ impl Vehicle {
         self.drain_battery(lift, dt);
     }
 
-    /// Power grows with the acceleration beyond hovering and, slightly, with speed; idle motors and the board take 4 %.
+    /// Power grows with the acceleration beyond hovering and, slightly, with speed; idle motors and
+    /// the board take 4 %.
     fn drain_battery(&mut self, lift: bool, dt: f32) {
         let load = if lift {
             power_ratio_at_speed(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0)
@@ -387,7 +404,8 @@ mod tests {
     fn fly(vehicle: &mut Vehicle, demand: &Demand, wind: Point, seconds: f32) -> (f32, f32) {
         let (mut fastest, mut worst_jerk) = (0.0_f32, 0.0_f32);
         for _ in 0..(seconds / DT) as usize {
-            let (p, v, before) = (vehicle.state().position, vehicle.state().velocity, vehicle.thrust);
+            let (p, v, before) =
+                (vehicle.state().position, vehicle.state().velocity, vehicle.thrust);
             vehicle.control(demand, &GAINS, &p, &v, DT);
             vehicle.advance(true, &wind, 0.0, DT);
             fastest = fastest.max(vehicle.state().velocity.norm());

@@ -1,8 +1,9 @@
 //! Reading payloads by field.
 //!
-//! The crate's types refuse a whole message for one enum value they do not know (a COMMAND_LONG with an unknown command,
-//! say), but such a command has to be answered UNSUPPORTED. So what comes in is read at the byte offsets of the wire
-//! order (fields sorted by size, extensions last); what V2 cut from the end reads as zero.
+//! The crate's types refuse a whole message for one enum value they do not know (a COMMAND_LONG
+//! with an unknown command, say), but such a command has to be answered UNSUPPORTED. So what comes
+//! in is read at the byte offsets of the wire order (fields sorted by size, extensions last); what
+//! V2 cut from the end reads as zero.
 
 use super::frame::Frame;
 

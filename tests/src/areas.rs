@@ -10,7 +10,8 @@ type Corner = [f64; 2];
 pub enum Shape {
     /// Convex, without holes and zones.
     Convex,
-    /// Concave, with up to three holes and up to three no-fly zones that may cut the border and each other.
+    /// Concave, with up to three holes and up to three no-fly zones that may cut the border and
+    /// each other.
     Any,
 }
 
@@ -26,7 +27,8 @@ pub fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
 
 /// A polygon that is seen whole from its middle.
 fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> Vec<Corner> {
-    let mut angles: Vec<f64> = (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
+    let mut angles: Vec<f64> =
+        (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
     angles.sort_by(f64::total_cmp);
     let least = between(random, 0.15, 0.9);
     let corner = |angle: f64| {
@@ -38,7 +40,8 @@ fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> V
 
 /// The convex hull of random places.
 fn convex(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Corner> {
-    let mut angles: Vec<f64> = (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
+    let mut angles: Vec<f64> =
+        (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
     angles.sort_by(f64::total_cmp);
     let turn = between(random, 0.0, std::f64::consts::TAU);
     let corner = |angle: f64| {
@@ -56,11 +59,13 @@ fn list(rings: &[Vec<Corner>]) -> String {
     rings.iter().map(ring).collect::<Vec<_>>().join(", ")
 }
 
-/// The same to be flown: pictures overlap enough for vehicles that stray, and autopilots, wind, estimates and radio vary.
+/// The same to be flown: pictures overlap enough for vehicles that stray, and autopilots, wind,
+/// estimates and radio vary.
 pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = scenario(random, shape, vehicles);
     let overlaps = text.lines().filter(|line| line.starts_with("overlap_"));
-    let plain: String = overlaps.fold(text.clone(), |text, line| text.replacen(&format!("{line}\n"), "", 1));
+    let plain: String =
+        overlaps.fold(text.clone(), |text, line| text.replacen(&format!("{line}\n"), "", 1));
     let (front, side) = (between(random, 0.5, 0.8), between(random, 0.4, 0.7));
     let cruise = between(random, 2.0, 8.0);
     let place = format!(
@@ -69,7 +74,10 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let mut text = plain.replace("[mission]\ncruise_mps = 5.0\n", &place);
     let trigger = ["distance", "waypoint"][(random.next_u32() % 2) as usize];
     let heading = ["sweep", "lane"][(random.next_u32() % 2) as usize];
-    text = text.replace("camera = ", &format!("trigger = \"{trigger}\"\nheading = \"{heading}\"\ncamera = "));
+    text = text.replace(
+        "camera = ",
+        &format!("trigger = \"{trigger}\"\nheading = \"{heading}\"\ncamera = "),
+    );
     let autopilot = ["px4", "ardupilot"][(random.next_u32() % 2) as usize];
     text = text.replace(
         "speed_max_mps",
@@ -84,7 +92,8 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     )
 }
 
-/// The same, as far and as fast as surveys are flown: up to 15 m/s and 120 m, and in places wide apart.
+/// The same, as far and as fast as surveys are flown: up to 15 m/s and 120 m, and in places wide
+/// apart.
 pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = flown(random, shape, vehicles);
     let drawn = |line: &str| match line.split(" = ").next() {
@@ -112,13 +121,16 @@ pub fn large(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     text.lines().map(drawn).collect()
 }
 
-/// A random convex area for so many vehicles, of which the radio loses a share of messages: minutes of work for each.
+/// A random convex area for so many vehicles, of which the radio loses a share of messages: minutes
+/// of work for each.
 pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     let mut text = flown(random, Shape::Convex, vehicles);
     let keep = |line: &&str| !line.starts_with("radio_loss") && !line.starts_with("cruise_mps");
     text = text.lines().filter(keep).map(|line| format!("{line}\n")).collect();
-    text =
-        text.replace("[mission]\n", &format!("[mission]\ncruise_mps = {:.1}\n", between(random, 3.0, 6.0)));
+    text = text.replace(
+        "[mission]\n",
+        &format!("[mission]\ncruise_mps = {:.1}\n", between(random, 3.0, 6.0)),
+    );
     text = text.replace("time_limit_s = 7200.0", "time_limit_s = 3600.0");
     // A wider separation takes worse estimates.
     let separation = format!("separation_m = {:.1}", between(random, 3.6, 8.0));
@@ -126,7 +138,8 @@ pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     text + &format!("radio_loss = {loss}\n")
 }
 
-/// The same without a camera: lanes as wide as a picture, and pictures that overlap along them, little or not at all.
+/// The same without a camera: lanes as wide as a picture, and pictures that overlap along them,
+/// little or not at all.
 pub fn without_overlap(random: &mut impl Rng, text: &str) -> String {
     let lane_m = between(random, 4.0, 20.0);
     let share = if random.next_u32().is_multiple_of(2) { 1.0 } else { between(random, 0.4, 1.0) };
@@ -136,7 +149,8 @@ pub fn without_overlap(random: &mut impl Rng, text: &str) -> String {
     rest.replacen("height_m", &spacing, 1)
 }
 
-/// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a hole outside.
+/// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a
+/// hole outside.
 pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let radius = between(random, 40.0, 250.0);
     let count = 3 + (random.next_u32() % 20) as usize;
@@ -169,7 +183,9 @@ pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String 
     let height = between(random, 15.0, 60.0);
     let (front, side) = (between(random, 0.1, 0.8), between(random, 0.1, 0.7));
     text += &format!("camera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = {height:.1}\n");
-    text += &format!("overlap_front = {front:.2}\noverlap_side = {side:.2}\n[mission]\ncruise_mps = 5.0\n");
+    text += &format!(
+        "overlap_front = {front:.2}\noverlap_side = {side:.2}\n[mission]\ncruise_mps = 5.0\n"
+    );
     let base = [0, 1].map(|_| between(random, -1.2, 1.2) * radius);
     let scattered = random.next_u32().is_multiple_of(2);
     for id in 1..=vehicles {

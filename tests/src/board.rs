@@ -20,11 +20,13 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Where a map for measurements lies.
 const MAP: u32 = 0x6080_0000;
 
-/// A program for the board `qemu`, from the directory that `FLOCKMATE_FIRMWARE` names, as seen from the checkout; `None` with a line
-/// that says what is skipped.
+/// A program for the board `qemu`, from the directory that `FLOCKMATE_FIRMWARE` names, as seen from
+/// the checkout; `None` with a line that says what is skipped.
 pub fn program(name: &str) -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("FLOCKMATE_FIRMWARE") else {
-        println!("skipped: FLOCKMATE_FIRMWARE names no built firmware (`cargo xtask test` builds it)");
+        println!(
+            "skipped: FLOCKMATE_FIRMWARE names no built firmware (`cargo xtask test` builds it)"
+        );
         return None;
     };
     Some(workspace().join(folder).join(name))
@@ -53,7 +55,10 @@ pub fn map_image(grid: &VoxelGrid<'_>) -> Vec<u8> {
     let numbers = shape.min.iter().chain([&shape.resolution_m]).flat_map(|x| x.to_le_bytes());
     let words = grid.words();
     let count = (words.len() as u32).to_le_bytes();
-    dims.chain(numbers).chain(count).chain(words.iter().flat_map(|word| word.to_le_bytes())).collect()
+    dims.chain(numbers)
+        .chain(count)
+        .chain(words.iter().flat_map(|word| word.to_le_bytes()))
+        .collect()
 }
 
 /// What `measure` or `calls` says of a roadmap file and a map, line by line.
@@ -70,7 +75,14 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     let (roadmap, map) = (file("roadmap.bin", roadmap), file("map.bin", map));
     // An instruction takes a nanosecond of the board's time.
     let out = qemu(program)
-        .args(["-monitor", "none", "-icount", "shift=0", "-semihosting-config", "enable=on,target=native"])
+        .args([
+            "-monitor",
+            "none",
+            "-icount",
+            "shift=0",
+            "-semihosting-config",
+            "enable=on,target=native",
+        ])
         .args(["-device", &loader(&roadmap, BANK2), "-device", &loader(&map, MAP)])
         .output()
         .expect("qemu-system-arm runs");
@@ -86,7 +98,14 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
 pub fn by_the_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
     let ports = [free_port(), free_port()];
     let mut qemu = qemu(program);
-    qemu.args(["-monitor", "none", "-icount", "shift=4", "-semihosting-config", "enable=on,target=native"]);
+    qemu.args([
+        "-monitor",
+        "none",
+        "-icount",
+        "shift=4",
+        "-semihosting-config",
+        "enable=on,target=native",
+    ]);
     for port in ports {
         qemu.args(["-serial", &format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on")]);
     }
@@ -109,12 +128,14 @@ pub fn put_on_boards(mission: &mut Mission, program: &Path, folder: &Path) {
     }
 }
 
-/// All of a flight that anybody can see: its result, what was said and when, and where everybody was.
+/// All of a flight that anybody can see: its result, what was said and when, and where everybody
+/// was.
 ///
 /// # Panics
 /// The result cannot be written.
 pub fn record(flight: &Flight) -> String {
     let result = serde_json::to_string(&flight.result).expect("a result");
-    let log: Vec<_> = flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();
+    let log: Vec<_> =
+        flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();
     format!("{result}\n{log:?}\n{:?}", flight.tracks)
 }

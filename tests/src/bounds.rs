@@ -1,4 +1,5 @@
-//! What bounds the work of every public call of planner-core and companion, and what an emulated board counted.
+//! What bounds the work of every public call of planner-core and companion, and what an emulated
+//! board counted.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -17,8 +18,9 @@ use crate::{board, workspace};
 /// Where the table of worst cases is, seen from the checkout.
 pub const PAGE: &str = "docs/worst-case.md";
 
-/// What the board's program `calls` calls each call, and what bounds its work: n nodes, h half-edges, w = 64 waypoints, g = 128 gates,
-/// v = 32 vehicles, p = 2048 pieces of flights, d metres of segment, c cells of a map.
+/// What the board's program `calls` calls each call, and what bounds its work: n nodes, h
+/// half-edges, w = 64 waypoints, g = 128 gates, v = 32 vehicles, p = 2048 pieces of flights, d
+/// metres of segment, c cells of a map.
 pub const BOUNDS: &[(&str, &str)] = &[
     ("frames::enu_to_geodetic", "constant: 5 rounds"),
     ("frames::geodetic_to_enu", "constant"),
@@ -107,9 +109,15 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("a coverage plan, 3", "`build` and `powell`"),
     ("left and binpat, 3", "`divide::remaining_lanes`, lanes · v, and one `binpat`"),
     ("left and binpat, 32", "the same"),
-    ("planner::coverage::plan_flights, 3", "`set_area`, `build`, one `binpat`, `flights::plan_flights`"),
+    (
+        "planner::coverage::plan_flights, 3",
+        "`set_area`, `build`, one `binpat`, `flights::plan_flights`",
+    ),
     ("planner::coverage::plan_flights, 3, zones", "the same"),
-    ("planner::coverage::plan_flights, 3 after two losses", "the same, and `losses::redivide_work` for each"),
+    (
+        "planner::coverage::plan_flights, 3 after two losses",
+        "the same, and `losses::redivide_work` for each",
+    ),
     ("planner::coverage::plan_flights, 3 after two losses, zones", "the same"),
     (
         "flights::plan_flights, 3",
@@ -184,10 +192,12 @@ impl Meter for Uncounted {
     }
 }
 
-/// Runs the board's program `calls` on the demo's roadmap and a map of the building; what it counted, by name.
+/// Runs the board's program `calls` on the demo's roadmap and a map of the building; what it
+/// counted, by name.
 ///
 /// # Errors
-/// The demo cannot be prepared, the program says something else, or its coverage plans are not the desk's, bit by bit.
+/// The demo cannot be prepared, the program says something else, or its coverage plans are not the
+/// desk's, bit by bit.
 pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
@@ -195,8 +205,11 @@ pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
     let lines = board::measure(program, &mission.roadmap_file, &board::map_image(&map.grid()));
     let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());
     let mut scratch = Box::new(WorkspaceOverlay::new());
-    let flights =
-        coverage_flights::measure_coverage_flights(&mut Uncounted, &mut scratch, &mut Box::default());
+    let flights = coverage_flights::measure_coverage_flights(
+        &mut Uncounted,
+        &mut scratch,
+        &mut Box::default(),
+    );
     let desk = format!("coverage {calls:08x} {flights:08x}");
     ensure!(
         lines.contains(&desk),
@@ -230,10 +243,16 @@ pub fn parts(page: &str) -> Result<[&str; 3]> {
 /// # Errors
 /// A call of [`BOUNDS`] was not counted.
 pub fn table(calls: &HashMap<String, Seen>) -> Result<String> {
-    let mut table = "| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|\n".to_owned();
+    let mut table =
+        "| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|\n".to_owned();
     for (name, bound) in BOUNDS {
         let call = calls.get(*name).with_context(|| format!("{name} was not counted"))?;
-        writeln!(table, "| `{name}` | {bound} | {} | {} |", rounded(call.instructions), call.bytes)?;
+        writeln!(
+            table,
+            "| `{name}` | {bound} | {} | {} |",
+            rounded(call.instructions),
+            call.bytes
+        )?;
     }
     Ok(table)
 }
@@ -245,8 +264,9 @@ pub fn rounded(count: u64) -> String {
         unit *= 10;
     }
     let count = count.div_ceil(unit) * unit;
-    let short =
-        |one: u64, name| format!("{:.*} {name}", usize::from(count < 10 * one), count as f64 / one as f64);
+    let short = |one: u64, name| {
+        format!("{:.*} {name}", usize::from(count < 10 * one), count as f64 / one as f64)
+    };
     match count {
         0..1000 => count.to_string(),
         1000..1_000_000 => short(1000, "k"),

@@ -1,4 +1,5 @@
-//! The largest costs of the methods that divide an area, on random convex areas for 2 to 10 vehicles.
+//! The largest costs of the methods that divide an area, on random convex areas for 2 to 10
+//! vehicles.
 
 use std::ops::Range;
 
@@ -37,7 +38,8 @@ impl Costs {
     pub fn of(seeds: Range<u64>) -> Self {
         let mut all: Vec<[f32; 4]> = seeds.into_par_iter().filter_map(costs).collect();
         assert!(!all.is_empty(), "no area could be planned");
-        let over = |a: usize, b: usize| all.iter().filter(|costs| costs[a] > costs[b] * ROUNDING).count();
+        let over =
+            |a: usize, b: usize| all.iter().filter(|costs| costs[a] > costs[b] * ROUNDING).count();
         let (powell_over_binpat, powell_over_simple) = (over(2, 1), over(2, 0));
         let below_exact = (0..3).map(|method| over(3, method)).sum();
         let gaps = [0, 1, 2].map(|method| {
@@ -54,7 +56,8 @@ fn costs(seed: u64) -> Option<[f32; 4]> {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);
     let scenario = scenario::parse(&text, "random").ok()?;
-    let cost = |method| CoveragePlan::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
+    let cost =
+        |method| CoveragePlan::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
     let bound_s = CoveragePlan::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
     let costs = [
         cost(Method::SimpleBinpat)?,
@@ -62,6 +65,9 @@ fn costs(seed: u64) -> Option<[f32; 4]> {
         cost(Method::PowellBinpat)?,
         cost(Method::Exact)?,
     ];
-    assert!(costs.iter().all(|cost| *cost >= bound_s * 0.9999), "seed {seed}: {costs:?} below {bound_s}");
+    assert!(
+        costs.iter().all(|cost| *cost >= bound_s * 0.9999),
+        "seed {seed}: {costs:?} below {bound_s}"
+    );
     Some(costs)
 }

@@ -11,8 +11,8 @@ use host_sim::result::MissionResult;
 use host_sim::swarm::Flight;
 use host_sim::{scenario, swarm};
 
-/// Reason why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the
-/// lost one hovers where it was to fly.
+/// Reason why a vehicle that was not struck lands short of its part: the rule for those that no
+/// majority hears, or the lost one hovers where it was to fly.
 pub const EXPLAINED: [&str; 10] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
@@ -29,12 +29,16 @@ pub const EXPLAINED: [&str; 10] = [
 /// Reason why a vehicle lands beside its pad: another one may lie there, or come down.
 pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
 
-/// When the last of the other vehicles began to land, or to fly home, by [`lines`]: nobody takes over what this vehicle leaves later.
+/// When the last of the other vehicles began to land, or to fly home, by [`lines`]: nobody takes
+/// over what this vehicle leaves later.
 pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     let mut ended: Vec<(&str, f64)> = Vec::new();
-    for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home")) {
+    for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home"))
+    {
         let mut words = line.split_whitespace();
-        let (Some(Ok(at_s)), Some(who)) = (words.next().map(str::parse), words.next()) else { continue };
+        let (Some(Ok(at_s)), Some(who)) = (words.next().map(str::parse), words.next()) else {
+            continue;
+        };
         if who != format!("Some({vehicle})") && ended.iter().all(|(first, _)| *first != who) {
             ended.push((who, at_s));
         }
@@ -45,7 +49,9 @@ pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
 /// Whether this vehicle itself said why it lands short of its part, by [`lines`].
 pub fn says(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
     let own = format!(" Some({vehicle}) ");
-    log.lines().filter(|line| line.contains(&own)).any(|line| reasons.iter().any(|row| line.contains(row)))
+    log.lines()
+        .filter(|line| line.contains(&own))
+        .any(|line| reasons.iter().any(|row| line.contains(row)))
 }
 
 /// Flies a coverage mission: its result with what its pictures show, and what was said.
@@ -98,7 +104,8 @@ pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
 /// What was said that matters.
 pub fn lines(log: &[Event]) -> String {
     let mut lines = String::new();
-    for event in log.iter().filter(|event| event.text.contains(':') || event.level == Level::Error) {
+    for event in log.iter().filter(|event| event.text.contains(':') || event.level == Level::Error)
+    {
         let _ = writeln!(lines, "{:8.2} {:?} {}", event.t_s, event.vehicle, event.text);
     }
     lines

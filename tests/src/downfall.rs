@@ -13,7 +13,8 @@ const STACK_END: u32 = 0x2008_A000;
 const SPARE: u32 = STACK_END + 0x100;
 /// Less than an interrupt takes of a stack.
 const STACK_LEFT: u32 = 8;
-/// End of the name of a function of `core` that does nothing but panic, at the place that it is given.
+/// End of the name of a function of `core` that does nothing but panic, at the place that it is
+/// given.
 const PANICS: &str = "panic_const_div_by_zero";
 /// That place.
 const PLACE: &[u8] = b"downfall.rs";
@@ -29,8 +30,10 @@ const PATIENCE: Duration = Duration::from_secs(120);
 const SPIN: &[u16] = &[0xB672, 0xE7FE];
 /// `mov sp, r0`, then `push {r0-r7, lr}`.
 const PUSH: &[u16] = &[0x4685, 0xB5FF];
-/// 0x05FA_0004 (SYSRESETREQ) into AIRCR at 0xE000_ED0C, then a branch to itself: `movw`, `movt` of `r1` and `r0`, `str r0, [r1]`.
-const RESET: &[u16] = &[0xF64E, 0x510C, 0xF2CE, 0x0100, 0xF240, 0x0004, 0xF2C0, 0x50FA, 0x6008, 0xE7FE];
+/// 0x05FA_0004 (SYSRESETREQ) into AIRCR at 0xE000_ED0C, then a branch to itself: `movw`, `movt` of
+/// `r1` and `r0`, `str r0, [r1]`.
+const RESET: &[u16] =
+    &[0xF64E, 0x510C, 0xF2CE, 0x0100, 0xF240, 0x0004, 0xF2C0, 0x50FA, 0x6008, 0xE7FE];
 /// `subs r0, #1`, back while it is not zero, and return: two instructions each time.
 const COUNT: &[u16] = &[0x3801, 0xD1FD, 0x4770];
 /// How long each time takes, at 2 ns an instruction.
@@ -70,8 +73,8 @@ impl Downfall {
         Duration::from_secs(u64::from(self == Self::Hang))
     }
 
-    /// Brings a board with this program down: it has started again when this returns, and its flash keeps what it holds, torn
-    /// words too.
+    /// Brings a board with this program down: it has started again when this returns, and its flash
+    /// keeps what it holds, torn words too.
     ///
     /// # Panics
     /// It does not start again by itself. The program has no function that panics by itself.
@@ -115,14 +118,16 @@ pub fn break_planner(board: &mut EmulatedBoard, program: &Path) {
     board.write_memory(function(program, PLANS), &UNDEFINED.to_le_bytes()).expect("a board");
 }
 
-/// Has a board's planner take so much longer, until the next start: where it begins, a branch leads to code that counts.
+/// Has a board's planner take so much longer, until the next start: where it begins, a branch leads
+/// to code that counts.
 ///
 /// # Panics
 /// The program has no planner.
 pub fn slow_planner(board: &mut EmulatedBoard, program: &Path, time: Duration) {
     let plans = function(program, PLANS);
     let begins = board.read_memory(plans, 16).expect("a board");
-    let halves: Vec<u16> = begins.chunks(2).map(|half| u16::from_le_bytes([half[0], half[1]])).collect();
+    let halves: Vec<u16> =
+        begins.chunks(2).map(|half| u16::from_le_bytes([half[0], half[1]])).collect();
     // `ldr.w pc, [pc]` and the address after it: eight bytes, or ten where a half word fills up.
     let (fills, mut moved) = (usize::from(!plans.is_multiple_of(4)), 0);
     while moved < 4 + fills {
@@ -130,8 +135,8 @@ pub fn slow_planner(board: &mut EmulatedBoard, program: &Path, time: Duration) {
     }
     let far = |address: u32| [0xF8DF, 0xF000, address as u16, (address >> 16) as u16];
     let times = (time.as_nanos() as u64 / COUNT_NS) as u32;
-    // `push {r0}`, `ldr r0` of the word that is jumped over, `subs`, `bne`, `pop {r0}`, what the branch took the place of, and
-    // back.
+    // `push {r0}`, `ldr r0` of the word that is jumped over, `subs`, `bne`, `pop {r0}`, what the
+    // branch took the place of, and back.
     let mut code = vec![0xB401, 0x4801, 0xE002, 0xBF00, times as u16, (times >> 16) as u16];
     code.extend([0x3801, 0xD1FD, 0xBC01]);
     code.extend(&halves[..moved]);
@@ -171,7 +176,9 @@ fn function(program: &Path, part: &str) -> u32 {
     // Closures of a function, and what is made for them, have its name in theirs.
     let ends = |name: &str| name.split(".llvm").next().is_some_and(|name| name.ends_with(part));
     let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(ends);
-    let symbol =
-        elf.symbols().find(named).unwrap_or_else(|| panic!("no function has a name that ends in {part}"));
+    let symbol = elf
+        .symbols()
+        .find(named)
+        .unwrap_or_else(|| panic!("no function has a name that ends in {part}"));
     symbol.address() as u32 & !1
 }

@@ -1,8 +1,9 @@
 //! Vehicles that fail where their radio no longer reaches the others.
 //!
-//! A flight of the demo with a short radio range, drawn by its seed, is flown once without a fault. Of that flight every moment
-//! is a candidate at which a vehicle on its path leaves the range of all others. Near one of them, from 3 s before to 12 s after, a
-//! fault strikes it, and the flight is flown again. Judged by the truth.
+//! A flight of the demo with a short radio range, drawn by its seed, is flown once without a fault.
+//! Of that flight every moment is a candidate at which a vehicle on its path leaves the range of
+//! all others. Near one of them, from 3 s before to 12 s after, a fault strikes it, and the flight
+//! is flown again. Judged by the truth.
 
 use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
@@ -28,7 +29,8 @@ pub const SCRIPTS: [&str; 9] = [
     "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD",
 ];
 
-/// A mission with a short radio range, its plan, and when each vehicle leaves the range of all others.
+/// A mission with a short radio range, its plan, and when each vehicle leaves the range of all
+/// others.
 pub struct Edge {
     /// How far the radio reaches, metres.
     pub range_m: f32,
@@ -115,7 +117,8 @@ fn leaves(flight: &Flight, range_m: f32) -> Vec<(f32, usize)> {
         let mut was_alone = true;
         for (k, (t_s, place)) in own.iter().enumerate() {
             let others = tracks.iter().enumerate().filter(|(j, _)| *j != i);
-            let mut others = others.filter_map(|(_, track)| track.get(k.min(track.len().saturating_sub(1))));
+            let mut others =
+                others.filter_map(|(_, track)| track.get(k.min(track.len().saturating_sub(1))));
             let alone = others.all(|(_, other)| (other - place).norm() > range_m);
             let moves = own.get(k + 5).is_some_and(|(_, later)| (later - place).norm() > 0.5);
             if alone && !was_alone && moves {
@@ -132,7 +135,8 @@ fn judge(flight: &Flight, struck: u8) -> Outcome {
     for e in &flight.log {
         let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
         outcome.log.push(text.clone());
-        let by_struck = e.vehicle == Some(struck) || e.text.ends_with(&format!(" vehicle {struck}"));
+        let by_struck =
+            e.vehicle == Some(struck) || e.text.ends_with(&format!(" vehicle {struck}"));
         let own_wall = e.text.contains("touches an obstacle") && e.vehicle == Some(struck);
         if e.text.contains("nearer than") && by_struck {
             outcome.near_struck.push(text);

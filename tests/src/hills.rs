@@ -25,8 +25,10 @@ impl Hills {
         let hills: Vec<[f64; 4]> = (0..random.next_u32() % 12)
             .map(|_| {
                 let at = || 2.0 * HALF_M;
-                let place = [areas::unit(random) * at() - HALF_M, areas::unit(random) * at() - HALF_M];
-                let (wide, high) = (20.0 + 200.0 * areas::unit(random), most_m * (areas::unit(random) - 0.3));
+                let place =
+                    [areas::unit(random) * at() - HALF_M, areas::unit(random) * at() - HALF_M];
+                let (wide, high) =
+                    (20.0 + 200.0 * areas::unit(random), most_m * (areas::unit(random) - 0.3));
                 [place[0], place[1], wide, high]
             })
             .collect();
@@ -40,7 +42,8 @@ impl Hills {
                 let hill = |[x, y, wide, high]: &[f64; 4]| {
                     high * (-((at[0] - x).powi(2) + (at[1] - y).powi(2)) / (wide * wide)).exp()
                 };
-                let noise = if areas::unit(random) < share { rough * areas::unit(random) } else { 0.0 };
+                let noise =
+                    if areas::unit(random) < share { rough * areas::unit(random) } else { 0.0 };
                 let smooth: f64 = hills.iter().map(hill).sum();
                 let height = 300.0 + smooth + tilt[0] * at[0] + tilt[1] * at[1] + noise;
                 heights_m.push((height * 100.0).round() / 100.0);
@@ -73,8 +76,10 @@ impl Hills {
     /// A scenario with these hills under its area, written to a file, and its vehicles on them.
     pub fn under(&self, text: &str, path: &Path, tolerance_m: f64) -> String {
         std::fs::write(path, self.asc()).expect("there is room");
-        let terrain =
-            format!("terrain = \"{}\"\nterrain_tolerance_m = {tolerance_m:.1}\ncamera = ", path.display());
+        let terrain = format!(
+            "terrain = \"{}\"\nterrain_tolerance_m = {tolerance_m:.1}\ncamera = ",
+            path.display()
+        );
         let origin_m = self.at(0.0, 0.0);
         let stand = |line: &str| match line.strip_prefix("start = [") {
             Some(numbers) => {

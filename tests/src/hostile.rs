@@ -1,15 +1,18 @@
-//! Forged frames, given to a companion in flight: right checksums, any sender but a ground station, the autopilot's own ids
-//! among them, fields random and at their bounds.
+//! Forged frames, given to a companion in flight: right checksums, any sender but a ground station,
+//! the autopilot's own ids among them, fields random and at their bounds.
 //!
-//! What must hold: no panic; every setpoint finite, inside the fence and near the last one; nothing armed without a start; the
-//! pilot's mode left alone; answers bounded. One target ([`attack`]) serves the fuzzer and the bench.
+//! What must hold: no panic; every setpoint finite, inside the fence and near the last one; nothing
+//! armed without a start; the pilot's mode left alone; answers bounded. One target ([`attack`])
+//! serves the fuzzer and the bench.
 
 use core::ops::Range;
 
 use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
-use companion::{COMPANION_COMPONENT, Companion, Config, Duration, Event, Instant, Link, RosterEntry, State};
+use companion::{
+    COMPANION_COMPONENT, Companion, Config, Duration, Event, Instant, Link, RosterEntry, State,
+};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
@@ -33,8 +36,28 @@ const STEP: Duration = Duration::from_millis(25);
 /// More than this in a second of simulated time is no bounded answer, frames to each link.
 const ANSWERS_MOST: [u32; 2] = [200, 60];
 /// Messages that a companion reads, and one that it does not.
-const READ: [u32; 20] =
-    [0, 1, 20, 21, 22, 23, 32, 33, 49, 66, 75, 76, 77, 110, 111, 193, 230, 245, 253, TUNNEL_DATA::ID];
+const READ: [u32; 20] = [
+    0,
+    1,
+    20,
+    21,
+    22,
+    23,
+    32,
+    33,
+    49,
+    66,
+    75,
+    76,
+    77,
+    110,
+    111,
+    193,
+    230,
+    245,
+    253,
+    TUNNEL_DATA::ID,
+];
 /// Speed of a setpoint, m/s.
 const SPEED_MPS: f32 = 2.2;
 
@@ -93,12 +116,16 @@ pub struct Flight {
 
 fn plan(over_area: bool) -> Plan16 {
     let mut path = Path::new();
-    for point in [Point::new(8.0, 12.0, 3.0), Point::new(20.0, 12.0, 3.0), Point::new(20.0, 30.0, 6.0)] {
+    for point in
+        [Point::new(8.0, 12.0, 3.0), Point::new(20.0, 12.0, 3.0), Point::new(20.0, 30.0, 6.0)]
+    {
         path.push(point, 1.5).expect("a short path");
     }
     let gates = heapless::Vec::new();
     let mut photographs = PicturePlan::new(3.0, HeadingMode::Ahead, Trigger::Distance);
-    photographs.add_stretch(1, 1, flight::WaypointRange { first: 0, end: 1 }).expect("room for one");
+    photographs
+        .add_stretch(1, 1, flight::WaypointRange { first: 0, end: 1 })
+        .expect("room for one");
     let task = if over_area { Task::Photograph(photographs) } else { Task::Goto(0) };
     Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }
@@ -124,7 +151,14 @@ impl Flight {
         let none = Limits { fence: None, ..limits };
         Self {
             companion: Victim::new(config).expect("a sound configuration"),
-            autopilot: Autopilot::new(kind, ID, (ORIGIN, ekf_origin), pad, 0, SetpointCheck::new(none)),
+            autopilot: Autopilot::new(
+                kind,
+                ID,
+                (ORIGIN, ekf_origin),
+                pad,
+                0,
+                SetpointCheck::new(none),
+            ),
             now: Instant::ZERO,
             started: false,
             framers: [Framer::new(), Framer::new()],
@@ -139,9 +173,11 @@ impl Flight {
         }
     }
 
-    /// One that has come to the phase of this number without an attack; from [`PHASES`] on the same over an area.
+    /// One that has come to the phase of this number without an attack; from [`PHASES`] on the same
+    /// over an area.
     pub fn at_phase(phase: usize) -> Self {
-        let kind = if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
+        let kind =
+            if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
         let mut flight = Self::new(kind, phase >= PHASES);
         let phase = phase % PHASES;
         flight.run(3.0);
@@ -279,7 +315,11 @@ impl Flight {
                 } else {
                     Ok(plan(self.over_area))
                 };
-                self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|failure| *failure));
+                self.companion.handle_plan(
+                    self.now,
+                    wanted,
+                    answer.as_ref().map_err(|failure| *failure),
+                );
             }
         }
     }
@@ -289,7 +329,8 @@ impl Flight {
         let mut input = bytes;
         let Some(frame) = self.framers[0].next(self.now, &mut input) else { return };
         if let Some(command) = frame.decode::<COMMAND_LONG_DATA>() {
-            let arms = command.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM && command.param1 == 1.0;
+            let arms =
+                command.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM && command.param1 == 1.0;
             if arms && !self.started {
                 self.broken("armed without a start");
             }
@@ -298,7 +339,9 @@ impl Flight {
             }
             let flies = matches!(
                 command.command,
-                MavCmd::MAV_CMD_DO_SET_MODE | MavCmd::MAV_CMD_NAV_TAKEOFF | MavCmd::MAV_CMD_NAV_LAND
+                MavCmd::MAV_CMD_DO_SET_MODE
+                    | MavCmd::MAV_CMD_NAV_TAKEOFF
+                    | MavCmd::MAV_CMD_NAV_LAND
             );
             if (flies || arms) && self.companion.state() == State::PilotControl {
                 self.broken(&format!("{:?} under the pilot", command.command));
@@ -319,16 +362,19 @@ impl Flight {
             if self.autopilot.mode != self.autopilot.kind.setpoint_mode() {
                 self.check.restart();
             }
-            // In a mode that is none of setpoints, as far as was reported, they go with the vehicle.
+            // In a mode that is none of setpoints, as far as was reported, they go with the
+            // vehicle.
             let telemetry = self.companion.telemetry();
-            self.check.follows = telemetry.custom_mode != telemetry.kind.unwrap_or_default().setpoint_mode();
+            self.check.follows =
+                telemetry.custom_mode != telemetry.kind.unwrap_or_default().setpoint_mode();
             self.check.urgent = self.companion.is_in_urgent_stop();
             self.check.take(self.now.as_micros() as f64 * 1e-6, &data);
         }
     }
 
-    /// Gives forged frames until the entropy or the number is spent. An attack has a theme: some of the links, some of the
-    /// messages, few or many frames a step; one that forges everything at once soon ends every mission.
+    /// Gives forged frames until the entropy or the number is spent. An attack has a theme: some of
+    /// the links, some of the messages, few or many frames a step; one that forges everything at
+    /// once soon ends every mission.
     pub fn attacked(mut self, entropy: &mut impl Entropy, frames: usize) -> Report {
         let mut left = frames;
         let bits = entropy.bits();

@@ -50,7 +50,8 @@ pub enum Profile {
     Release,
 }
 
-/// The Python with pymavlink and mavsdk that `FLOCKMATE_PYTHON` names, or `None` with a line that says what is skipped.
+/// The Python with pymavlink and mavsdk that `FLOCKMATE_PYTHON` names, or `None` with a line that
+/// says what is skipped.
 pub fn python() -> Option<String> {
     let python = std::env::var("FLOCKMATE_PYTHON").ok();
     if python.is_none() {
@@ -64,14 +65,22 @@ pub fn python() -> Option<String> {
 /// Builds `host-sim` and returns where it is: cargo gives another package's binaries to no test.
 pub fn host_sim(profile: Profile) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
-    build.current_dir(workspace()).args(["build", "--quiet", "--package", "host-sim", "--bin", "host-sim"]);
+    build.current_dir(workspace()).args([
+        "build",
+        "--quiet",
+        "--package",
+        "host-sim",
+        "--bin",
+        "host-sim",
+    ]);
     if profile == Profile::Release {
         build.arg("--release");
     }
     assert!(build.status().expect("cargo runs").success(), "host-sim does not build");
     let test = std::env::current_exe().expect("a test knows its own path");
     // TARGET/PROFILE/deps/TEST-HASH
-    let target = test.ancestors().nth(3).expect("tests lie three levels deep in the target directory");
+    let target =
+        test.ancestors().nth(3).expect("tests lie three levels deep in the target directory");
     target.join(if profile == Profile::Release { "release" } else { "debug" }).join("host-sim")
 }
 
@@ -100,7 +109,8 @@ impl Drop for Guard {
     }
 }
 
-/// Starts a `host-sim` that listens on as many links; it prints the address each got, `127.0.0.1:PORT` or a path.
+/// Starts a `host-sim` that listens on as many links; it prints the address each got,
+/// `127.0.0.1:PORT` or a path.
 ///
 /// # Panics
 /// It does not start.
@@ -131,8 +141,9 @@ pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
     listening(command, listen.len())
 }
 
-/// A port that nobody has now, of TCP and UDP, and that no other test of this process is given. Not one of those that the system
-/// hands out by itself: another process may be handed it before it is used.
+/// A port that nobody has now, of TCP and UDP, and that no other test of this process is given. Not
+/// one of those that the system hands out by itself: another process may be handed it before it is
+/// used.
 ///
 /// # Panics
 /// There is none.
@@ -142,19 +153,23 @@ pub fn free_port() -> u16 {
     let first = (std::process::id() % 100) as u16 * 100;
     let next = |_| 20_000 + (first + GIVEN.fetch_add(1, Ordering::Relaxed)) % 10_000;
     let free = |port: &u16| {
-        TcpListener::bind(("127.0.0.1", *port)).is_ok() && UdpSocket::bind(("127.0.0.1", *port)).is_ok()
+        TcpListener::bind(("127.0.0.1", *port)).is_ok()
+            && UdpSocket::bind(("127.0.0.1", *port)).is_ok()
     };
     (0..10_000).map(next).find(free).expect("one of so many is free")
 }
 
-/// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first on the path; `None` with a line that says so.
+/// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first on the path; `None` with a
+/// line that says so.
 pub fn chromium() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("FLOCKMATE_CHROMIUM") {
         return Some(named.into());
     }
     let path = std::env::var_os("PATH").unwrap_or_default();
     let names = ["chromium", "chromium-browser", "google-chrome"];
-    let found = std::env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|p| p.is_file());
+    let found = std::env::split_paths(&path)
+        .flat_map(|dir| names.map(|n| dir.join(n)))
+        .find(|p| p.is_file());
     if found.is_none() {
         println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
     }

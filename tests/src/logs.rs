@@ -1,4 +1,5 @@
-//! Recorded MAVLink: `.tlog` files, where big-endian microseconds precede each frame, and plain streams of frames.
+//! Recorded MAVLink: `.tlog` files, where big-endian microseconds precede each frame, and plain
+//! streams of frames.
 
 use std::path::{Path, PathBuf};
 
@@ -45,7 +46,9 @@ pub fn read(path: &Path) -> Vec<Recorded> {
 fn frame_length(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [0xFE, payload, ..] => Some(8 + usize::from(payload)),
-        [0xFD, payload, flags, ..] => Some(12 + usize::from(payload) + if flags & 1 == 0 { 0 } else { 13 }),
+        [0xFD, payload, flags, ..] => {
+            Some(12 + usize::from(payload) + if flags & 1 == 0 { 0 } else { 13 })
+        }
         _ => None,
     }
 }

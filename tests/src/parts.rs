@@ -5,8 +5,13 @@ use companion::swarm::fleet::{DivisionInput, Fleet};
 /// A waypoint is so long, decimetres.
 pub const WAYPOINT_DM: u16 = 100;
 
-/// The part of each vehicle, waypoints in the order in which it flies them, by what `fleet` knows; and a hash of it.
-pub fn parts<const V: usize>(whole: &[u32], fleet: &Fleet<V>, count: usize) -> (Vec<Vec<u32>>, u32) {
+/// The part of each vehicle, waypoints in the order in which it flies them, by what `fleet` knows;
+/// and a hash of it.
+pub fn parts<const V: usize>(
+    whole: &[u32],
+    fleet: &Fleet<V>,
+    count: usize,
+) -> (Vec<Vec<u32>>, u32) {
     let mut left = whole.to_vec();
     let mut living = vec![true; count];
     let share = |left: &[u32], living: &[bool]| {
@@ -27,7 +32,9 @@ pub fn parts<const V: usize>(whole: &[u32], fleet: &Fleet<V>, count: usize) -> (
             let sure = lot.alive || lot.along_dm == DivisionInput::WHOLE_PATH;
             done.extend(&parts[rank][..if sure { taken } else { taken.saturating_sub(1) }]);
             living[rank] = lot.alive;
-            hash = hash.wrapping_mul(31).wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.alive));
+            hash = hash
+                .wrapping_mul(31)
+                .wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.alive));
         }
         left.retain(|waypoint| !done.contains(waypoint));
         parts = share(&left, &living);

@@ -1,8 +1,8 @@
-//! Roadmap files whose CRC is right and whose contents are not: refused, or every search on them is right and ends within
-//! its bound.
+//! Roadmap files whose CRC is right and whose contents are not: refused, or every search on them is
+//! right and ends within its bound.
 //!
-//! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must find comes from
-//! Dijkstra 1959 in f64. A search may ask about each half-edge once.
+//! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must
+//! find comes from Dijkstra 1959 in f64. A search may ask about each half-edge once.
 
 use std::cell::Cell;
 use std::cmp::Reverse;
@@ -20,7 +20,9 @@ use planner_core::roadmap::{
 };
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleConfig};
-use planner_core::search::{SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row};
+use planner_core::search::{
+    SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row,
+};
 
 use crate::hostile::{Bytes, Entropy};
 use crate::meeting::dice::Dice;
@@ -36,8 +38,12 @@ const HEADER: RoadmapHeader = RoadmapHeader {
     starts: 2,
     goals: 2,
 };
-const SCHEDULE: ScheduleConfig =
-    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+const SCHEDULE: ScheduleConfig = ScheduleConfig {
+    separation_m: 2.0,
+    parked_separation_m: 1.7,
+    cruise_mps: 2.0,
+    vertical_mps: 1.0,
+};
 /// Clearance of vehicles that some edges are too narrow for, metres.
 const WIDE_M: f32 = 1.5;
 /// Bytes of a word, of a node, of a node's ways to the landmarks.
@@ -75,7 +81,8 @@ impl Forger {
         forger
     }
 
-    /// Changes some of the roadmap's file, makes its CRC right again, and searches what is accepted.
+    /// Changes some of the roadmap's file, makes its CRC right again, and searches what is
+    /// accepted.
     ///
     /// # Errors
     /// Reason why the file is refused.
@@ -184,15 +191,17 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + WORD].try_into().expect("four bytes"))
 }
 
-/// Bytes of header, nodes, offsets, half-edges, ways to the landmarks and heights, as the header says.
+/// Bytes of header, nodes, offsets, half-edges, ways to the landmarks and heights, as the header
+/// says.
 fn sizes(bytes: &[u8]) -> [usize; 6] {
     let (nodes, half_edges) = (word(bytes, 60) as usize, word(bytes, 64) as usize);
     let heights = if bytes[8] == 2 { nodes * WORD } else { 0 };
     [HEADER_LEN, nodes * NODE, (nodes + 1) * WORD, half_edges * WORD, nodes * WAYS, heights]
 }
 
-/// Changes one or a few words of a file: of the header, a node, an offset, a half-edge, a way to a landmark; or the
-/// ways to a landmark by a constant, which differences between neighbours do not show.
+/// Changes one or a few words of a file: of the header, a node, an offset, a half-edge, a way to a
+/// landmark; or the ways to a landmark by a constant, which differences between neighbours do not
+/// show.
 fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
     let sizes = sizes(bytes);
     for _ in 0..1 + entropy.bits() % 3 {
@@ -209,9 +218,13 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
             2 => (f32::from_bits(old) * (0.5 + share)).to_bits(),
             3 => (f32::from_bits(old) + 4.0 * share - 2.0).to_bits(),
             4 => old.wrapping_add((value % 3) as u32).wrapping_sub(1),
-            5 => [f32::NAN, f32::INFINITY, -0.0, 0.0, 1e30, -1.0, 16_384.0, 65_536.0][(value % 8) as usize]
+            5 => [f32::NAN, f32::INFINITY, -0.0, 0.0, 1e30, -1.0, 16_384.0, 65_536.0]
+                [(value % 8) as usize]
                 .to_bits(),
-            6 => word(bytes, HEADER_LEN + value as usize % ((bytes.len() - HEADER_LEN) / WORD) * WORD),
+            6 => word(
+                bytes,
+                HEADER_LEN + value as usize % ((bytes.len() - HEADER_LEN) / WORD) * WORD,
+            ),
             _ => {
                 let landmarks = sizes[..4].iter().sum::<usize>();
                 let column = bytes[landmarks..landmarks + sizes[4]].as_chunks_mut::<WORD>().0;
@@ -225,7 +238,8 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
     }
 }
 
-/// Puts the lengths along ways of fewest edges in place of the shortest: each is a sum of edges, and many are right.
+/// Puts the lengths along ways of fewest edges in place of the shortest: each is a sum of edges,
+/// and many are right.
 fn lengthen_ways(bytes: &mut [u8]) {
     let view = RoadmapView::parse(bytes).expect("nothing is changed yet");
     let mut ways = vec![[0.0_f32; LANDMARKS]; view.node_count()];
@@ -243,8 +257,10 @@ fn lengthen_ways(bytes: &mut [u8]) {
                 }
             }
         }
-        let farther = |best: u16, node: u16| ways[usize::from(node)][0] > ways[usize::from(best)][0];
-        landmark = (0..ways.len() as u16).fold(0, |best, node| if farther(best, node) { node } else { best });
+        let farther =
+            |best: u16, node: u16| ways[usize::from(node)][0] > ways[usize::from(best)][0];
+        landmark = (0..ways.len() as u16)
+            .fold(0, |best, node| if farther(best, node) { node } else { best });
     }
     let sizes = sizes(bytes);
     let begin: usize = sizes[..4].iter().sum();
@@ -260,7 +276,10 @@ fn read_all(view: &RoadmapView<'_>) {
         let at = view.node(node);
         assert!(at.iter().all(|c| c.is_finite()));
         assert!(view.ground_m(node).is_none_or(|ground_m| ground_m <= at.z));
-        assert!(view.ground_range_near(&at).is_none_or(|(low_m, high_m)| low_m <= high_m && high_m <= at.z));
+        assert!(
+            view.ground_range_near(&at)
+                .is_none_or(|(low_m, high_m)| low_m <= high_m && high_m <= at.z)
+        );
         for edge in view.half_edges(node) {
             assert!(view.distance_m(node, edge.target) > 0.0);
             let back = view.edge_between(edge.target, node).expect("each edge has its opposite");
@@ -291,11 +310,13 @@ fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> 
     ways
 }
 
-/// The ways to the landmarks, node 0 and the node farthest from it, are as long as the file says; 0 where there is none.
+/// The ways to the landmarks, node 0 and the node farthest from it, are as long as the file says; 0
+/// where there is none.
 fn landmarks_are_right(view: &RoadmapView<'_>, bytes: &[u8]) {
     let begin: usize = sizes(bytes)[..4].iter().sum();
-    let stored =
-        |node: usize, landmark: usize| f32::from_bits(word(bytes, begin + node * WAYS + landmark * WORD));
+    let stored = |node: usize, landmark: usize| {
+        f32::from_bits(word(bytes, begin + node * WAYS + landmark * WORD))
+    };
     let farthest = (0..view.node_count())
         .fold(0, |best, node| if stored(node, 0) > stored(best, 0) { node } else { best });
     for (landmark, from) in [0, farthest as u16].into_iter().enumerate() {
@@ -305,7 +326,8 @@ fn landmarks_are_right(view: &RoadmapView<'_>, bytes: &[u8]) {
     }
 }
 
-/// Every kind of search between four nodes finds what there is, and asks about each half-edge once at most.
+/// Every kind of search between four nodes finds what there is, and asks about each half-edge once
+/// at most.
 fn searches_are_right(
     view: &RoadmapView<'_>,
     from: [u16; 2],
@@ -319,7 +341,11 @@ fn searches_are_right(
         view.has_clearance(edge, required_m)
     };
     let bounded = |searches: usize| {
-        assert!(asked.get() <= searches * view.half_edge_count(), "{} half-edges asked about", asked.get());
+        assert!(
+            asked.get() <= searches * view.half_edge_count(),
+            "{} half-edges asked about",
+            asked.get()
+        );
         asked.set(0);
     };
     let ways = from.map(|node| lengths_from(view, node, required_m));
@@ -337,7 +363,9 @@ fn searches_are_right(
             });
             near(legs.sum(), way(0, to[0]));
         }
-        error => assert!(error == Err(SearchError::NoPath) && way(0, to[0]).is_infinite(), "{error:?}"),
+        error => {
+            assert!(error == Err(SearchError::NoPath) && way(0, to[0]).is_infinite(), "{error:?}")
+        }
     }
     bounded(1);
 
@@ -354,5 +382,6 @@ fn searches_are_right(
 
     dijkstra_all(view, from[1], passable, ws).expect("the node exists");
     bounded(1);
-    (0..view.node_count() as u16).for_each(|node| near(f64::from(ws.distance_m(node)), way(1, node)));
+    (0..view.node_count() as u16)
+        .for_each(|node| near(f64::from(ws.distance_m(node)), way(1, node)));
 }

@@ -1,11 +1,13 @@
-//! The one checker of a stream of setpoints: what it asks of the vehicle, and whether it is fit to be flown.
+//! The one checker of a stream of setpoints: what it asks of the vehicle, and whether it is fit to
+//! be flown.
 //!
-//! Speed, acceleration and jerk are divided differences of the positions that were sent, in the autopilot's frame, so they
-//! hold whatever feed-forward goes along, and however the steps lie in time: a curve whose third derivative is bounded has
-//! third divided differences within that bound. A gap longer than `GAP_S` begins another stream, and so does a setpoint
-//! that an autopilot in another mode did not follow: it has to be finite and inside the fence all the same. A setpoint that
-//! moves without a velocity of its own follows a vehicle that another flies, or is believed to: it moves no faster than
-//! `FOLLOWS_MPS`.
+//! Speed, acceleration and jerk are divided differences of the positions that were sent, in the
+//! autopilot's frame, so they hold whatever feed-forward goes along, and however the steps lie in
+//! time: a curve whose third derivative is bounded has third divided differences within that bound.
+//! A gap longer than `GAP_S` begins another stream, and so does a setpoint that an autopilot in
+//! another mode did not follow: it has to be finite and inside the fence all the same. A setpoint
+//! that moves without a velocity of its own follows a vehicle that another flies, or is believed
+//! to: it moves no faster than `FOLLOWS_MPS`.
 
 use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
 use nalgebra::Vector3;
@@ -126,7 +128,8 @@ pub struct SetpointCheck {
     pub urgent: bool,
     /// Whether the vehicle is believed to be flown by another: setpoints go with it.
     pub follows: bool,
-    /// What a place was rounded by on its way to the checker, metres, beside what its own numbers show.
+    /// What a place was rounded by on its way to the checker, metres, beside what its own numbers
+    /// show.
     pub rounded_m: f32,
     /// What was seen.
     pub stats: SetpointStats,
@@ -166,8 +169,10 @@ impl SetpointCheck {
 
     /// Takes a setpoint in.
     pub fn take(&mut self, at_s: f64, data: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
-        let fields =
-            [data.x, data.y, data.z, data.vx, data.vy, data.vz, data.afx, data.afy, data.afz, data.yaw];
+        let fields = [
+            data.x, data.y, data.z, data.vx, data.vy, data.vz, data.afx, data.afy, data.afz,
+            data.yaw,
+        ];
         if fields.iter().any(|field| !field.is_finite()) {
             self.stats.not_finite += 1;
             self.fault(at_s, format!("not finite: {fields:?}"));
@@ -186,7 +191,11 @@ impl SetpointCheck {
             self.fault(at_s, format!("outside the fence: {position:?}"));
         }
         let before = self.last.filter(|last| ((at_s - last.at_s) as f32) < GAP_S);
-        let calm = if self.urgent { 0 } else { before.map_or(u8::MAX, |last| last.calm.saturating_add(1)) };
+        let calm = if self.urgent {
+            0
+        } else {
+            before.map_or(u8::MAX, |last| last.calm.saturating_add(1))
+        };
         self.stats.urgent += u64::from(self.urgent);
         // The sums of the smoother are rounded like what is sent.
         let rounded_m = self.rounded_m + 2.0 * rounding_m(data);
@@ -230,7 +239,9 @@ impl SetpointCheck {
     /// Acceleration and jerk, from this setpoint and those before it.
     fn take_change(&mut self, before: &Last, next: &mut Last, jumps: bool) {
         let (dt_s, stats) = (next.dt_s[0], &mut self.stats);
-        let (Some(velocity), Some(velocity_before)) = (next.velocity, before.velocity) else { return };
+        let (Some(velocity), Some(velocity_before)) = (next.velocity, before.velocity) else {
+            return;
+        };
         let accel = (velocity - velocity_before) / (0.5 * (dt_s + before.dt_s[0]));
         next.accel = Some(accel);
         stats.accel_mps2 = stats.accel_mps2.max(accel.norm());

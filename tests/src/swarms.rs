@@ -77,20 +77,28 @@ impl Space {
                 let mut boxes = vec![(Point::zeros(), Point::new(length, width, height))];
                 for _ in 0..rng.below(3) {
                     let (at, wide) = (rng.uniform(2.0, length - 6.0), rng.uniform(1.5, 4.0));
-                    boxes.push((Point::new(at, 0.0, 0.0), Point::new(at + wide, width + 5.0, height)));
+                    boxes.push((
+                        Point::new(at, 0.0, 0.0),
+                        Point::new(at + wide, width + 5.0, height),
+                    ));
                 }
                 boxes
             }
             // A shaft, with rooms beside it at the bottom and at the top.
             8..12 => {
-                let size = Point::new(rng.uniform(1.0, 5.0), rng.uniform(1.0, 5.0), rng.uniform(8.0, 35.0));
+                let size = Point::new(
+                    rng.uniform(1.0, 5.0),
+                    rng.uniform(1.0, 5.0),
+                    rng.uniform(8.0, 35.0),
+                );
                 let (low, high) = (Point::new(-10.0, -4.0, 0.0), Point::new(10.0, 8.0, 2.0));
                 let lift = Point::new(0.0, 0.0, size.z - 2.0);
                 vec![(Point::zeros(), size), (low, high), (low + lift, high + lift)]
             }
             // So long that timed segments are longer.
             _ => {
-                let size = Point::new(rng.uniform(200.0, 1500.0), rng.uniform(2.0, 60.0), 3.0 * height);
+                let size =
+                    Point::new(rng.uniform(200.0, 1500.0), rng.uniform(2.0, 60.0), 3.0 * height);
                 return Self { boxes: vec![(Point::zeros(), size)], edge_max_m: 80.0 };
             }
         };
@@ -112,11 +120,16 @@ impl Space {
 
     fn point(&self, rng: &mut Random) -> Point {
         let (low, high) = self.boxes[rng.below(self.boxes.len())];
-        Point::new(rng.uniform(low.x, high.x), rng.uniform(low.y, high.y), rng.uniform(low.z, high.z))
+        Point::new(
+            rng.uniform(low.x, high.x),
+            rng.uniform(low.y, high.y),
+            rng.uniform(low.z, high.z),
+        )
     }
 
     fn holds(&self, p: &Point) -> bool {
-        let inside = |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
+        let inside =
+            |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
         self.boxes.iter().any(inside)
     }
 
@@ -151,11 +164,13 @@ struct Draw {
 }
 
 impl Swarm {
-    /// Any: rooms, corridors with side rooms, shafts, far ways; now and then more vehicles than goals or fewer.
+    /// Any: rooms, corridors with side rooms, shafts, far ways; now and then more vehicles than
+    /// goals or fewer.
     pub fn random(rng: &mut Random) -> Self {
         let space = Space::random(rng);
         let vehicles = if rng.one_in(20) { 9 + rng.below(24) } else { 2 + rng.below(7) };
-        let goals = if rng.one_in(8) { 1 + rng.below(vehicles + 2).min(VEHICLES - 1) } else { vehicles };
+        let goals =
+            if rng.one_in(8) { 1 + rng.below(vehicles + 2).min(VEHICLES - 1) } else { vehicles };
         let highest_m = [1.5, 8.0, 30.0][rng.below(3)];
         let safety_m = if rng.one_in(2) { 1.5 } else { rng.uniform(0.8, 3.0) };
         Self::drawn(&Draw { space, vehicles, goals, highest_m, safety_m }, rng)
@@ -181,8 +196,9 @@ impl Swarm {
                 let height = rng.uniform(0.5, draw.highest_m);
                 let height = if one_floor { place.z + 0.5 } else { height };
                 let ground = place - Point::new(0.0, 0.0, height);
-                let apart =
-                    |(p, h): (&Point, &f32)| (p - Point::new(0.0, 0.0, *h) - ground).norm() >= apart_m;
+                let apart = |(p, h): (&Point, &f32)| {
+                    (p - Point::new(0.0, 0.0, *h) - ground).norm() >= apart_m
+                };
                 if height <= 30.0 && places.iter().zip(&heights).all(apart) {
                     places.push(place);
                     heights.push(height);
@@ -203,7 +219,9 @@ impl Swarm {
         for a in 0..nodes.len() {
             for b in a + 1..nodes.len() {
                 let length = (nodes[a] - nodes[b]).norm();
-                if (0.1..draw.space.edge_max_m).contains(&length) && draw.space.sees(&nodes[a], &nodes[b]) {
+                if (0.1..draw.space.edge_max_m).contains(&length)
+                    && draw.space.sees(&nodes[a], &nodes[b])
+                {
                     let clearance_m = if one_size { 1.0 } else { rng.uniform(0.6, 2.0) };
                     edges.push(Edge { a: a as u16, b: b as u16, clearance_m });
                 }
@@ -281,7 +299,11 @@ pub fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
 
 /// Where its flight ends, metres along its path.
 pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
-    if flight.task.leaves_pad() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
+    if flight.task.leaves_pad() {
+        flight.path.length_m() + flight.descent_m
+    } else {
+        -flight.climb_m
+    }
 }
 
 /// A number from the environment.

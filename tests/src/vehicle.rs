@@ -1,4 +1,5 @@
-//! One vehicle: a board in QEMU in lock step with a simulated autopilot, and a ground station on its radio.
+//! One vehicle: a board in QEMU in lock step with a simulated autopilot, and a ground station on
+//! its radio.
 
 use std::path::{self, PathBuf};
 use std::time::Duration;
@@ -52,7 +53,8 @@ pub struct Heard {
     pub commands: Vec<(u32, f32)>,
     /// Its state as last reported.
     pub state: State,
-    /// Frames missing in the row of each line, by their numbers. A companion that restarts counts from zero, which shows too.
+    /// Frames missing in the row of each line, by their numbers. A companion that restarts counts
+    /// from zero, which shows too.
     pub missing: [u32; 2],
     last: [Option<u8>; 2],
 }
@@ -96,20 +98,22 @@ pub fn mission(text: &str) -> Mission {
 /// The path has no legs.
 pub fn ahead<const W: usize>(path: &Path<W>) -> Point {
     let late = path.waypoints().windows(2).filter(|leg| leg[0].along_m > 0.5 * path.length_m());
-    let widest = late.max_by(|a, b| a[1].clearance_m.total_cmp(&b[1].clearance_m)).expect("a path has legs");
+    let widest =
+        late.max_by(|a, b| a[1].clearance_m.total_cmp(&b[1].clearance_m)).expect("a path has legs");
     (widest[0].position + widest[1].position) * 0.5
 }
 
 impl Vehicle {
-    /// The first vehicle of a mission, on its pad, its autopilot and its board just switched on; the board's flash holds the
-    /// files of `known`.
+    /// The first vehicle of a mission, on its pad, its autopilot and its board just switched on;
+    /// the board's flash holds the files of `known`.
     ///
     /// # Panics
     /// The board does not start.
     pub fn new(program: &path::Path, mission: &Mission, known: &Mission, seed: u64) -> Self {
         let folder = tempfile::tempdir().expect("a temporary directory");
         let mut board = EmulatedBoard::start(program, &folder.path().join("log")).expect("a board");
-        let bank = boards::flash_bank_image(&known.roadmap_file, &known.mission_file).expect("it holds them");
+        let bank = boards::flash_bank_image(&known.roadmap_file, &known.mission_file)
+            .expect("it holds them");
         board.load_flash(&bank).expect("a board");
         let mut config = config(mission);
         config.seed = seed;
@@ -261,8 +265,9 @@ impl Vehicle {
         self.until(text, |vehicle| vehicle.heard.texts.iter().any(|said| said.starts_with(text)));
     }
 
-    /// Starts the mission whenever it is ready, and steps until it has left the pad's states: a state heard is up to a second
-    /// old, and a board that has just lost its autopilot may still seem ready.
+    /// Starts the mission whenever it is ready, and steps until it has left the pad's states: a
+    /// state heard is up to a second old, and a board that has just lost its autopilot may still
+    /// seem ready.
     pub fn start(&mut self) {
         let mut last = None;
         self.until("started", |vehicle| {
@@ -305,10 +310,13 @@ impl Heard {
         }
         let by_radio = line == Port::Swarm as usize;
         match frame.message_id {
-            HEARTBEAT_DATA::ID if by_radio => self.state = reported_state(frame).unwrap_or(self.state),
+            HEARTBEAT_DATA::ID if by_radio => {
+                self.state = reported_state(frame).unwrap_or(self.state)
+            }
             STATUSTEXT_DATA::ID if by_radio => {
                 let text = frame.decode::<STATUSTEXT_DATA>().map(|data| data.text);
-                self.texts.extend(text.iter().map(|text| text.to_str().unwrap_or_default().to_owned()));
+                self.texts
+                    .extend(text.iter().map(|text| text.to_str().unwrap_or_default().to_owned()));
             }
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => {
                 self.setpoints.extend(frame.decode());

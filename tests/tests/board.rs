@@ -1,8 +1,9 @@
-//! The board computes what the desk computes, bit by bit, and in how many instructions: `measure` in QEMU. So it does at the
-//! limits of every public call of planner-core, and beyond, without a panic: `limits`.
+//! The board computes what the desk computes, bit by bit, and in how many instructions: `measure`
+//! in QEMU. So it does at the limits of every public call of planner-core, and beyond, without a
+//! panic: `limits`.
 //!
-//! QEMU counts: with `-icount shift=0` an instruction takes a nanosecond of the board's time. They are its instructions, not
-//! cycles of the chip.
+//! QEMU counts: with `-icount shift=0` an instruction takes a nanosecond of the board's time. They
+//! are its instructions, not cycles of the chip.
 
 use std::collections::HashMap;
 
@@ -18,15 +19,20 @@ use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
 use planner_core::prm::{self, Config};
 
 /// Most instructions, by the name of what is counted.
-const LIMITS: [(&str, u64); 4] =
-    [("replan", 40_000_000), ("build", 100_000_000), ("build-with-clearance", 100_000_000), ("step", 60_000)];
+const LIMITS: [(&str, u64); 4] = [
+    ("replan", 40_000_000),
+    ("build", 100_000_000),
+    ("build-with-clearance", 100_000_000),
+    ("step", 60_000),
+];
 
 #[test]
 fn the_board_computes_what_the_desk_computes() {
     let Some(program) = board::program("measure") else { return };
-    let scenario =
-        scenario::load(&workspace().join("host-sim/scenarios/demo.toml")).expect("the demo is good");
-    let mission = Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo can be prepared");
+    let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))
+        .expect("the demo is good");
+    let mission =
+        Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo can be prepared");
     let map = building::building_map(building::DEFAULT_SEED, 0.5)
         .expect("the building")
         .voxel_map(Unknown::Blocked);
@@ -36,7 +42,8 @@ fn the_board_computes_what_the_desk_computes() {
     let mut ws = Box::new(Workspace::new());
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, &mut ws);
-        let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
+        let [costs, assignment, paths, scales] =
+            [case.costs, case.assignment, case.paths, case.scales];
         let line = format!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
         assert!(lines.contains(&line), "the desk has {line:?}, the board\n{}", lines.join("\n"));
     }

@@ -1,5 +1,6 @@
-//! Three boards plan an area above a hill from mission file and field in their flash, divide it alike and photograph it. The pictures are judged
-//! by where they were truly taken. Where one of them is switched off in flight, the other two divide what it left.
+//! Three boards plan an area above a hill from mission file and field in their flash, divide it
+//! alike and photograph it. The pictures are judged by where they were truly taken. Where one of
+//! them is switched off in flight, the other two divide what it left.
 
 use flockmate_tests::hills::Hills;
 use flockmate_tests::vehicle::mission;
@@ -9,7 +10,8 @@ use host_sim::swarm::Flight;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 
-/// An area with a zone that no vehicle may enter, small: boards in QEMU are no faster than a few times the clock.
+/// An area with a zone that no vehicle may enter, small: boards in QEMU are no faster than a few
+/// times the clock.
 const FIELD: &str = r#"
 [area]
 polygon = [[0, 0], [70, 0], [80, 45], [10, 50]]
@@ -50,7 +52,8 @@ fn three_boards_photograph_an_area_whole() {
     assert!(high_m - low_m > 3.0, "it is level: {heights_m:?}");
     board::put_on_boards(&mut mission, &program, folder.path());
     let (result, log) = covered::fly(&mut mission).expect("the boards fly it");
-    let said = || log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect::<Vec<_>>();
+    let said =
+        || log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect::<Vec<_>>();
     assert_eq!(covered::faults(&result), None, "{:?}", said());
     println!("{:?}", result.coverage);
     for vehicle in &result.vehicles {
@@ -89,13 +92,15 @@ kind = "kill"
 vehicle = 3
 "#;
 
-/// Each vehicle that is left flies one division: what the desk plans from the same lots, bit by bit.
+/// Each vehicle that is left flies one division: what the desk plans from the same lots, bit by
+/// bit.
 fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
     for vehicle in left {
         let told: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();
         assert_eq!(told.len(), 1, "vehicle {vehicle}: {:?}", flight.divisions);
         let lots = &told[0].lots;
-        let plan = mission.plan_rest(&[], std::iter::once(&lots[..])).expect("the desk divides it too");
+        let plan =
+            mission.plan_rest(&[], std::iter::once(&lots[..])).expect("the desk divides it too");
         println!("{:?}", told[0]);
         assert_eq!(lots.iter().map(|lot| lot.alive).collect::<Vec<_>>(), [true, true, false]);
         assert_eq!(told[0].plan_crc, plan.crc, "vehicle {vehicle}: {lots:?}");
@@ -113,9 +118,15 @@ fn two_boards_photograph_what_a_third_leaves_that_is_switched_off() {
     for flight in [&desk, &boards] {
         let said = || flight.log.iter().map(|e| (e.t_s, e.vehicle, &e.text)).collect::<Vec<_>>();
         assert_eq!(covered::faults(&flight.result), None, "{:?}", said());
-        println!("{:.0} s in {:.1} s: {:?}", flight.simulated_s, flight.took_s, flight.result.coverage);
+        println!(
+            "{:.0} s in {:.1} s: {:?}",
+            flight.simulated_s, flight.took_s, flight.result.coverage
+        );
         let third = &flight.result.vehicles[2];
-        assert!(third.end == "Killed" && third.flown_m > 20.0, "it was struck on its pad: {third:?}");
+        assert!(
+            third.end == "Killed" && third.flown_m > 20.0,
+            "it was struck on its pad: {third:?}"
+        );
         divides_as_planned(&mission, flight, [1, 2]);
     }
 }

@@ -1,12 +1,15 @@
-//! A roadmap on its way into an emulated board, cut anywhere: afterwards the board holds the old one or the new one, whole. An
-//! armed board erases nothing, nor one that does not know yet whether it is.
+//! A roadmap on its way into an emulated board, cut anywhere: afterwards the board holds the old
+//! one or the new one, whole. An armed board erases nothing, nor one that does not know yet whether
+//! it is.
 //!
-//! The board is the firmware as it is flashed, in QEMU and in lock step with its client; its emulated flash keeps over a reset what was in it, torn words too. Each
-//! cut is a reset: while a slot is erased, after a random byte of the upload, or a random moment after the last one, while it is
-//! checked and sealed. Every second cut is moved on, by instants, to one that leaves a torn word: of the data, or the seal. What
-//! the board holds then is asked of it by FTP.
+//! The board is the firmware as it is flashed, in QEMU and in lock step with its client; its
+//! emulated flash keeps over a reset what was in it, torn words too. Each cut is a reset: while a
+//! slot is erased, after a random byte of the upload, or a random moment after the last one, while
+//! it is checked and sealed. Every second cut is moved on, by instants, to one that leaves a torn
+//! word: of the data, or the seal. What the board holds then is asked of it by FTP.
 //!
-//! `FLOCKMATE_FIRMWARE=… FLOCKMATE_CUTS=200 cargo test --workspace --test board_cuts -- --nocapture` makes two hundred.
+//! `FLOCKMATE_FIRMWARE=… FLOCKMATE_CUTS=200 cargo test --workspace --test board_cuts -- --nocapture`
+//! makes two hundred.
 
 use std::io::{Error, ErrorKind, Result};
 use std::net::SocketAddr;
@@ -23,7 +26,9 @@ use flockmate_tests::downfall::reset;
 use host_sim::boards::{EmulatedBoard, PortBytes};
 use host_sim::link::Link;
 use host_sim::upload::{FtpClient, crc32};
-use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType};
+use mavlink::dialects::ardupilotmega::{
+    HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
+};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, RoadmapHeader};
@@ -74,7 +79,8 @@ enum Cut {
 /// A board that its clients share, one after the other.
 type Shared = Arc<Mutex<EmulatedBoard>>;
 
-/// What a client sees of its vehicle: the companion, and an autopilot that reports that it is there.
+/// What a client sees of its vehicle: the companion, and an autopilot that reports that it is
+/// there.
 struct Line {
     board: Shared,
     began: Instant,
@@ -119,7 +125,8 @@ impl Line {
             ..HEARTBEAT_DATA::DEFAULT
         };
         let mut out = [0; frame::MAX_FRAME_LEN];
-        let length = frame::encode(Header { system: 1, component: 1, sequence: 0 }, &beat, &mut out);
+        let length =
+            frame::encode(Header { system: 1, component: 1, sequence: 0 }, &beat, &mut out);
         self.put(&out[..length]);
     }
 }
@@ -194,7 +201,8 @@ fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
         starts: 1,
         goals: 1,
     };
-    let mut bytes = vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).expect("it is small")];
+    let mut bytes =
+        vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).expect("it is small")];
     let length = roadmap::write(&header, &points, &edges, &mut bytes).expect("it is a roadmap");
     assert_eq!(length, bytes.len());
     bytes
@@ -274,7 +282,8 @@ fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool 
     client.wait_for_companion().and_then(|_| client.upload(File::Roadmap, file, sealing)).is_ok()
 }
 
-/// Stops a board; every second time, if it may, where a word of the kind that the part has is torn. The torn words.
+/// Stops a board; every second time, if it may, where a word of the kind that the part has is torn.
+/// The torn words.
 fn stop(board: &Shared, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usize> {
     let mut board = board.lock().unwrap();
     for _ in 0..LOOKS {
@@ -366,7 +375,10 @@ fn an_armed_board_erases_nothing() {
     reset(&mut board.lock().unwrap());
     while torn().is_empty() {
         let now_us = board.lock().unwrap().now_us();
-        assert!(now_us < ALONE_AFTER_US + ERASES_WITHIN_US, "it erases nothing without an autopilot");
+        assert!(
+            now_us < ALONE_AFTER_US + ERASES_WITHIN_US,
+            "it erases nothing without an autopilot"
+        );
         run(100_000);
     }
     let erased_us = board.lock().unwrap().now_us();

@@ -1,8 +1,9 @@
-//! An emulated board in flight, treated badly: reset at any moment, cables pulled, garbage on both lines. The board is the firmware
-//! as it is flashed, the autopilot beside it the simulated one, both in lock step: what is tested here happens the same every time.
+//! An emulated board in flight, treated badly: reset at any moment, cables pulled, garbage on both
+//! lines. The board is the firmware as it is flashed, the autopilot beside it the simulated one,
+//! both in lock step: what is tested here happens the same every time.
 //!
-//! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture` resets fifty times, and
-//! `FLOCKMATE_GARBAGE=1000000` puts a megabyte on each line.
+//! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture`
+//! resets fifty times, and `FLOCKMATE_GARBAGE=1000000` puts a megabyte on each line.
 
 use std::io;
 use std::net::SocketAddr;
@@ -71,13 +72,19 @@ const PER_MS: usize = 10;
 const BURST: Duration = Duration::from_millis(38);
 /// For how long setpoints are held up on purpose.
 const HELD_UP: [Duration; 2] = [Duration::from_millis(83), Duration::from_millis(217)];
-/// Between two setpoints, microseconds of the board's time, and how late one may be: the longest that other interrupts and
-/// calls of the companion hold it up.
+/// Between two setpoints, microseconds of the board's time, and how late one may be: the longest
+/// that other interrupts and calls of the companion hold it up.
 const PERIOD_US: u64 = 50_000;
 const LATE_US: u64 = 100;
 
-/// Brings the companion down at a random moment of a flight, and sees the flight to its end; what came of it.
-fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut Pcg32) -> Option<String> {
+/// Brings the companion down at a random moment of a flight, and sees the flight to its end; what
+/// came of it.
+fn reset_in_flight(
+    vehicle: &mut Vehicle,
+    how: Downfall,
+    brakes: bool,
+    rng: &mut Pcg32,
+) -> Option<String> {
     vehicle.start();
     vehicle.run(Duration::from_millis(u64::from(rng.next_u32() % FLIGHT_MS)));
     if is_over(vehicle) {
@@ -94,8 +101,10 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
     let mut in_air = Duration::ZERO;
     vehicle.until("landed by itself, or hovering", |vehicle| {
         let truth = vehicle.autopilot.true_state();
-        let (away, armed, flies): (Point, _, _) = (truth.position - place, truth.armed, vehicle.flies());
-        (farthest_m, highest_m) = (farthest_m.max(away.xy().norm()), highest_m.max(truth.position.z - top_m));
+        let (away, armed, flies): (Point, _, _) =
+            (truth.position - place, truth.armed, vehicle.flies());
+        (farthest_m, highest_m) =
+            (farthest_m.max(away.xy().norm()), highest_m.max(truth.position.z - top_m));
         let passed = Duration::from_micros(vehicle.autopilot.time_us() - began);
         if flies {
             in_air = passed;
@@ -113,19 +122,33 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
     let context = format!("{how:?} in {state:?} at {place:?}: {heard:?}");
     assert!(!vehicle.autopilot.true_state().armed, "{context}");
     assert!(heard.setpoints.is_empty(), "it sends setpoints, {context}");
-    assert!(!heard.commands.iter().any(|(number, _)| FLIES.contains(number)), "it flies on, {context}");
-    assert!(farthest_m < STOPS_M && highest_m < 1.0, "{farthest_m} m away, {highest_m} m up, {context}");
+    assert!(
+        !heard.commands.iter().any(|(number, _)| FLIES.contains(number)),
+        "it flies on, {context}"
+    );
+    assert!(
+        farthest_m < STOPS_M && highest_m < 1.0,
+        "{farthest_m} m away, {highest_m} m up, {context}"
+    );
     let said = |text: &str| heard.texts.iter().any(|said| said == text);
     assert!(heard.texts.iter().any(|said| said.starts_with(how.said())), "{context}");
     if in_air > FINDS {
         assert!(said("Found in flight: no mission"), "{context}");
         assert!(said("Landed after failsafe: mission over"), "{context}");
     }
-    Some(format!("{how:?} in {state:?}: {:.1} s in the air, {farthest_m:.1} m", in_air.as_secs_f32()))
+    Some(format!(
+        "{how:?} in {state:?}: {:.1} s in the air, {farthest_m:.1} m",
+        in_air.as_secs_f32()
+    ))
 }
 
 /// Resets one board in flight again and again.
-fn reset_again_and_again(program: &Path, missions: [&Mission; 2], resets: usize, seed: u64) -> Vec<String> {
+fn reset_again_and_again(
+    program: &Path,
+    missions: [&Mission; 2],
+    resets: usize,
+    seed: u64,
+) -> Vec<String> {
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut lines = Vec::new();
     let mut flights = 0;
@@ -136,9 +159,9 @@ fn reset_again_and_again(program: &Path, missions: [&Mission; 2], resets: usize,
         // Every other flight is by the other autopilot: each meets every downfall.
         let how = Downfall::ALL[(lines.len() / 2 + seed as usize) % Downfall::ALL.len()];
         let outcome = reset_in_flight(&mut vehicle, how, brakes, &mut rng);
-        lines.extend(
-            outcome.map(|line| format!("seed {seed}, {}: {line}", if brakes { "ArduCopter" } else { "PX4" })),
-        );
+        lines.extend(outcome.map(|line| {
+            format!("seed {seed}, {}: {line}", if brakes { "ArduCopter" } else { "PX4" })
+        }));
         flights += 1;
         assert!(flights < 10 + 4 * resets as u64, "most flights end before they are reset");
     }
@@ -181,7 +204,8 @@ fn cables_are_pulled_and_put_back_without_a_restart() {
     let mission = mission(LOBBY);
     let mut vehicle = Vehicle::new(&program, &mission, &mission, 1);
     vehicle.until("ready", |vehicle| vehicle.heard.state == State::Ready);
-    // On the pad: said when it is silent, said when it is back, and ready again. What counts is what was said last.
+    // On the pad: said when it is silent, said when it is back, and ready again. What counts is
+    // what was said last.
     let last = |vehicle: &Vehicle, text| vehicle.heard.texts.iter().rposition(|said| said == text);
     let heard = |vehicle: &Vehicle| last(vehicle, FOUND) > last(vehicle, SILENT);
     vehicle.plug(Port::Autopilot, false);
@@ -226,14 +250,16 @@ fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
     for in_a_row in 1..=3 {
         vehicle.break_planner();
         vehicle.heard = Heard::default();
-        let crashed =
-            |vehicle: &Vehicle| vehicle.heard.texts.iter().any(|text| text.starts_with("Restarted: fault"));
+        let crashed = |vehicle: &Vehicle| {
+            vehicle.heard.texts.iter().any(|text| text.starts_with("Restarted: fault"))
+        };
         vehicle.until("planning", |vehicle| crashed(vehicle));
         let texts = &vehicle.heard.texts;
         let aside = texts.iter().any(|text| text == ASIDE);
         assert!(in_a_row == 3 || !aside, "after {in_a_row} in a row: {texts:?}");
     }
-    // The mission is left alone from that start on, whose planner is broken again: the board stays up.
+    // The mission is left alone from that start on, whose planner is broken again: the board stays
+    // up.
     vehicle.until_said(ASIDE);
     vehicle.run(FINDS);
     vehicle.break_planner();
@@ -244,7 +270,8 @@ fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
     assert_eq!(heard.state, State::Aborted, "there is no plan");
 }
 
-/// A client's end of a radio that the vehicle's thread serves: each has its turn, and time passes between the client's.
+/// A client's end of a radio that the vehicle's thread serves: each has its turn, and time passes
+/// between the client's.
 struct Radio {
     turns: Receiver<(Instant, Vec<u8>)>,
     sends: SyncSender<Vec<u8>>,
@@ -286,7 +313,8 @@ impl Link for Radio {
 #[test]
 fn setpoints_flow_through_planning_uploading_and_garbage() {
     let Some(program) = board::program("flockmate") else { return };
-    let length = std::env::var("FLOCKMATE_GARBAGE").map_or(GARBAGE, |n| n.parse().expect("a number"));
+    let length =
+        std::env::var("FLOCKMATE_GARBAGE").map_or(GARBAGE, |n| n.parse().expect("a number"));
     let (mut vehicle, place) = demo_on_its_way(&program);
     // An upload by the radio, another roadmap than the one that is flown on.
     let ((turn, turns), (sends, sent)) = (sync_channel(1), sync_channel(1));
@@ -382,7 +410,8 @@ fn reported(vehicle: &mut Vehicle) -> (usize, u64) {
     (count.parse().expect("a number"), gap.parse().expect("a number"))
 }
 
-/// How late a setpoint was at most, microseconds of the board's time. One that a change of state brings comes early.
+/// How late a setpoint was at most, microseconds of the board's time. One that a change of state
+/// brings comes early.
 fn late_us(heard: &Heard) -> u64 {
     let gaps = heard.setpoints_us.windows(2).map(|pair| pair[1] - pair[0]);
     gaps.max().expect("many").saturating_sub(PERIOD_US)

@@ -1,5 +1,5 @@
-//! Boards in lock step with the simulation: a flight is the same twice, whatever else this machine does. By the wall clock, for
-//! foreign ground tools, a board has ports.
+//! Boards in lock step with the simulation: a flight is the same twice, whatever else this machine
+//! does. By the wall clock, for foreign ground tools, a board has ports.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{available_parallelism, scope};
@@ -45,7 +45,11 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
     let mut mission = mission(THREE);
     board::put_on_boards(&mut mission, &program, folder.path());
     let first = fly(&mut mission);
-    assert!(first.result.complete, "{:?}", first.log.iter().map(|event| &event.text).collect::<Vec<_>>());
+    assert!(
+        first.result.complete,
+        "{:?}",
+        first.log.iter().map(|event| &event.text).collect::<Vec<_>>()
+    );
     let over = AtomicBool::new(false);
     let second = scope(|scope| {
         let busy = || {
@@ -58,8 +62,16 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
         over.store(true, Ordering::Relaxed);
         second
     });
-    println!("{:.0} s in {:.1} s, beside a load {:.1} s", first.simulated_s, first.took_s, second.took_s);
-    assert!(board::record(&first) == board::record(&second), "{:?}\n{:?}", first.result, second.result);
+    println!(
+        "{:.0} s in {:.1} s, beside a load {:.1} s",
+        first.simulated_s, first.took_s, second.took_s
+    );
+    assert!(
+        board::record(&first) == board::record(&second),
+        "{:?}\n{:?}",
+        first.result,
+        second.result
+    );
 }
 
 #[test]

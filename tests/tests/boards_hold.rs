@@ -1,5 +1,5 @@
-//! A roadmap with more edges than a board holds is cut down so that it fits: nodes that were connected stay so, whatever
-//! clearance is required, and paths lengthen little.
+//! A roadmap with more edges than a board holds is cut down so that it fits: nodes that were
+//! connected stay so, whatever clearance is required, and paths lengthen little.
 
 use std::time::Instant;
 
@@ -22,11 +22,19 @@ const MEDIAN: f32 = 1.03;
 const MOST: f32 = 1.15;
 
 fn config(nodes: usize) -> Config {
-    Config { nodes, edge_min_m: 0.5, edge_max_m: 8.0, clearance_m: 0.2, seed: 1, sampling: Sampling::Uniform }
+    Config {
+        nodes,
+        edge_min_m: 0.5,
+        edge_max_m: 8.0,
+        clearance_m: 0.2,
+        seed: 1,
+        sampling: Sampling::Uniform,
+    }
 }
 
 fn file(roadmap: &Roadmap, config: &Config) -> Vec<u8> {
-    roadmap::encode(roadmap, &roadmap::header(config, Geodetic::default(), 0, 0)).expect("it is a roadmap")
+    roadmap::encode(roadmap, &roadmap::header(config, Geodetic::default(), 0, 0))
+        .expect("it is a roadmap")
 }
 
 /// Lengths of the shortest ways from a node to all others.
@@ -36,7 +44,8 @@ fn ways(
     required_m: f32,
     workspace: &mut SearchWorkspace<4096>,
 ) -> Vec<f32> {
-    dijkstra_all(view, from, |_, edge| view.has_clearance(edge, required_m), workspace).expect("it fits");
+    dijkstra_all(view, from, |_, edge| view.has_clearance(edge, required_m), workspace)
+        .expect("it fits");
     (0..view.node_count() as u16).map(|node| workspace.distance_m(node)).collect()
 }
 
@@ -47,11 +56,16 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
         let mut ratios = Vec::new();
         for i in 0..SOURCES {
             // Not those whose paths decide which edges are kept.
-            let from = (u32::from(2 * i + 1) * all.node_count() as u32 / u32::from(2 * SOURCES)) as u16;
+            let from =
+                (u32::from(2 * i + 1) * all.node_count() as u32 / u32::from(2 * SOURCES)) as u16;
             let before = ways(all, from, required_m, &mut workspace);
             let after = ways(kept, from, required_m, &mut workspace);
             for (node, (before, after)) in before.iter().zip(&after).enumerate() {
-                assert_eq!(before.is_finite(), after.is_finite(), "{name}: {from} to {node}, {required_m} m");
+                assert_eq!(
+                    before.is_finite(),
+                    after.is_finite(),
+                    "{name}: {from} to {node}, {required_m} m"
+                );
                 if *before > 0.0 && before.is_finite() {
                     ratios.push(after / before);
                 }
@@ -99,10 +113,14 @@ fn holds(name: &str, map: &VoxelMap, config: Config, board: &BoardCapacity) {
 /// `FLOCKMATE_CAPS` sets the roadmaps a map.
 #[test]
 fn scanned_maps_fit_and_paths_stay_short() {
-    let seeds: u64 = std::env::var("FLOCKMATE_CAPS").map_or(1, |count| count.parse().expect("a number"));
-    for (name, resolution_m) in [("geb079", 0.08), ("manufacturing", 0.086_642_2), ("maze", 0.195_32)] {
+    let seeds: u64 =
+        std::env::var("FLOCKMATE_CAPS").map_or(1, |count| count.parse().expect("a number"));
+    for (name, resolution_m) in
+        [("geb079", 0.08), ("manufacturing", 0.086_642_2), ("maze", 0.195_32)]
+    {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { return };
-        let map = map::load(path.to_str().unwrap(), resolution_m).unwrap().voxel_map(Unknown::Blocked);
+        let map =
+            map::load(path.to_str().unwrap(), resolution_m).unwrap().voxel_map(Unknown::Blocked);
         // What cuts down was chosen by the first seed.
         for seed in 1..=seeds {
             holds(name, &map, Config { seed, ..config(2300) }, &BOARDS[0]);
@@ -136,7 +154,11 @@ fn a_fine_hall_of_a_million_edges_fits() {
     let kept = all.clone().fit_to_board(&BOARDS[0]).expect("it can be cut down");
     let bytes = file(&kept, &config);
     let took = began.elapsed();
-    println!("hall: {} edges, {} bytes for a board, {took:.2?}: {parts:?}", all.edges.len(), bytes.len());
+    println!(
+        "hall: {} edges, {} bytes for a board, {took:.2?}: {parts:?}",
+        all.edges.len(),
+        bytes.len()
+    );
     assert!(cfg!(debug_assertions) || took.as_secs_f64() < 8.0);
     assert_eq!(BOARDS[0].roadmap_excess(&RoadmapView::parse(&bytes).unwrap()), None);
 }

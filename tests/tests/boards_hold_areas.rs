@@ -45,19 +45,29 @@ fn vertices_zones_and_lanes_beyond_a_boards_are_named() {
     for vertices in [3, 255, 256, 257, 300] {
         let area = format!("polygon = {}", polygon(vertices, [0.0, 60.0], 50.0));
         for excess in excess(&field(&area, 20.0, 2, -8.0)).0 {
-            assert_eq!(excess.is_some_and(|why| why.contains("vertices")), vertices > 256, "{vertices}");
+            assert_eq!(
+                excess.is_some_and(|why| why.contains("vertices")),
+                vertices > 256,
+                "{vertices}"
+            );
         }
     }
     for corners in [16, 17] {
-        let zones = [[-20.0, 60.0], [20.0, 60.0]].map(|middle| polygon(corners, middle, 6.0)).join(", ");
+        let zones =
+            [[-20.0, 60.0], [20.0, 60.0]].map(|middle| polygon(corners, middle, 6.0)).join(", ");
         let area = format!("polygon = {}\nno_fly = [{zones}]", polygon(8, [0.0, 60.0], 50.0));
         for excess in excess(&field(&area, 20.0, 2, -8.0)).0 {
-            assert_eq!(excess.is_some_and(|why| why.contains("corners")), 2 * corners > BOARD_CORNERS);
+            assert_eq!(
+                excess.is_some_and(|why| why.contains("corners")),
+                2 * corners > BOARD_CORNERS
+            );
         }
     }
     let mut seen = [false; 2];
     for width_m in [60.0, 1600.0] {
-        let area = format!("polygon = [[0, 0], [{width_m}, 0], [{width_m}, 30], [0, 30]]\nangle_deg = 90.0");
+        let area = format!(
+            "polygon = [[0, 0], [{width_m}, 0], [{width_m}, 30], [0, 30]]\nangle_deg = 90.0"
+        );
         let (excess, lanes) = excess(&field(&area, 8.0, 16, -8.0));
         let says = |why: &Option<String>| why.as_ref().is_some_and(|why| why.contains("lanes"));
         assert_eq!(says(&excess[2]), lanes > 256, "{lanes} {excess:?}");

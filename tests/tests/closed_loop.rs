@@ -1,4 +1,5 @@
-//! Missions flown whole: planned by planner-core, flown by companions through MAVLink, watched by the referee.
+//! Missions flown whole: planned by planner-core, flown by companions through MAVLink, watched by
+//! the referee.
 
 use std::net::TcpStream;
 use std::path::Path;
@@ -18,7 +19,11 @@ fn assert_complete_and_clean(result: &MissionResult) {
         assert!(vehicle.reached && vehicle.landed && vehicle.end == "Done", "{vehicle:?}");
     }
     let safety = &result.safety;
-    assert_eq!((safety.wall_contacts, safety.violations, safety.deadlocks), (0, 0, 0), "{safety:?}");
+    assert_eq!(
+        (safety.wall_contacts, safety.violations, safety.deadlocks),
+        (0, 0, 0),
+        "{safety:?}"
+    );
     assert!(safety.min_separation_m.is_none_or(|m| m >= safety.safety_distance_m), "{safety:?}");
     assert!(result.complete);
 }
@@ -26,7 +31,8 @@ fn assert_complete_and_clean(result: &MissionResult) {
 fn fly(path: &Path, seed: Option<u64>) -> MissionResult {
     let mut scenario = scenario::load(path).expect("the scenario is good");
     scenario.seed = seed.unwrap_or(scenario.seed);
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the mission can be prepared");
+    let mut mission =
+        Mission::prepare(scenario, &Progress::hidden()).expect("the mission can be prepared");
     let plan = mission.plan().expect("the swarm can be planned");
     swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).expect("it flies").result
 }
@@ -42,10 +48,13 @@ fn demo_result_is_the_same_twice_and_in_debug_and_release() {
     let mut results = Vec::new();
     for (program, name) in [(&debug, "first"), (&debug, "second"), (&release, "release")] {
         let out = dir.path().join(name);
-        let demo = Command::new(program).args(["demo", "--out"]).arg(&out).output().expect("it runs");
+        let demo =
+            Command::new(program).args(["demo", "--out"]).arg(&out).output().expect("it runs");
         assert!(demo.status.success(), "{name}: {}", String::from_utf8_lossy(&demo.stderr));
         assert!(out.join("report.html").exists() && out.join("timing.json").exists());
-        results.push(std::fs::read_to_string(out.join("result.json")).expect("result.json is written"));
+        results.push(
+            std::fs::read_to_string(out.join("result.json")).expect("result.json is written"),
+        );
     }
     assert_eq!(results[0], results[1], "two runs differ");
     assert_eq!(results[0], results[2], "debug and release differ");
@@ -56,7 +65,8 @@ fn ten_vehicles_fly_the_building_clean_with_other_seeds() {
     for seed in 1..=8 {
         let result = fly(&scenario_path("host-sim/scenarios/demo.toml"), Some(seed));
         let served = result.vehicles.iter().filter(|v| v.goal.is_some()).count();
-        // A roadmap of 2300 nodes may leave a goal out of reach (P3D Fig. 10); every vehicle that flies, flies clean.
+        // A roadmap of 2300 nodes may leave a goal out of reach (P3D Fig. 10); every vehicle that
+        // flies, flies clean.
         assert!(served >= 8, "seed {seed}: only {served} goals in reach");
         let safety = &result.safety;
         assert_eq!(
@@ -65,7 +75,11 @@ fn ten_vehicles_fly_the_building_clean_with_other_seeds() {
             "seed {seed}: {safety:?}"
         );
         let flown = result.vehicles.iter().filter(|v| v.goal.is_some());
-        assert!(flown.into_iter().all(|v| v.reached && v.landed), "seed {seed}: {:?}", result.vehicles);
+        assert!(
+            flown.into_iter().all(|v| v.reached && v.landed),
+            "seed {seed}: {:?}",
+            result.vehicles
+        );
     }
 }
 
@@ -86,13 +100,22 @@ fn four_vehicles_fly_the_manufacturing_hall() {
 #[test]
 fn companion_and_autopilot_fly_in_two_processes() {
     let path = scenario_path("host-sim/scenarios/demo.toml");
-    let mission = Mission::prepare(scenario::load(&path).expect("the scenario is good"), &Progress::hidden())
-        .expect("the mission can be prepared");
+    let mission =
+        Mission::prepare(scenario::load(&path).expect("the scenario is good"), &Progress::hidden())
+            .expect("the mission can be prepared");
     let pad = mission.pad_position(mission.index_of(7).expect("the demo has a vehicle 7"));
     let home = format!("{:.8},{:.8},{:.3}", pad.lat_deg, pad.lon_deg, pad.alt_m);
-    let (_autopilot, addresses) = autopilot(&["udp-listen:127.0.0.1:0"], &["--sysid", "7", "--home", &home]);
+    let (_autopilot, addresses) =
+        autopilot(&["udp-listen:127.0.0.1:0"], &["--sysid", "7", "--home", &home]);
     let companion = Command::new(host_sim(Profile::Debug))
-        .args(["companion", "--autopilot", &format!("udp:{}", addresses[0]), "--id", "7", "--start"])
+        .args([
+            "companion",
+            "--autopilot",
+            &format!("udp:{}", addresses[0]),
+            "--id",
+            "7",
+            "--start",
+        ])
         .arg(&path)
         .stdout(Stdio::null())
         .spawn()
@@ -103,13 +126,14 @@ fn companion_and_autopilot_fly_in_two_processes() {
 
 /// The demo's first vehicles, in a file.
 fn first_of_the_demo(vehicles: usize, path: &Path) {
-    let demo = std::fs::read_to_string(scenario_path("host-sim/scenarios/demo.toml")).expect("it is there");
+    let demo = std::fs::read_to_string(scenario_path("host-sim/scenarios/demo.toml"))
+        .expect("it is there");
     let parts: Vec<_> = demo.split("[[vehicles]]").take(1 + vehicles).collect();
     std::fs::write(path, parts.join("[[vehicles]]")).expect("a writable folder");
 }
 
-/// The companion of vehicle 1 in a process that listens for its autopilot and, if it shall, for its radio; then `fly` with the
-/// options that name these, in the order of its ports.
+/// The companion of vehicle 1 in a process that listens for its autopilot and, if it shall, for its
+/// radio; then `fly` with the options that name these, in the order of its ports.
 fn fly_beside_a_process(vehicles: usize, options: &[&str]) {
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("scenario.toml");

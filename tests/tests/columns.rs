@@ -1,5 +1,6 @@
-//! Random missions on scanned maps: a start or goal whose column is clear by brute force over all cells is planned, any
-//! other is refused by a message that names a place nearby, and nothing is touched in flight.
+//! Random missions on scanned maps: a start or goal whose column is clear by brute force over all
+//! cells is planned, any other is refused by a message that names a place nearby, and nothing is
+//! touched in flight.
 //!
 //! `FLOCKMATE_COLUMNS=100` sets the missions a map.
 
@@ -16,7 +17,8 @@ use sim_autopilot::Estimator;
 /// How far `estimator = "rtk"` errs across, metres.
 const RTK_ERROR_M: f32 = 0.1;
 
-/// A map, the resolution it is planned at, and a vehicle that fits it: its radius and its margin, metres.
+/// A map, the resolution it is planned at, and a vehicle that fits it: its radius and its margin,
+/// metres.
 struct Case {
     file: &'static str,
     resolution_m: f32,
@@ -48,7 +50,8 @@ const NODES: [(usize, bool); 2] = [(1500, false), (6000, true)];
 /// Missions a map, where nothing else is asked for.
 const MISSIONS: usize = 3;
 
-/// Height of the ground and whether the column from there to the point is clear, over all cells of the map.
+/// Height of the ground and whether the column from there to the point is clear, over all cells of
+/// the map.
 fn is_clear(map: &OccupancyMap, p: &Point, radius_m: f32, required_m: f32) -> bool {
     let shape = map.shape();
     let cell_m = f64::from(shape.resolution_m);
@@ -96,7 +99,9 @@ fn is_low(map: &OccupancyMap, p: &Point, required_m: f32) -> bool {
     let shape = map.shape();
     let Some([i, j, top]) = shape.cell_of(p) else { return true };
     let below = (0..top).rev().find(|&k| map.state_at([i, j, k]) != Occupancy::Free);
-    below.is_some_and(|below| p.z - shape.min.z - (below + 1) as f32 * shape.resolution_m <= required_m)
+    below.is_some_and(|below| {
+        p.z - shape.min.z - (below + 1) as f32 * shape.resolution_m <= required_m
+    })
 }
 
 /// A random free place over something that was seen.
@@ -112,14 +117,17 @@ fn place(map: &OccupancyMap, rng: &mut Pcg32) -> Point {
 
 #[test]
 fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
-    let missions = std::env::var("FLOCKMATE_COLUMNS").map_or(MISSIONS, |count| count.parse().unwrap());
+    let missions =
+        std::env::var("FLOCKMATE_COLUMNS").map_or(MISSIONS, |count| count.parse().unwrap());
     for case in &CASES {
         let Some(file) = shared_data(&format!("maps3d/{}", case.file)) else { return };
         let map = map::load(file.to_str().unwrap(), case.resolution_m).unwrap();
         let required_m = case.radius_m + case.margin_m;
-        // A margin below what a receiver errs by keeps no vehicle off a wall: there it is the columns alone that are tried.
+        // A margin below what a receiver errs by keeps no vehicle off a wall: there it is the
+        // columns alone that are tried.
         let fits = case.margin_m >= RTK_ERROR_M;
-        let (estimator, cruise_mps) = if fits { (Estimator::Rtk, 1.0) } else { (Estimator::Perfect, 0.3) };
+        let (estimator, cruise_mps) =
+            if fits { (Estimator::Rtk, 1.0) } else { (Estimator::Perfect, 0.3) };
         let mut rng = Pcg32::seed_from_u64(1);
         let (mut flown, mut walled_off, mut missed) = (0, 0, 0);
         let (mut contacts, mut refused, mut hints) = (0, 0, 0);
@@ -131,7 +139,8 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 }
                 let p = place(&map, &mut rng);
                 match is_clear(&map, &p, case.radius_m, required_m) {
-                    // The program reports what such a place is short of; the unit tests of `shortage` have it.
+                    // The program reports what such a place is short of; the unit tests of
+                    // `shortage` have it.
                     true if is_low(&map, &p, required_m) => {}
                     true if clear.len() < 2 => clear.push(p),
                     false => other = Some(p),
@@ -177,8 +186,10 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 let lines = shortage::shortage_lines(&mission, &plan);
                 Some((lines.iter().any(|line| line.contains("the map has one")), mission, plan))
             };
-            // More nodes where the map itself has a way that the roadmap has not: as the program suggests.
-            let plan = plan(NODES[0]).and_then(|first| if first.0 { plan(NODES[1]) } else { Some(first) });
+            // More nodes where the map itself has a way that the roadmap has not: as the program
+            // suggests.
+            let plan =
+                plan(NODES[0]).and_then(|first| if first.0 { plan(NODES[1]) } else { Some(first) });
             let Some((false, mission, plan)) = plan else {
                 missed += 1;
                 continue;
@@ -187,8 +198,9 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 walled_off += 1;
                 continue;
             }
-            let result =
-                swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).expect("it flies").result;
+            let result = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())
+                .expect("it flies")
+                .result;
             contacts += result.safety.wall_contacts;
             flown += 1;
         }

@@ -1,7 +1,9 @@
-//! Ground tools that others wrote must be able to fly `host-sim autopilot`: pymavlink and MAVSDK; and with MAVProxy use a companion's services.
+//! Ground tools that others wrote must be able to fly `host-sim autopilot`: pymavlink and MAVSDK;
+//! and with MAVProxy use a companion's services.
 //!
-//! The scripts in `tests/conformance` run with the Python of the virtual environment that `cargo xtask test` makes
-//! (`FLOCKMATE_PYTHON`); without it each test says so and passes. Flights are in real time: half a minute each.
+//! The scripts in `tests/conformance` run with the Python of the virtual environment that
+//! `cargo xtask test` makes (`FLOCKMATE_PYTHON`); without it each test says so and passes. Flights
+//! are in real time: half a minute each.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -9,7 +11,9 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use companion::services::parameters;
-use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, python, shared_data, workspace};
+use flockmate_tests::{
+    Guard, Profile, autopilot, free_port, host_sim, python, shared_data, workspace,
+};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
@@ -26,7 +30,8 @@ fn run(python: &str, script: &str, arguments: &[&str]) {
         .unwrap_or_else(|why| panic!("{python} does not start: {why}"));
     let mut child = Guard(child);
     let output = BufReader::new(child.0.stdout.take().expect("stdout is piped"));
-    let reader = std::thread::spawn(move || output.lines().map_while(Result::ok).collect::<Vec<_>>());
+    let reader =
+        std::thread::spawn(move || output.lines().map_while(Result::ok).collect::<Vec<_>>());
     let status = child.wait_for(TIME_LIMIT);
     drop(child);
     let lines = reader.join().expect("the reader does not panic").join("\n");
@@ -89,7 +94,8 @@ fn mavsdk_uses_the_simulated_ardupilots_parameters_and_missions() {
 /// Where vehicles of a survey stand, degrees.
 const PADS: [&str; 2] = ["47.3977,8.5463", "47.3981,8.5463"];
 
-/// Plans the polygon of QGroundControl's sample survey for some vehicles, as `cover` does; `None` where the sample is not there.
+/// Plans the polygon of QGroundControl's sample survey for some vehicles, as `cover` does; `None`
+/// where the sample is not there.
 fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Option<()> {
     let sample = shared_data("plans/qgroundcontrol_sample_with_survey.plan")?;
     let mut scenario = format!(
@@ -105,12 +111,18 @@ fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Optio
     }
     let file = out.join("survey.toml");
     std::fs::write(&file, scenario).expect("a scenario");
-    let cover = Command::new(host_sim(Profile::Debug)).arg("cover").arg(file).arg("--out").arg(out).status();
+    let cover = Command::new(host_sim(Profile::Debug))
+        .arg("cover")
+        .arg(file)
+        .arg("--out")
+        .arg(out)
+        .status();
     assert!(cover.expect("host-sim starts").success(), "it is planned and covers everything");
     Some(())
 }
 
-/// MAVSDK and pymavlink read what `cover` wrote; MAVSDK has it flown, and pymavlink counts the pictures on a second link.
+/// MAVSDK and pymavlink read what `cover` wrote; MAVSDK has it flown, and pymavlink counts the
+/// pictures on a second link.
 fn vehicle_flies(python: &str, out: &Path, vehicle: usize, personality: &str, trigger: &str) {
     let address = format!("127.0.0.1:{}", free_port());
     let (id, home) = (vehicle.to_string(), format!("{},488", PADS[vehicle - 1]));
@@ -118,13 +130,15 @@ fn vehicle_flies(python: &str, out: &Path, vehicle: usize, personality: &str, tr
     if personality == "ardupilot" {
         options.extend(ARDUPILOT);
     }
-    let (_autopilot, at) = autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
+    let (_autopilot, at) =
+        autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
     let urls = [format!("udpin://{address}"), format!("udpout:{}", at[1])];
     let folder = out.display().to_string();
     run(python, "plan_flight.py", &[&urls[0], &urls[1], &folder, &id, personality, trigger]);
 }
 
-/// One vehicle with a picture at each waypoint; and, while it flies, both of a fleet that trigger by distance.
+/// One vehicle with a picture at each waypoint; and, while it flies, both of a fleet that trigger
+/// by distance.
 fn plans_fly(personality: &str) {
     let Some(python) = python() else { return };
     let (alone, fleet) =
@@ -132,7 +146,9 @@ fn plans_fly(personality: &str) {
     let by_waypoint = "lane_m = 25.0\nwaypoint_m = 20.0\ntrigger = \"waypoint\"";
     let Some(()) = survey(personality, 1, by_waypoint, alone.path()) else { return };
     // By distance, where a survey says nothing.
-    let Some(()) = survey(personality, 2, "lane_m = 13.0\nwaypoint_m = 9.0", fleet.path()) else { return };
+    let Some(()) = survey(personality, 2, "lane_m = 13.0\nwaypoint_m = 9.0", fleet.path()) else {
+        return;
+    };
     std::thread::scope(|scope| {
         scope.spawn(|| vehicle_flies(&python, alone.path(), 1, personality, "waypoint"));
         for vehicle in [1, 2] {
@@ -152,7 +168,8 @@ fn mavsdk_has_the_simulated_ardupilot_fly_survey_plans() {
     plans_fly("ardupilot");
 }
 
-/// A companion of the lobby's first vehicle beside the autopilot that sends to this port, and the two files it may be given.
+/// A companion of the lobby's first vehicle beside the autopilot that sends to this port, and the
+/// two files it may be given.
 struct Onboard {
     _companion: Guard,
     files: tempfile::TempDir,
@@ -163,12 +180,15 @@ impl Onboard {
         let files = tempfile::tempdir().expect("a directory");
         // MAVSDK is system 245 unless set otherwise.
         let text = std::fs::read_to_string(workspace().join("host-sim/scenarios/lobby.toml"));
-        let text = text.expect("it is there").replace("[mission]", "[mission]\nground_stations = [255, 245]");
+        let text = text
+            .expect("it is there")
+            .replace("[mission]", "[mission]\nground_stations = [255, 245]");
         assert!(text.contains("245"));
         let lobby = files.path().join("lobby.toml");
         std::fs::write(&lobby, text).expect("a scenario");
         let program = host_sim(Profile::Debug);
-        let plan = Command::new(&program).arg("plan").arg(&lobby).arg("--out").arg(files.path()).status();
+        let plan =
+            Command::new(&program).arg("plan").arg(&lobby).arg("--out").arg(files.path()).status();
         assert!(plan.expect("host-sim starts").success());
         let companion = Command::new(program)
             .args([
@@ -221,7 +241,9 @@ fn mavproxy_uses_the_companions_files_and_parameters_through_the_autopilot() {
         return;
     }
     let count = parameters::PARAMETER_COUNT.to_string();
-    onboard("onboard_mavproxy.py", "udp-listen:127.0.0.1:0", &[&count], |at| format!("udpout:{at}"));
+    onboard("onboard_mavproxy.py", "udp-listen:127.0.0.1:0", &[&count], |at| {
+        format!("udpout:{at}")
+    });
 }
 
 #[test]

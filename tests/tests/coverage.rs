@@ -1,4 +1,5 @@
-//! Coverage plans, judged by the one checker: everything photographed, every waypoint once, no leg in a no-fly zone.
+//! Coverage plans, judged by the one checker: everything photographed, every waypoint once, no leg
+//! in a no-fly zone.
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::costs::Costs;
@@ -42,7 +43,10 @@ fn random_areas_are_covered() {
         if findings.is_clean() {
             Ok(true)
         } else {
-            Err(format!("seed {seed}: {:?}\n{text}", Findings { over_time: Vec::new(), ..findings }))
+            Err(format!(
+                "seed {seed}: {:?}\n{text}",
+                Findings { over_time: Vec::new(), ..findings }
+            ))
         }
     };
     // Areas that are none, or that zones close, are followed by others.
@@ -56,7 +60,8 @@ fn random_areas_are_covered() {
     assert!(wrong.is_empty() && planned >= areas(), "{planned} planned, {} wrong", wrong.len());
 }
 
-/// A field is a whole number of lanes wide and a little more, whose pictures do not overlap; with and without a zone in it.
+/// A field is a whole number of lanes wide and a little more, whose pictures do not overlap; with
+/// and without a zone in it.
 #[test]
 fn fields_a_little_wider_than_their_lanes_are_covered() {
     let mut random = Pcg32::seed_from_u64(0x51DE);
@@ -68,7 +73,8 @@ fn fields_a_little_wider_than_their_lanes_are_covered() {
         let (width_m, long_m) = (lane_m * f64::from(lanes) + more_m, lane_m * 12.0);
         let [east_m, north_m] = [0, 1].map(|_| areas::between(&mut random, -200.0, 200.0));
         let box_of = |low: [f64; 2], high: [f64; 2]| {
-            let [l, b, r, t] = [east_m + low[0], north_m + low[1], east_m + high[0], north_m + high[1]];
+            let [l, b, r, t] =
+                [east_m + low[0], north_m + low[1], east_m + high[0], north_m + high[1]];
             format!("[[{l:.7}, {b:.7}], [{r:.7}, {b:.7}], [{r:.7}, {t:.7}], [{l:.7}, {t:.7}]]")
         };
         let at = [0.3 * long_m, areas::between(&mut random, 0.0, 0.8) * width_m];
@@ -81,9 +87,10 @@ fn fields_a_little_wider_than_their_lanes_are_covered() {
             box_of([0.0; 2], [long_m, width_m]),
             north_m - 20.0
         );
-        let scenario = scenario::parse(&text, "field").unwrap_or_else(|error| panic!("{error:#}\n{text}"));
-        let findings =
-            findings(&scenario, Method::PowellBinpat).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let scenario =
+            scenario::parse(&text, "field").unwrap_or_else(|error| panic!("{error:#}\n{text}"));
+        let findings = findings(&scenario, Method::PowellBinpat)
+            .unwrap_or_else(|error| panic!("{error}\n{text}"));
         if !findings.is_clean() {
             wrong.push((case, more_m / lane_m, findings.covered_share));
         }
@@ -91,7 +98,8 @@ fn fields_a_little_wider_than_their_lanes_are_covered() {
     assert!(wrong.is_empty(), "{} of 600: {:?}", wrong.len(), &wrong[..wrong.len().min(8)]);
 }
 
-/// `FLOCKMATE_AREAS=1000` takes minutes in a debug build: `exact` looks at 2²⁰ states for ten vehicles.
+/// `FLOCKMATE_AREAS=1000` takes minutes in a debug build: `exact` looks at 2²⁰ states for ten
+/// vehicles.
 #[test]
 fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
     let count = std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
@@ -103,7 +111,8 @@ fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
     assert!(costs.powell_over_simple * 20 <= costs.areas && costs.gaps[2] <= 8.0, "{costs:?}");
 }
 
-/// The least largest cost of waypoints `from` on for these vehicles and layers, by trying everything.
+/// The least largest cost of waypoints `from` on for these vehicles and layers, by trying
+/// everything.
 fn brute_force(planned: &CoveragePlan<'_>, from: u32, vehicles: &[usize], layers: &[u8]) -> f64 {
     let count = planned.tracks.waypoint_count();
     if from == count {
@@ -116,15 +125,17 @@ fn brute_force(planned: &CoveragePlan<'_>, from: u32, vehicles: &[usize], layers
     for (i, &v) in vehicles.iter().enumerate() {
         for (j, &layer) in layers.iter().enumerate() {
             let vehicle = &planned.vehicles[v];
-            let top_m = f64::from(heights.mission_m) + f64::from(layer) * f64::from(heights.layer_m);
-            let delay_s = top_m / f64::from(vehicle.climb_mps) + top_m / f64::from(vehicle.descend_mps);
+            let top_m =
+                f64::from(heights.mission_m) + f64::from(layer) * f64::from(heights.layer_m);
+            let delay_s =
+                top_m / f64::from(vehicle.climb_mps) + top_m / f64::from(vehicle.descend_mps);
             let mut inside_m = 0.0;
             for end in from + 1..=count {
                 if end > from + 1 {
                     inside_m += distance(&place(end - 2), &place(end - 1));
                 }
-                let transit_m =
-                    distance(&vehicle.place, &place(from)) + distance(&place(end - 1), &vehicle.home);
+                let transit_m = distance(&vehicle.place, &place(from))
+                    + distance(&place(end - 1), &vehicle.home);
                 let own_s = (inside_m + transit_m) / f64::from(vehicle.cruise_mps) + delay_s;
                 let others = [&vehicles[..i], &vehicles[i + 1..]].concat();
                 let above = [&layers[..j], &layers[j + 1..]].concat();
@@ -145,8 +156,12 @@ fn exact_is_what_trying_everything_finds() {
         // Pictures so large that there are few.
         text = text.replace("height_m = ", "height_m = 1");
         for id in 1..=vehicles {
-            let speeds = [areas::unit(&mut random), areas::unit(&mut random)].map(|unit| 0.5 + 4.0 * unit);
-            let extra = format!("id = {id}\nclimb_mps = {:.2}\ndescend_mps = {:.2}\n", speeds[0], speeds[1]);
+            let speeds =
+                [areas::unit(&mut random), areas::unit(&mut random)].map(|unit| 0.5 + 4.0 * unit);
+            let extra = format!(
+                "id = {id}\nclimb_mps = {:.2}\ndescend_mps = {:.2}\n",
+                speeds[0], speeds[1]
+            );
             text = text.replace(&format!("id = {id}\n"), &extra);
         }
         let Ok(scenario) = scenario::parse(&text, "random") else { continue };
@@ -158,7 +173,10 @@ fn exact_is_what_trying_everything_finds() {
         let layers: Vec<u8> = (1..=vehicles as u8).collect();
         let best = brute_force(&planned, 0, &all, &layers);
         let found = f64::from(planned.plan.max_cost_s());
-        assert!((found - best).abs() <= best * 1e-4, "seed {seed}: {found} instead of {best}\n{text}");
+        assert!(
+            (found - best).abs() <= best * 1e-4,
+            "seed {seed}: {found} instead of {best}\n{text}"
+        );
         tried += 1;
     }
     println!("{tried} areas tried");
@@ -186,13 +204,15 @@ fn real_areas_are_covered() {
         let Some(path) = shared_data(name) else { return };
         let mut text = real(&path, area);
         for id in 1..=3 {
-            text +=
-                &format!("[[vehicles]]\nid = {id}\nspeed_max_mps = 20.0\nstart = [{}, 0.0, 0.0]\n", 3 * id);
+            text += &format!(
+                "[[vehicles]]\nid = {id}\nspeed_max_mps = 20.0\nstart = [{}, 0.0, 0.0]\n",
+                3 * id
+            );
         }
         let scenario = scenario::parse(&text, name).unwrap_or_else(|error| panic!("{error}"));
         for method in [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat, Method::Exact] {
-            let planned =
-                CoveragePlan::new(&scenario, method).unwrap_or_else(|error| panic!("{name}: {error:#}"));
+            let planned = CoveragePlan::new(&scenario, method)
+                .unwrap_or_else(|error| panic!("{name}: {error:#}"));
             let found = check_plan(&planned);
             println!(
                 "{name} {}: {} lanes, {} waypoints, {} cells, {:.1} s, bound {:.1} s",
@@ -214,7 +234,10 @@ fn files_without_an_area_are_refused_by_name() {
         ("coverage/darp_inputVariables.json", "is not GeoJSON"),
         ("plans/qgroundcontrol_sample.plan", "holds no polygon"),
         ("plans/qgroundcontrol_sample_with_structured_scan.plan", "holds no polygon"),
-        ("plans/qgroundcontrol_sample_wrong_overall_version.plan", "is not a plan of QGroundControl"),
+        (
+            "plans/qgroundcontrol_sample_wrong_overall_version.plan",
+            "is not a plan of QGroundControl",
+        ),
     ] {
         let Some(path) = shared_data(name) else { return };
         let text = real(&path, "lane_m = 10.0") + "[[vehicles]]\nid = 1\nstart = [0, 0, 0]\n";
@@ -259,11 +282,23 @@ fn bad_areas_are_refused_by_name_or_covered() {
             "holes = [[[20, 20], [60, 20], [60, 70]], [[40, 25], [55, 25], [55, 35]]]",
             "hole 0 and hole 1 overlap",
         ),
-        (square, "holes = [[[-20, 0], [20, 0], [20, 80], [-20, 80]]]", "reaches out of its polygon"),
-        (square, "holes = [[[-20, -20], [120, -20], [120, 100], [-20, 100]]]", "reaches out of its polygon"),
+        (
+            square,
+            "holes = [[[-20, 0], [20, 0], [20, 80], [-20, 80]]]",
+            "reaches out of its polygon",
+        ),
+        (
+            square,
+            "holes = [[[-20, -20], [120, -20], [120, 100], [-20, 100]]]",
+            "reaches out of its polygon",
+        ),
         (square, "holes = [[[0, 0], [100, 0], [100, 80], [0, 80]]]", "holes leave nothing"),
         (square, "holes = [[[10, 10], [20, 20], [20, 10], [10, 20]]]", "crosses another one"),
-        (square, "no_fly = [[[-10, -10], [-10, 90], [110, 90], [110, -10]]]", "hold the whole area"),
+        (
+            square,
+            "no_fly = [[[-10, -10], [-10, 90], [110, 90], [110, -10]]]",
+            "hold the whole area",
+        ),
         (
             square,
             "coordinates = \"wgs84\"\norigin = { lat_deg = 0, lon_deg = 0, alt_m = 0 }",
@@ -302,13 +337,16 @@ fn bad_areas_are_refused_by_name_or_covered() {
                 let judged = found.cells > 0 && found.is_clean();
                 assert!(judged, "{shown}: {:?}", Findings { over_time: Vec::new(), ..found });
             }
-            Err(error) if !why.is_empty() => assert!(error.contains(why), "{shown} {more}: {error}"),
+            Err(error) if !why.is_empty() => {
+                assert!(error.contains(why), "{shown} {more}: {error}")
+            }
             other => panic!("{shown} {more}: {other:?}, expected {why:?}"),
         }
     }
 }
 
-/// Companions plan by shares alone: an exact division is one that they find too, as good, or it is refused.
+/// Companions plan by shares alone: an exact division is one that they find too, as good, or it is
+/// refused.
 #[test]
 fn exact_divisions_are_planned_by_companions_or_refused_by_name() {
     let one = |seed: u64| -> Option<bool> {
@@ -321,7 +359,8 @@ fn exact_divisions_are_planned_by_companions_or_refused_by_name() {
         let best_s = CoveragePlan::plan_as_companions(&scenario).ok()?.plan.max_cost_s();
         match Mission::prepare(scenario.clone(), &Progress::hidden()) {
             Ok(_) => {
-                let powell = CoveragePlan::new(&scenario, Method::PowellBinpat).expect("it was planned");
+                let powell =
+                    CoveragePlan::new(&scenario, Method::PowellBinpat).expect("it was planned");
                 assert!(best_s <= powell.plan.max_cost_s() * 1.0001, "seed {seed}");
                 Some(true)
             }
@@ -356,12 +395,13 @@ fn what_cannot_be_flown_is_refused_by_name() {
              start = [0, -10, 0]\n{more}\n"
         );
         let scenario = scenario::parse(&text, "asked").map_err(|error| error.to_string())?;
-        let planned =
-            CoveragePlan::new(&scenario, Method::PowellBinpat).map_err(|error| error.to_string())?;
+        let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)
+            .map_err(|error| error.to_string())?;
         let longest_s = planned.sorties.iter().map(|sortie| sortie.flown_s).fold(0.0, f32::max);
         let costs_s = planned.max_cost_s();
         drop(planned);
-        Mission::prepare(scenario, &Progress::hidden()).map_err(|error| format!("flown: {error}"))?;
+        Mission::prepare(scenario, &Progress::hidden())
+            .map_err(|error| format!("flown: {error}"))?;
         Ok::<_, String>((longest_s, costs_s))
     };
     let (longest_s, costs_s) = plan("", start, "").expect("nothing is wrong");
@@ -371,16 +411,20 @@ fn what_cannot_be_flown_is_refused_by_name() {
         let endurance = format!("endurance_s = {seconds:.2}");
         plan("", &format!("{start}\n{endurance}"), &endurance)
     };
-    let error = endurance(0.5 * (costs_s + longest_s) / 0.85).expect_err("the battery is too small");
+    let error =
+        endurance(0.5 * (costs_s + longest_s) / 0.85).expect_err("the battery is too small");
     assert!(error.contains("of that are for the landing"), "{error}");
-    // Whoever flies at speed needs more than a hover of that time: `fly` says how much, and takes no less.
+    // Whoever flies at speed needs more than a hover of that time: `fly` says how much, and takes
+    // no less.
     let error = endurance(longest_s / 0.84).expect_err("the battery is too small at speed");
     let (_, needed) = error.split_once("would need the charge of ").expect(&error);
     let needed_s: f32 = needed.split_once(" s").expect(&error).0.parse().expect(&error);
     assert!(needed_s > longest_s && needed_s < 1.2 * longest_s, "{error}");
     endurance((needed_s + 1.0) / 0.85).expect("the battery lasts");
     // Layers end at 45 m, lanes at 120 m.
-    let fence = |max: &str| plan(&format!("geofence = {{ min = [-50, -50, -10], max = {max} }}"), start, "");
+    let fence = |max: &str| {
+        plan(&format!("geofence = {{ min = [-50, -50, -10], max = {max} }}"), start, "")
+    };
     for max in ["[60, 200, 200]", "[200, 200, 20]", "[200, 200, 44]"] {
         let error = fence(max).expect_err(max);
         assert!(error.contains("outside mission.geofence"), "{max}: {error}");
@@ -388,8 +432,14 @@ fn what_cannot_be_flown_is_refused_by_name() {
     fence("[121, 100, 46]").expect("it is around all that is flown");
     for (first, why) in [
         ("start = [6, -10, 35]", "pictures are taken at 35.0 m"),
-        ("start = [6, -10, 20]", "flown: bad vehicle: asked:10: vehicle 7 starts 20.0 m above the ground"),
-        ("start = [6, -10, -20]", "flown: bad vehicle: asked:10: vehicle 7 starts -20.0 m above the ground"),
+        (
+            "start = [6, -10, 20]",
+            "flown: bad vehicle: asked:10: vehicle 7 starts 20.0 m above the ground",
+        ),
+        (
+            "start = [6, -10, -20]",
+            "flown: bad vehicle: asked:10: vehicle 7 starts -20.0 m above the ground",
+        ),
         ("start = [0, -10, 20]", "vehicles 7 and 9 start 0.00 m apart"),
         ("start = [6, -10, 0]\nweight = 0", "weight must be a number from"),
     ] {

@@ -1,6 +1,8 @@
-//! A vehicle that flies around what hovers on its lane is struck itself: nothing touches, and all come down.
+//! A vehicle that flies around what hovers on its lane is struck itself: nothing touches, and all
+//! come down.
 //!
-//! `FLOCKMATE_BESIDE=N` looks for such vehicles in N missions in place of [`MISSIONS`], `FLOCKMATE_BESIDE_FROM` in others.
+//! `FLOCKMATE_BESIDE=N` looks for such vehicles in N missions in place of [`MISSIONS`],
+//! `FLOCKMATE_BESIDE_FROM` in others.
 
 use flockmate_tests::{areas, covered, number};
 use rand_core::{Rng as _, SeedableRng as _};
@@ -31,7 +33,8 @@ const STRIKES: [&str; 14] = [
 ];
 
 fn fault(kind: &str, at_s: f32, vehicle: u8) -> String {
-    let keys = format!("[[faults]]\nkind = \"{kind}\"\n").replace("duration_s = \"", "duration_s = ");
+    let keys =
+        format!("[[faults]]\nkind = \"{kind}\"\n").replace("duration_s = \"", "duration_s = ");
     // A number has no quotes behind it.
     let keys = match keys.contains("duration_s") {
         true => keys.trim_end().trim_end_matches('"').to_owned() + "\n",
@@ -53,7 +56,8 @@ fn flies_around(log: &str) -> Option<(f32, u8)> {
 fn struck(seed: u64) -> (bool, Option<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
-    let mut text = areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.4 } else { 0.1 });
+    let mut text =
+        areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.4 } else { 0.1 });
     let hovers = 1 + (random.next_u32() % count as u32) as u8;
     let at_s = 60.0 + (random.next_u32() % 150) as f32;
     text += &fault(HOVERS[(seed / 4 % 2) as usize], at_s, hovers);
@@ -69,7 +73,8 @@ fn struck(seed: u64) -> (bool, Option<String>) {
     let others = result.vehicles.iter().filter(|v| v.id != hovers && v.id != vehicle);
     let stays = others.filter(|v| !ends(&v.end)).count();
     let disarmed = log.lines().any(|line| {
-        line.contains("Disarmed in flight") && !(kind == "kill" && line.contains(&format!("Some({vehicle})")))
+        line.contains("Disarmed in flight")
+            && !(kind == "kill" && line.contains(&format!("Some({vehicle})")))
     });
     let wrong = touches || stays > 0 || disarmed;
     (true, wrong.then(|| format!("seed {seed} {kind}: {safety:?}, {stays} stay\n{log}\n{text}")))

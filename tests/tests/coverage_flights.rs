@@ -1,5 +1,5 @@
-//! Coverage missions flown whole: companions plan from the mission file, the autopilots trigger their cameras, and the
-//! pictures are judged by where they were truly taken.
+//! Coverage missions flown whole: companions plan from the mission file, the autopilots trigger
+//! their cameras, and the pictures are judged by where they were truly taken.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -70,18 +70,24 @@ fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretche
     for wrong in &wrong {
         println!("{}\n", wrong.chars().take(3000).collect::<String>());
     }
-    let ended = |how: Option<&str>| all.iter().filter(|outcome| outcome.as_ref() == Ok(&how)).count() as u64;
+    let ended = |how: Option<&str>| {
+        all.iter().filter(|outcome| outcome.as_ref() == Ok(&how)).count() as u64
+    };
     for known in NO_FLIGHT {
         println!("{known}: {}", ended(Some(known)));
     }
     let flown = ended(None);
     let in_stretches = in_stretches.into_inner();
-    println!("{flown} of {count} areas flown, {in_stretches} of them in stretches, {} wrong", wrong.len());
+    println!(
+        "{flown} of {count} areas flown, {in_stretches} of them in stretches, {} wrong",
+        wrong.len()
+    );
     assert!(in_stretches >= stretched);
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
 }
 
-/// The tracks of CPP's Tables A1 to A12, as docs/coverage.md derives them from its times: east and north, metres.
+/// The tracks of CPP's Tables A1 to A12, as docs/coverage.md derives them from its times: east and
+/// north, metres.
 const TRACKS: [(&str, [u32; 2]); 2] = [("short", [150, 180]), ("long", [320, 420])];
 
 /// One of them: lanes of 10 m from 35 m at 5 m/s, as the paper flies it, in gusts of 3 m/s.
@@ -104,7 +110,8 @@ fn track([east_m, north_m]: [u32; 2], vehicles: usize, autopilot: &str, estimato
     )
 }
 
-/// The short track by 3 and by 5 vehicles of either autopilot with either estimator; `FLOCKMATE_TRACKS=2` flies the long one as well.
+/// The short track by 3 and by 5 vehicles of either autopilot with either estimator;
+/// `FLOCKMATE_TRACKS=2` flies the long one as well.
 #[test]
 fn the_papers_tracks_are_photographed_whole() {
     let mut cases = Vec::new();
@@ -117,34 +124,37 @@ fn the_papers_tracks_are_photographed_whole() {
             }
         }
     }
-    let one = |(name, sides, vehicles, autopilot, estimator): &(&str, [u32; 2], usize, &str, &str)| {
-        let case = format!("{name} | {vehicles} | {autopilot} | {estimator}");
-        let (result, log) = covered::fly_text(&track(*sides, *vehicles, autopilot, estimator))
-            .unwrap_or_else(|error| panic!("{case}: {error}"));
-        let coverage = result.coverage.as_ref().expect("it has an area");
-        println!(
-            "| {case} | {:.0} | {} | {:.2} % | {} | {} | {:.2} |",
-            result.totals.makespan_s,
-            coverage.photos,
-            100.0 * coverage.covered_share,
-            coverage.left,
-            coverage.twice,
-            result.safety.min_separation_m.unwrap_or(f64::NAN),
-        );
-        covered::faults(&result).map(|faults| format!("{case}: {faults}\n{log}"))
-    };
+    let one =
+        |(name, sides, vehicles, autopilot, estimator): &(&str, [u32; 2], usize, &str, &str)| {
+            let case = format!("{name} | {vehicles} | {autopilot} | {estimator}");
+            let (result, log) = covered::fly_text(&track(*sides, *vehicles, autopilot, estimator))
+                .unwrap_or_else(|error| panic!("{case}: {error}"));
+            let coverage = result.coverage.as_ref().expect("it has an area");
+            println!(
+                "| {case} | {:.0} | {} | {:.2} % | {} | {} | {:.2} |",
+                result.totals.makespan_s,
+                coverage.photos,
+                100.0 * coverage.covered_share,
+                coverage.left,
+                coverage.twice,
+                result.safety.min_separation_m.unwrap_or(f64::NAN),
+            );
+            covered::faults(&result).map(|faults| format!("{case}: {faults}\n{log}"))
+        };
     let wrong: Vec<String> = cases.par_iter().filter_map(one).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(4000).collect::<String>());
 }
 
-/// On the pad, while it starts, or in the air: a vehicle that is paused and resumed photographs its part.
+/// On the pad, while it starts, or in the air: a vehicle that is paused and resumed photographs its
+/// part.
 #[test]
 fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
     let one = |seed: u64| {
         let mut random = Pcg32::seed_from_u64(seed);
         // Most on their pads: their times there are short.
         let at_s = 0.5 + (random.next_u32() % [600, 6000][(seed % 3 / 2) as usize]) as f32 / 100.0;
-        let (duration_s, vehicle) = ((1 + random.next_u32() % 40) as f32 / 10.0, 1 + random.next_u32() % 2);
+        let (duration_s, vehicle) =
+            ((1 + random.next_u32() % 40) as f32 / 10.0, 1 + random.next_u32() % 2);
         let autopilot = ["px4", "ardupilot"][(seed % 2) as usize];
         let text = format!(
             "seed = {seed}\n[area]\npolygon = [[0, 0], [80, 0], [80, 60]]\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\n\
@@ -166,7 +176,8 @@ fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
     );
 }
 
-/// Two vehicles that each err by as much as stops none of them stay apart by the safety distance, whatever the separation.
+/// Two vehicles that each err by as much as stops none of them stay apart by the safety distance,
+/// whatever the separation.
 #[test]
 fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
     let mut random = Pcg32::seed_from_u64(7);
@@ -192,8 +203,8 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
     }
 }
 
-/// Pads as near as a scenario may have them, low and fast flights, gusts: a vehicle comes over its pad with what it flew, and
-/// down beside one that stands there.
+/// Pads as near as a scenario may have them, low and fast flights, gusts: a vehicle comes over its
+/// pad with what it flew, and down beside one that stands there.
 #[test]
 fn vehicles_land_on_pads_as_near_as_they_may_be() {
     let outcome = |seed: u64| -> Result<(), String> {
@@ -229,7 +240,9 @@ fn vehicles_land_on_pads_as_near_as_they_may_be() {
         let (result, log) = covered::fly_text(&text)?;
         match covered::faults(&result) {
             None => Ok(()),
-            Some(faults) => Err(format!("seed {seed}, pads {apart_cm} cm apart: {faults}\n{log}{text}")),
+            Some(faults) => {
+                Err(format!("seed {seed}, pads {apart_cm} cm apart: {faults}\n{log}{text}"))
+            }
         }
     };
     let count = number("FLOCKMATE_PADS", 16);

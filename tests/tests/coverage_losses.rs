@@ -1,4 +1,5 @@
-//! A vehicle lost in a coverage mission: the others divide what it leaves, and photograph all of it.
+//! A vehicle lost in a coverage mission: the others divide what it leaves, and photograph all of
+//! it.
 //!
 //! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
 
@@ -56,17 +57,20 @@ struct Draw {
     most_in_three: usize,
 }
 
-/// The row of a vehicle that no other vehicle heard for so long that its part was divided among the others.
+/// The row of a vehicle that no other vehicle heard for so long that its part was divided among the
+/// others.
 const GIVEN_AWAY: &str = "Its part was given away: landing";
 
-/// After the stroke of another: its pilot keeps that for good, and the row of the vehicle that it keeps on its pad.
+/// After the stroke of another: its pilot keeps that for good, and the row of the vehicle that it
+/// keeps on its pad.
 const START_BARRED_S: f64 = 20.0 + 180.0 + 20.0;
 
 /// What the radio does beside losing messages one by one.
 #[derive(Clone, Copy, PartialEq)]
 enum Radio {
     Even,
-    /// Vehicles hear and send nothing for seconds, or send without hearing, or hear without being heard.
+    /// Vehicles hear and send nothing for seconds, or send without hearing, or hear without being
+    /// heard.
     Rough,
 }
 
@@ -77,8 +81,8 @@ fn large(random: &mut Pcg32, vehicles: usize, loss: f32) -> String {
     kept.map(|line| format!("{line}\n")).collect::<String>() + &format!("radio_loss = {loss}\n")
 }
 
-/// Bursts in which a vehicle neither hears nor sends, and spells in which it does one of both: half of them are over before anybody
-/// is given up.
+/// Bursts in which a vehicle neither hears nor sends, and spells in which it does one of both: half
+/// of them are over before anybody is given up.
 fn rough(random: &mut Pcg32, vehicles: usize, until_s: u32) -> String {
     let one = |k: u32| {
         let vehicle = 1 + random.next_u32() % vehicles as u32;
@@ -102,14 +106,18 @@ fn drawn(draw: Draw, seed: u64) -> (String, &'static str, Vec<u8>, f32) {
     // Six seeds strike in every way, each half with 50 % loss and the next six with the other loss.
     let kind = draw.kinds[(seed % 6) as usize];
     let count = [3, 5][(seed / 12 % 2) as usize];
-    let mut text =
-        (draw.area)(&mut random, count, if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 });
+    let mut text = (draw.area)(
+        &mut random,
+        count,
+        if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 },
+    );
     let first = (random.next_u32() % count as u32) as u8;
     // Beside others, of which some are in the air and some on their pads yet.
     let at_s = 20.0 + (random.next_u32() % draw.until_s) as f32;
     let mut struck = Vec::new();
     for k in 0..draw.struck {
-        let (vehicle, also) = (1 + (first + k as u8) % count as u8, draw.kinds[(seed as usize + 5 * k) % 6]);
+        let (vehicle, also) =
+            (1 + (first + k as u8) % count as u8, draw.kinds[(seed as usize + 5 * k) % 6]);
         text += &format!("[[faults]]\nat_s = {at_s}\nkind = \"{also}\"\nvehicle = {vehicle}\n");
         struck.push(vehicle);
     }
@@ -138,7 +146,8 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let whole = ["Done", "no goal", "Aborted: Landed beside its goal"];
     let short = |end: &str| !whole.iter().any(|whole| end.starts_with(whole));
     // What a vehicle reports that it flew around, the next start flies.
-    let around = |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<u64>().ok();
+    let around =
+        |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<u64>().ok();
     let reported: u64 = log.lines().filter_map(around).sum();
     // Of the area no more than those waypoints' share.
     let missing = (1.0 - coverage.covered_share) * coverage.photos as f64;
@@ -163,12 +172,16 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         left: coverage.left,
         twice: coverage.twice,
         landed_short,
-        broken: [safety.wall_contacts, safety.violations, safety.deadlocks].map(|count| count as u64),
+        broken: [safety.wall_contacts, safety.violations, safety.deadlocks]
+            .map(|count| count as u64),
         explained: vehicles
             .iter()
             .filter(fell_short)
             .all(|v| covered::says(&log, v.id, &reasons) || waits(v))
-            && (whole || landed_short > 0 || missing <= reported as f64 || vehicles.iter().all(had_none)),
+            && (whole
+                || landed_short > 0
+                || missing <= reported as f64
+                || vehicles.iter().all(had_none)),
         text: log,
     })
 }
@@ -193,8 +206,8 @@ fn what_two_vehicles_leave_that_are_lost_at_once_over_a_rough_radio_is_photograp
     are_whole(Draw { radio: Radio::Rough, ..TWO });
 }
 
-/// A vehicle whose power is gone above its pad falls beside it: others that come down there later keep off all that its fall may have
-/// reached.
+/// A vehicle whose power is gone above its pad falls beside it: others that come down there later
+/// keep off all that its fall may have reached.
 #[test]
 fn who_lands_keeps_off_where_another_may_have_fallen() {
     let one = |seed: u64| -> Option<(u64, f32, bool)> {
@@ -210,12 +223,15 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
         let height = text.lines().find_map(|line| line.strip_prefix("height_m = "))?;
         let descent_s: f64 = height.parse().ok()?;
         let at_s = ends_s - descent_s + f64::from(random.next_u32() % 300) / 10.0 - 15.0;
-        let struck = format!("{text}[[faults]]\nat_s = {at_s:.1}\nkind = \"kill\"\nvehicle = {fallen}\n");
+        let struck =
+            format!("{text}[[faults]]\nat_s = {at_s:.1}\nkind = \"kill\"\nvehicle = {fallen}\n");
         let scenario = scenario::parse(&struck, "area").ok()?;
         let mut mission = Mission::prepare(scenario, &Progress::hidden()).ok()?;
         let flight = covered::flight(&mut mission, &mut Vec::new()).ok()?;
         let vehicles = || flight.result.vehicles.iter().zip(&flight.tracks);
-        let lies = |wanted: u8| vehicles().find(|(v, _)| v.id == wanted).and_then(|(_, track)| track.last());
+        let lies = |wanted: u8| {
+            vehicles().find(|(v, _)| v.id == wanted).and_then(|(_, track)| track.last())
+        };
         let wreck = lies(fallen)?.1;
         let beside = |(v, track): (&VehicleResult, &Vec<(f32, Point)>)| -> Option<f32> {
             let at = track.last().filter(|_| v.id != fallen && v.landed)?.1;
@@ -233,14 +249,19 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
     };
     let (from, count) = (number("FLOCKMATE_FALLEN_FROM", 0), number("FLOCKMATE_FALLEN", 20));
     let all: Vec<_> = (from..from + count).into_par_iter().filter_map(one).collect();
-    let wrong: Vec<u64> = all.iter().filter(|(_, _, wrong)| *wrong).map(|(seed, ..)| *seed).collect();
+    let wrong: Vec<u64> =
+        all.iter().filter(|(_, _, wrong)| *wrong).map(|(seed, ..)| *seed).collect();
     let least_m = all.iter().fold(f32::INFINITY, |least, (_, m, _)| least.min(*m));
-    println!("{} flown, {least_m} m from a wreck at least, too near or not down in {wrong:?}", all.len());
+    println!(
+        "{} flown, {least_m} m from a wreck at least, too near or not down in {wrong:?}",
+        all.len()
+    );
     assert!(wrong.is_empty());
     assert!(2 * all.len() as u64 > count);
 }
 
-/// One vehicle is heard no more and flies on as long as its lease allows, while others come down beside it.
+/// One vehicle is heard no more and flies on as long as its lease allows, while others come down
+/// beside it.
 #[test]
 fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
     let one = |seed: u64| -> Option<(u64, bool)> {
@@ -257,10 +278,11 @@ fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
         let landing = 1 + random.next_u32() % (count as u32 - 1);
         for k in 1..=landing {
             let vehicle = 1 + (silent + k) % count as u32;
-            let kind =
-                ["battery-low", "return-order", "pilot-takeover"][(random.next_u32() % 5 / 2) as usize];
+            let kind = ["battery-low", "return-order", "pilot-takeover"]
+                [(random.next_u32() % 5 / 2) as usize];
             let at_s = at_s + random.next_u32() % 60;
-            text += &format!("[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
+            text +=
+                &format!("[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
         }
         let (result, log) = covered::fly_text(&text).ok()?;
         let safety = result.safety;
@@ -272,7 +294,8 @@ fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
     };
     let (from, count) = (number("FLOCKMATE_UNHEARD_FROM", 0), number("FLOCKMATE_UNHEARD", 40));
     let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
-    let broken: Vec<u64> = all.iter().filter(|(_, broken)| *broken).map(|(seed, _)| *seed).collect();
+    let broken: Vec<u64> =
+        all.iter().filter(|(_, broken)| *broken).map(|(seed, _)| *seed).collect();
     println!("{} flown, too near in {broken:?}", all.len());
     assert!(broken.is_empty());
     assert!(2 * all.len() as u64 > count);
@@ -289,15 +312,22 @@ fn what_a_vehicle_leaves_that_is_lost_before_it_flies_is_photographed_by_the_oth
     are_whole(Draw { until_s: 30, ..EVEN });
 }
 
-/// Above pads from which others are yet to start, or on their ways: whoever cannot start leaves its part to those that fly.
+/// Above pads from which others are yet to start, or on their ways: whoever cannot start leaves its
+/// part to those that fly.
 #[test]
 fn what_waits_below_a_vehicle_that_a_pilot_keeps_is_photographed_by_the_others() {
     are_whole(Draw { kinds: ["pilot-takeover"; 6], until_s: 40, ..EVEN });
 }
 
 /// One vehicle is lost among others with radios that lose messages one by one.
-const EVEN: Draw =
-    Draw { area: areas::lost, kinds: KINDS, until_s: 220, struck: 1, radio: Radio::Even, most_in_three: 1 };
+const EVEN: Draw = Draw {
+    area: areas::lost,
+    kinds: KINDS,
+    until_s: 220,
+    struck: 1,
+    radio: Radio::Even,
+    most_in_three: 1,
+};
 /// Two of three or of five are lost at once. Of three the last one has no majority: it lands.
 const TWO: Draw = Draw { struck: 2, most_in_three: 2, ..EVEN };
 
@@ -328,7 +358,8 @@ fn are_whole(draw: Draw) {
     let (wrong, short) = (all.iter().filter(wrong).count(), all.iter().filter(short).count());
     println!("{} flown, {short} not whole for a reason that is named, {wrong} wrong", all.len());
     assert_eq!(wrong, 0);
-    // Where the rule lands a vehicle that a rough radio cuts off, or one that is alone, the area may be whole all the same.
+    // Where the rule lands a vehicle that a rough radio cuts off, or one that is alone, the area
+    // may be whole all the same.
     let incomplete = all.iter().filter(|o| o.covered < 1.0).count();
     println!("{incomplete} incomplete");
     let rare = if draw.radio == Radio::Rough || draw.struck > 1 { incomplete } else { short };
@@ -340,10 +371,14 @@ fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
     let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
     let places = photographs.stretches(&flight.path);
     let places = places.flat_map(|shots| (0..shots.count).map(move |k| shots.picture_at_m(k)));
-    places.filter(|at_m| *at_m <= along_m + 0.01).filter_map(|at_m| flight.path.point_at(at_m)).collect()
+    places
+        .filter(|at_m| *at_m <= along_m + 0.01)
+        .filter_map(|at_m| flight.path.point_at(at_m))
+        .collect()
 }
 
-/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by the vehicle that kept it, or by the one that has it now.
+/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by the
+/// vehicle that kept it, or by the one that has it now.
 #[test]
 fn divisions_leave_nothing_out_and_give_nothing_twice() {
     let one = |seed: u64| -> usize {
@@ -353,7 +388,8 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
         let scenario = scenario::parse(&text, "area").expect("a scenario");
         let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
         let Ok(mut plan) = mission.plan() else { return 0 };
-        let mut whole: Vec<Point> = plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
+        let mut whole: Vec<Point> =
+            plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
         let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
         let mut lives = vec![true; vehicles];
         let mut divided = 0;
@@ -373,13 +409,15 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
             let lots: Vec<DivisionInput> = (0..vehicles).map(|i| lot(i, &mut random)).collect();
             let before = plan;
             losses.push(lots.clone());
-            // Where vehicles hold nearer to each other than any order of departures allows there is none, nor where a path
-            // would need more corners than it may have.
+            // Where vehicles hold nearer to each other than any order of departures allows there is
+            // none, nor where a path would need more corners than it may have.
             match mission.plan_rest(&[], losses.iter().map(|lots| &lots[..])) {
                 Ok(divided) => plan = divided,
                 Err(error) => {
                     let text = format!("{error:#}");
-                    let known = ["cannot pass", "too many corners"].iter().any(|known| text.contains(known));
+                    let known = ["cannot pass", "too many corners"]
+                        .iter()
+                        .any(|known| text.contains(known));
                     assert!(known, "seed {seed}: {text}");
                     return divided;
                 }
@@ -429,15 +467,17 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
         let mut plan = mission.plan().expect("it was planned");
         let planned = CoveragePlan::plan_as_companions(&mission.scenario).expect("it was planned");
-        let whole = (0..planned.tracks.waypoint_count()).filter_map(|number| planned.tracks.waypoint(number));
+        let whole = (0..planned.tracks.waypoint_count())
+            .filter_map(|number| planned.tracks.waypoint(number));
         let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
         while let Some(lots) = next_division_inputs(&plan) {
             for (flight, lot) in plan.flights.iter().zip(&lots) {
                 kept.extend(pictures(flight, lot.along_m()));
             }
             losses.push(lots);
-            plan =
-                mission.plan_rest(&[], losses.iter().map(|lots| &lots[..])).expect("it was divided before");
+            plan = mission
+                .plan_rest(&[], losses.iter().map(|lots| &lots[..]))
+                .expect("it was divided before");
         }
         kept.extend(plan.flights.iter().flat_map(|flight| pictures(flight, f32::INFINITY)));
         let mut count = 0;

@@ -1,5 +1,5 @@
-//! The plans that `cover` writes, flown without a companion: uploaded to both simulated autopilots, in memory. Pictures are
-//! counted and placed by the truth.
+//! The plans that `cover` writes, flown without a companion: uploaded to both simulated autopilots,
+//! in memory. Pictures are counted and placed by the truth.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -21,7 +21,8 @@ const PASSED_UP_M: f32 = 1.1;
 const CRUISE_MPS: f32 = 5.0;
 /// PX4's camera looks every 50 ms.
 const LATE_M: f32 = 0.05 * CRUISE_MPS;
-/// Between two pictures by distance: the look is in the first step of 4 ms after that, and gusts and estimates are none here.
+/// Between two pictures by distance: the look is in the first step of 4 ms after that, and gusts
+/// and estimates are none here.
 const GAP_M: f32 = LATE_M + 0.05;
 
 fn scenario(personality: &str, trigger: &str) -> String {
@@ -89,7 +90,8 @@ impl Client {
             }
             let scale = if item.frame == 2 { 1.0 } else { 1e7 };
             for (at, value) in [(16, item.place[0]), (20, item.place[1])] {
-                payload[at..at + 4].copy_from_slice(&((value * scale).round() as i32).to_le_bytes());
+                payload[at..at + 4]
+                    .copy_from_slice(&((value * scale).round() as i32).to_le_bytes());
             }
             payload[24..28].copy_from_slice(&(item.place[2] as f32).to_le_bytes());
             payload[28..30].copy_from_slice(&(k as u16).to_le_bytes());
@@ -114,7 +116,12 @@ impl Client {
 }
 
 /// Flies one vehicle's plan and returns its pictures.
-fn fly(planned: &CoveragePlan<'_>, stops: &[Stop], items: &[Item], personality: AutopilotKind) -> Vec<Photo> {
+fn fly(
+    planned: &CoveragePlan<'_>,
+    stops: &[Stop],
+    items: &[Item],
+    personality: AutopilotKind,
+) -> Vec<Photo> {
     let origin = planned.wanted.origin;
     let start = stops[0].position;
     let config = Config {
@@ -126,8 +133,13 @@ fn fly(planned: &CoveragePlan<'_>, stops: &[Stop], items: &[Item], personality: 
         ..Config::default()
     };
     let autopilot = Autopilot::new(&config).expect("a sound configuration");
-    let mut client =
-        Client { autopilot, framer: Framer::new(), acks: Vec::new(), reached: Vec::new(), announced: 0 };
+    let mut client = Client {
+        autopilot,
+        framer: Framer::new(),
+        acks: Vec::new(),
+        reached: Vec::new(),
+        announced: 0,
+    };
     client.run(3.0);
     // The delay before it leaves is the swarm's; ArduPilot's item 0 is home.
     let mut items: Vec<Item> = items.iter().filter(|item| item.command != 93).cloned().collect();
@@ -152,9 +164,11 @@ fn fly(planned: &CoveragePlan<'_>, stops: &[Stop], items: &[Item], personality: 
         );
     }
     client.run(0.1);
-    let off = (client.autopilot.true_state().position - stops[stops.len() - 1].position).xy().norm();
+    let off =
+        (client.autopilot.true_state().position - stops[stops.len() - 1].position).xy().norm();
     assert!(off < 1.0, "{personality:?} came home {off} m off");
-    let all: Vec<u16> = (u16::from(personality == AutopilotKind::Ardupilot)..items.len() as u16).collect();
+    let all: Vec<u16> =
+        (u16::from(personality == AutopilotKind::Ardupilot)..items.len() as u16).collect();
     assert_eq!(client.reached, all, "each item is reported once");
     let photos = client.autopilot.take_photos();
     assert_eq!(client.announced, photos.len(), "each picture is announced");
@@ -166,7 +180,8 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
     (off.xy().norm(), off.z.abs())
 }
 
-/// By distance: pictures of a lane are nowhere further apart than they are planned, but for the look that they wait for.
+/// By distance: pictures of a lane are nowhere further apart than they are planned, but for the
+/// look that they wait for.
 fn judge_gaps(photos: &[Photo], wanted: &[&Stop], label: &str) {
     for lane in wanted.chunk_by(|a, b| a.lane == b.lane) {
         let [first, .., last] = lane else { continue };
@@ -179,9 +194,15 @@ fn judge_gaps(photos: &[Photo], wanted: &[&Stop], label: &str) {
         // Lanes that a zone divides lie in one line.
         along.retain(|at| (-PASSED_M..way.norm() + PASSED_M).contains(at));
         along.sort_by(f32::total_cmp);
-        assert!(along[0] < PASSED_M && along[along.len() - 1] > way.norm() - PASSED_M, "{label}: {along:?}");
+        assert!(
+            along[0] < PASSED_M && along[along.len() - 1] > way.norm() - PASSED_M,
+            "{label}: {along:?}"
+        );
         let widest_m = along.windows(2).fold(0.0, |most: f32, pair| most.max(pair[1] - pair[0]));
-        assert!(widest_m < step_m + GAP_M, "{label}: {widest_m} m without a picture, {step_m} m planned");
+        assert!(
+            widest_m < step_m + GAP_M,
+            "{label}: {widest_m} m without a picture, {step_m} m planned"
+        );
     }
 }
 
@@ -194,7 +215,8 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
     for (sortie, stops, _) in &flights {
         let items = export::flight_items(&planned, sortie, stops);
         let photos = fly(&planned, stops, &items, personality);
-        let wanted: Vec<&Stop> = stops.iter().filter(|s| matches!(s.act, StopAction::Photo(_))).collect();
+        let wanted: Vec<&Stop> =
+            stops.iter().filter(|s| matches!(s.act, StopAction::Photo(_))).collect();
         assert!(wanted.len() > 10);
         let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
         let label = format!("{personality:?}, {trigger}: {} of {}", photos.len(), wanted.len());
@@ -203,7 +225,10 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
                 assert_eq!(photos.len(), wanted.len(), "{label}");
                 for (photo, stop) in photos.iter().zip(&wanted) {
                     let (across, up) = off_by(photo, &stop.position);
-                    assert!(across < PASSED_M && up < PASSED_UP_M, "{label}: {across} m, {up} m off");
+                    assert!(
+                        across < PASSED_M && up < PASSED_UP_M,
+                        "{label}: {across} m, {up} m off"
+                    );
                 }
             }
             "distance" => {
@@ -211,9 +236,11 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
                 let counts = wanted.len() - lanes..=wanted.len() + lanes;
                 assert!(counts.contains(&photos.len()), "{label}, {lanes} lanes");
                 judge_gaps(&photos, &wanted, &label);
-                // Both ends of a lane as they are passed; between them each is late by the looks before it.
+                // Both ends of a lane as they are passed; between them each is late by the looks
+                // before it.
                 for (k, stop) in wanted.iter().enumerate() {
-                    let before = wanted[..k].iter().rev().take_while(|s| s.lane == stop.lane).count();
+                    let before =
+                        wanted[..k].iter().rev().take_while(|s| s.lane == stop.lane).count();
                     let near = |photo: &Photo| {
                         let (across, up) = off_by(photo, &stop.position);
                         across < PASSED_M + LATE_M * before as f32 && up < PASSED_UP_M
@@ -225,7 +252,8 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
         }
         if personality == AutopilotKind::Px4 && trigger == "waypoint" {
             // The heading of a sweep: one for all, within what PX4 waits for.
-            let turned = photos.iter().map(|photo| (photo.heading_rad - photos[0].heading_rad).abs());
+            let turned =
+                photos.iter().map(|photo| (photo.heading_rad - photos[0].heading_rad).abs());
             assert!(turned.fold(0.0, f32::max) < 0.43, "{label}");
         }
     }
@@ -243,7 +271,8 @@ fn each_plan_is_flown_and_photographs_what_was_planned() {
     }
 }
 
-/// Along lanes that rise and fall pictures are as far apart, and as near to where they were planned, as over level ground.
+/// Along lanes that rise and fall pictures are as far apart, and as near to where they were
+/// planned, as over level ground.
 #[test]
 fn plans_above_terrain_are_flown_as_planned() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -253,7 +282,8 @@ fn plans_above_terrain_are_flown_as_planned() {
     let mut text = "ncols 100\nnrows 100\nxllcorner -80\nyllcorner -80\ncellsize 2\n".to_owned();
     for row in (0..100).rev() {
         let at = |k: i32| f64::from(k) * 2.0 - 79.0;
-        let row: Vec<String> = (0..100).map(|column| format!("{:.2}", height(at(column), at(row)))).collect();
+        let row: Vec<String> =
+            (0..100).map(|column| format!("{:.2}", height(at(column), at(row)))).collect();
         text += &(row.join(" ") + "\n");
     }
     std::fs::write(&file, text).expect("a file");
@@ -268,7 +298,8 @@ fn plans_above_terrain_are_flown_as_planned() {
             let found = scenario::parse(&text, "plans").expect("a scenario");
             let planned = CoveragePlan::new(&found, Method::Binpat).expect("a plan");
             let flights = planned.flights();
-            let heights = flights.iter().flat_map(|(_, stops, _)| stops).filter(|stop| stop.lane.is_some());
+            let heights =
+                flights.iter().flat_map(|(_, stops, _)| stops).filter(|stop| stop.lane.is_some());
             let heights: Vec<f32> = heights.map(|stop| stop.position.z).collect();
             let rise_m = heights.iter().fold(0.0, |most: f32, z| most.max(z - heights[0]));
             assert!(rise_m > 5.0, "its lanes rise over the ridge: {rise_m}");
@@ -276,8 +307,8 @@ fn plans_above_terrain_are_flown_as_planned() {
     }
 }
 
-/// With the overlaps that a scenario has by default, autopilots alone leave nothing out: they pass the ends of lanes within 2 m,
-/// and ArduPilot turns while it flies on.
+/// With the overlaps that a scenario has by default, autopilots alone leave nothing out: they pass
+/// the ends of lanes within 2 m, and ArduPilot turns while it flies on.
 #[test]
 fn plans_flown_without_a_companion_photograph_the_whole_area() {
     for (name, personality) in ALL {
@@ -290,15 +321,21 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
             let mut pictures = Vec::new();
             for (sortie, stops, _) in &planned.flights() {
                 let items = export::flight_items(&planned, sortie, stops);
-                pictures.extend(fly(&planned, stops, &items, personality).iter().map(|photo| Picture {
-                    vehicle: None,
-                    t_s: photo.time_us as f32 * 1e-6,
-                    position: photo.position,
-                    heading: FRAC_PI_2 - photo.heading_rad,
+                pictures.extend(fly(&planned, stops, &items, personality).iter().map(|photo| {
+                    Picture {
+                        vehicle: None,
+                        t_s: photo.time_us as f32 * 1e-6,
+                        position: photo.position,
+                        heading: FRAC_PI_2 - photo.heading_rad,
+                    }
                 }));
             }
             let found = check::check_pictures(&planned, pictures);
-            assert_eq!((found.covered_share, found.missing), (1.0, None), "{personality:?}, {trigger}");
+            assert_eq!(
+                (found.covered_share, found.missing),
+                (1.0, None),
+                "{personality:?}, {trigger}"
+            );
         }
     }
 }

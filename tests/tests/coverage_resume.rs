@@ -1,6 +1,8 @@
-//! Coverage missions that are interrupted, and started again: the rest is flown, and nothing is left out.
+//! Coverage missions that are interrupted, and started again: the rest is flown, and nothing is
+//! left out.
 //!
-//! `FLOCKMATE_RESUMED=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_RESUMED_FROM` others.
+//! `FLOCKMATE_RESUMED=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_RESUMED_FROM`
+//! others.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +21,8 @@ const MISSIONS: u64 = 8;
 /// Starts until the area is whole.
 const STARTS: usize = 4;
 /// What brings a vehicle down early; it is carried back to its pad, charged and switched on.
-const KINDS: [&str; 5] = ["battery-low", "battery-low", "pilot-takeover", "companion-reset", "kill"];
+const KINDS: [&str; 5] =
+    ["battery-low", "battery-low", "pilot-takeover", "companion-reset", "kill"];
 
 /// The scenario without faults, and what happens in the first flights.
 fn drawn(seed: u64) -> (String, Vec<String>) {
@@ -38,8 +41,10 @@ fn drawn(seed: u64) -> (String, Vec<String>) {
             let many = kind != "kill" && kind != "companion-reset";
             if vehicle == 1 || (many && (all || random.next_u32().is_multiple_of(2))) {
                 let at_s = 20 + random.next_u32() % 160;
-                let _ =
-                    write!(lines, "[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
+                let _ = write!(
+                    lines,
+                    "[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = {vehicle}\n"
+                );
             }
         }
         faults.push(lines);
@@ -47,7 +52,11 @@ fn drawn(seed: u64) -> (String, Vec<String>) {
     (text, faults)
 }
 
-fn fly(text: &str, dir: &Path, pictures: &mut Vec<Picture>) -> Result<(MissionResult, String), String> {
+fn fly(
+    text: &str,
+    dir: &Path,
+    pictures: &mut Vec<Picture>,
+) -> Result<(MissionResult, String), String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let mut scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
     for vehicle in &mut scenario.vehicles {
@@ -96,7 +105,12 @@ fn outcome(seed: u64) -> Option<Outcome> {
         let home = |end: &str| end == "Done" || end.starts_with("no goal");
         outcome.broken |= start >= faults.len() && !result.vehicles.iter().all(|v| home(&v.end));
         outcome.twice = coverage.twice;
-        let _ = writeln!(said, "start {start}: {:.2} % {:?}\n{log}", 100.0 * coverage.covered_share, safety);
+        let _ = writeln!(
+            said,
+            "start {start}: {:.2} % {:?}\n{log}",
+            100.0 * coverage.covered_share,
+            safety
+        );
         if coverage.covered_share >= 1.0 {
             outcome.starts = Some(start + 1);
             break;
@@ -108,11 +122,15 @@ fn outcome(seed: u64) -> Option<Outcome> {
 
 #[test]
 fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
-    let (from, count) = (number("FLOCKMATE_RESUMED_FROM", 0), number("FLOCKMATE_RESUMED", MISSIONS));
+    let (from, count) =
+        (number("FLOCKMATE_RESUMED_FROM", 0), number("FLOCKMATE_RESUMED", MISSIONS));
     let all: Vec<Outcome> = (from..from + count).into_par_iter().filter_map(outcome).collect();
     let wrong = |o: &&Outcome| o.broken || o.starts.is_none();
     for o in all.iter().filter(wrong) {
-        println!("seed {}: whole after {:?} starts, {} twice\n{}", o.seed, o.starts, o.twice, o.said);
+        println!(
+            "seed {}: whole after {:?} starts, {} twice\n{}",
+            o.seed, o.starts, o.twice, o.said
+        );
     }
     let after = |starts| all.iter().filter(|o| o.starts == Some(starts)).count();
     let twice: u64 = all.iter().map(|o| o.twice).sum();
@@ -124,21 +142,23 @@ fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
     assert_eq!(all.iter().filter(wrong).count(), 0);
 }
 
-/// A pilot takes a vehicle, which hovers, and others fly around it: whether they left waypoints out, and what is wrong after the
-/// next start, which is to fly those and no more.
+/// A pilot takes a vehicle, which hovers, and others fly around it: whether they left waypoints
+/// out, and what is wrong after the next start, which is to fly those and no more.
 fn around(seed: u64) -> (bool, Option<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
     // By a good estimate: what is left out is judged by true places.
     let text = areas::lost(&mut random, count, 0.1).replace("\"recorded\"", "\"rtk\"");
     let (vehicle, at_s) = (1 + random.next_u32() % count as u32, 60 + random.next_u32() % 150);
-    let struck =
-        format!("{text}[[faults]]\nat_s = {at_s}.0\nkind = \"pilot-takeover\"\nvehicle = {vehicle}\n");
+    let struck = format!(
+        "{text}[[faults]]\nat_s = {at_s}.0\nkind = \"pilot-takeover\"\nvehicle = {vehicle}\n"
+    );
     let dir = tempfile::tempdir().expect("a directory");
     let mut pictures = Vec::new();
     let Ok((result, log)) = fly(&struck, dir.path(), &mut pictures) else { return (false, None) };
     let left = result.coverage.expect("it has an area").left;
-    let around = |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<usize>().ok();
+    let around =
+        |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<usize>().ok();
     let reported: usize = log.lines().filter_map(around).sum();
     if left == 0 || !log.contains("Replanning → Follow: Flying around") {
         return (false, None);
@@ -147,9 +167,16 @@ fn around(seed: u64) -> (bool, Option<String>) {
     let (result, then) = fly(&text, dir.path(), &mut pictures).expect("it was flown before");
     let (coverage, second) = (result.coverage.expect("it has an area"), pictures.len() - first);
     // A new start of an area that counts as whole would fly all of it.
-    let wrong = coverage.covered_share < 1.0 || coverage.left > 0 || second < reported || 2 * second > first;
+    let wrong = coverage.covered_share < 1.0
+        || coverage.left > 0
+        || second < reported
+        || 2 * second > first;
     let said = || {
-        let after = format!("{left} left, then {} of {:.2} %", coverage.left, 100.0 * coverage.covered_share);
+        let after = format!(
+            "{left} left, then {} of {:.2} %",
+            coverage.left,
+            100.0 * coverage.covered_share
+        );
         format!(
             "seed {seed}: {first} pictures, {reported} reported, {after}, {second} pictures\n{log}\n{then}"
         )

@@ -1,4 +1,5 @@
-//! Areas that take more than one battery: each sortie comes home in time, and together they photograph everything once.
+//! Areas that take more than one battery: each sortie comes home in time, and together they
+//! photograph everything once.
 
 use flockmate_tests::areas::{self, Shape};
 use host_sim::coverage::check::{Findings, check_plan};
@@ -25,7 +26,8 @@ fn with_batteries(text: &str, endurance_s: f32) -> String {
 /// From pad to pad, with stops at both ends of each lane and over the pad.
 fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let stops = flight::route_stops(planned, route);
-    let steady_s = flight::stop_times_s(planned, route, &stops).last().copied().expect("a flight has stops");
+    let steady_s =
+        flight::stop_times_s(planned, route, &stops).last().copied().expect("a flight has stops");
     let (speed, accel) = (planned.vehicles[usize::from(route.vehicle)].cruise_mps, 1.5f32);
     // Over a leg from rest to rest.
     let lost_s = |leg_m: f32| match leg_m < speed * speed / accel {
@@ -44,8 +46,8 @@ fn lanes(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Route> {
     lanes.map(|lane| Route { first: lane[0], end: lane[lane.len() - 1] + 1, ..*route }).collect()
 }
 
-/// The fewest sorties within this time, one lane after the other as long as it fits: no part takes longer than what it
-/// is a part of. None where a lane alone does not fit.
+/// The fewest sorties within this time, one lane after the other as long as it fits: no part takes
+/// longer than what it is a part of. None where a lane alone does not fit.
 fn fewest(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Option<usize> {
     let (mut count, mut first) = (1, route.first);
     for lane in lanes(planned, route) {
@@ -90,7 +92,11 @@ struct Seen {
 fn judge_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32, seen: &mut Seen) {
     let sorties: Vec<_> = planned.sorties_of(route).collect();
     let flown: Vec<u32> = sorties.iter().flat_map(|sortie| sortie.route.waypoints()).collect();
-    assert_eq!(flown, route.waypoints().collect::<Vec<_>>(), "the route's waypoints in their order");
+    assert_eq!(
+        flown,
+        route.waypoints().collect::<Vec<_>>(),
+        "the route's waypoints in their order"
+    );
     for (sortie, number) in sorties.iter().zip(1..) {
         assert_eq!((sortie.number, usize::from(sortie.of)), (number, sorties.len()));
         assert_eq!((sortie.route.layer, sortie.route.heading), (route.layer, route.heading));
@@ -150,8 +156,8 @@ fn judge(seed: u64) -> Option<Seen> {
     let between_s = least_s + (1.1 * longest_s - least_s) * areas::unit(&mut random) as f32;
     let endurance_s = (between_s / USABLE_CHARGE * 10.0).round() / 10.0;
     let most_s = endurance_s * USABLE_CHARGE;
-    let scenario: Scenario =
-        scenario::parse(&with_batteries(&text, endurance_s), "batteries").expect("only batteries are new");
+    let scenario: Scenario = scenario::parse(&with_batteries(&text, endurance_s), "batteries")
+        .expect("only batteries are new");
     let mut seen = Seen::default();
     let planned = match CoveragePlan::new(&scenario, method) {
         Ok(planned) => planned,
@@ -161,8 +167,10 @@ fn judge(seed: u64) -> Option<Seen> {
             let short = |route: &&Route| fewest(&whole, route, most_s / ROUNDING).is_none();
             let routes: Vec<_> = whole.plan.routes.iter().filter(short).collect();
             let named = |route: &&Route| {
-                error
-                    .contains(&format!("vehicle {} would fly", plain.vehicles[usize::from(route.vehicle)].id))
+                error.contains(&format!(
+                    "vehicle {} would fly",
+                    plain.vehicles[usize::from(route.vehicle)].id
+                ))
             };
             assert!(routes.iter().any(named), "seed {seed}: {error}");
             return Some(Seen { refused: 1, ..seen });
@@ -170,7 +178,11 @@ fn judge(seed: u64) -> Option<Seen> {
     };
     assert_eq!(planned.plan, whole.plan, "seed {seed}: which vehicle flies what does not change");
     let findings = check_plan(&planned);
-    assert!(findings.is_clean(), "seed {seed}: {:?}", Findings { over_time: Vec::new(), ..findings });
+    assert!(
+        findings.is_clean(),
+        "seed {seed}: {:?}",
+        Findings { over_time: Vec::new(), ..findings }
+    );
     for route in &planned.plan.routes {
         judge_route(&planned, route, most_s, &mut seen);
     }
@@ -190,7 +202,8 @@ fn each_sortie_comes_home_in_time_and_nothing_is_left_out() {
     let all: Vec<Seen> = (0..count).into_par_iter().filter_map(judge).collect();
     let sum = |of: fn(&Seen) -> usize| all.iter().map(of).sum::<usize>() as u64;
     let (planned, refused) = (sum(|s| s.planned), sum(|s| s.refused));
-    let (single, several, every_cut) = (sum(|s| s.single), sum(|s| s.several), sum(|s| s.every_cut));
+    let (single, several, every_cut) =
+        (sum(|s| s.single), sum(|s| s.several), sum(|s| s.every_cut));
     println!(
         "{planned} areas planned, {refused} refused; {single} routes of one sortie, {several} of several, {every_cut} of \
          these beside every cut"
@@ -209,8 +222,8 @@ fn without_batteries_a_route_that_takes_longer_is_refused() {
                 endurance_s = 500\n";
     let sorties = |text: &str| -> Result<usize, String> {
         let scenario = scenario::parse(text, "one battery").expect("a scenario");
-        let planned =
-            CoveragePlan::new(&scenario, Method::PowellBinpat).map_err(|error| format!("{error:#}"))?;
+        let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)
+            .map_err(|error| format!("{error:#}"))?;
         judge_route(&planned, &planned.plan.routes[0], 500.0 * USABLE_CHARGE, &mut Seen::default());
         Ok(planned.sorties.len())
     };

@@ -1,6 +1,6 @@
-//! Coverage plans above terrain, random and real, judged by what is not the planner: never nearer to the ground than the height
-//! of the pictures, never higher than the tolerance above what must be flown over, no steeper than vehicles fly, all
-//! photographed.
+//! Coverage plans above terrain, random and real, judged by what is not the planner: never nearer
+//! to the ground than the height of the pictures, never higher than the tolerance above what must
+//! be flown over, no steeper than vehicles fly, all photographed.
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
@@ -34,17 +34,20 @@ fn drawn(seed: u64, folder: &std::path::Path) -> String {
     let trigger = ["distance", "waypoint", "none"][(seed % 3) as usize];
     text = text.replace("camera = ", &format!("trigger = \"{trigger}\"\ncamera = "));
     let [climb, descend] = [0, 1].map(|_| 0.5 + 4.0 * areas::unit(&mut random));
-    let speeds =
-        format!("climb_mps = {climb:.1}\ndescend_mps = {descend:.1}\nendurance_s = 36000.0\nspeed_max_mps");
+    let speeds = format!(
+        "climb_mps = {climb:.1}\ndescend_mps = {descend:.1}\nendurance_s = 36000.0\nspeed_max_mps"
+    );
     text = text.replace("speed_max_mps", &speeds);
     hills.under(&text, &folder.join(format!("hills-{seed}.asc")), tolerance_m)
 }
 
-/// The rule: no higher than the tolerance above the highest ground near, or what the slope from higher ground allows.
+/// The rule: no higher than the tolerance above the highest ground near, or what the slope from
+/// higher ground allows.
 struct Ceiling<'a> {
     grid: &'a HeightGrid,
     near_m: f32,
-    /// Along east or north; both add up. The field's steps of 0.1 m make it up to a fifth less steep than vehicles fly.
+    /// Along east or north; both add up. The field's steps of 0.1 m make it up to a fifth less
+    /// steep than vehicles fly.
     slope: f32,
 }
 
@@ -52,9 +55,12 @@ impl<'a> Ceiling<'a> {
     fn of(planned: &CoveragePlan<'a>) -> Self {
         let terrain = planned.wanted.terrain.as_ref().unwrap();
         let field = FieldView::parse(&terrain.field).unwrap();
-        let margin_m =
-            margins::required_distances(&planned.scenario.simulation, 0.0, &planned.scenario.vehicles)
-                .margin_m;
+        let margin_m = margins::required_distances(
+            &planned.scenario.simulation,
+            0.0,
+            &planned.scenario.vehicles,
+        )
+        .margin_m;
         let near_m = 3.0 * field.shape().cell_m + margin_m + 2.0 * terrain.grid.cell_m();
         Self { grid: &terrain.grid, near_m, slope: terrain.slope * 0.8 / std::f32::consts::SQRT_2 }
     }
@@ -65,7 +71,9 @@ impl<'a> Ceiling<'a> {
         for row in 0..rows {
             for column in 0..columns {
                 let cell = [column, row];
-                let Some(height_m) = self.grid.cell_height(cell).filter(|height_m| *height_m > over) else {
+                let Some(height_m) =
+                    self.grid.cell_height(cell).filter(|height_m| *height_m > over)
+                else {
                     continue;
                 };
                 let away = (self.grid.cell_centre(cell) - place).abs();
@@ -77,8 +85,8 @@ impl<'a> Ceiling<'a> {
     }
 }
 
-/// Random places around pictures that no picture shows where the ground is as high as there, not as below the camera: the
-/// plan need not see them, but overlaps should.
+/// Random places around pictures that no picture shows where the ground is as high as there, not as
+/// below the camera: the plan need not see them, but overlaps should.
 fn hidden(planned: &CoveragePlan<'_>, stops: &[&Stop], places: usize) -> usize {
     let (area, along) = (planned.wanted, planned.tracks.lane_direction());
     let pictures: Vec<Point> = stops
@@ -94,7 +102,8 @@ fn hidden(planned: &CoveragePlan<'_>, stops: &[&Stop], places: usize) -> usize {
         let place = near + along * u + Flat::new(-along.y, along.x) * v;
         let shown = |ground_m: &dyn Fn(&Point) -> f32| {
             pictures.iter().any(|camera| {
-                let (off, half) = (place - camera.xy(), (camera.z - ground_m(camera)) / area.height_m / 2.0);
+                let (off, half) =
+                    (place - camera.xy(), (camera.z - ground_m(camera)) / area.height_m / 2.0);
                 let footprint = area.spacing.footprint;
                 off.dot(&along).abs() <= footprint.along_m * half
                     && off.perp(&along).abs() <= footprint.across_m * half
@@ -160,7 +169,11 @@ fn plans_above_random_terrain_keep_their_heights() {
     }
     let planned = all.iter().filter(|outcome| matches!(outcome, Ok(true))).count();
     println!("{planned} of {} areas planned, {} wrong", all.len(), wrong.len());
-    assert!(wrong.is_empty() && planned * 2 >= all.len(), "{planned} planned, {} wrong", wrong.len());
+    assert!(
+        wrong.is_empty() && planned * 2 >= all.len(),
+        "{planned} planned, {} wrong",
+        wrong.len()
+    );
 }
 
 #[test]
@@ -209,10 +222,14 @@ fn plans_above_real_terrain_keep_their_heights() {
                 }
             }
         }
-        let findings = judge(&scenario.expect(name), 200).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let findings =
+            judge(&scenario.expect(name), 200).unwrap_or_else(|error| panic!("{name}: {error}"));
         let heights = findings.heights.unwrap();
         println!("{name}: {heights:?}");
-        assert!(heights.least_m >= height_m - 0.02 && heights.most_m > height_m + 3.0, "{name}: {heights:?}");
+        assert!(
+            heights.least_m >= height_m - 0.02 && heights.most_m > height_m + 3.0,
+            "{name}: {heights:?}"
+        );
     }
 }
 
@@ -221,7 +238,8 @@ fn what_cannot_be_planned_or_flown_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     // A tenth of the seeds are no areas: the first that is one.
     let texts = (100..140).map(|seed| drawn(seed, folder.path()));
-    let text = texts.into_iter().find(|text| scenario::parse(text, "random").is_ok()).expect("an area");
+    let text =
+        texts.into_iter().find(|text| scenario::parse(text, "random").is_ok()).expect("an area");
     let line = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap().to_owned();
     let first = line("start = ");
     let place = &first[..first.rfind(", ").unwrap()];
@@ -238,7 +256,8 @@ fn what_cannot_be_planned_or_flown_is_refused_by_name() {
             "alt_m near the ground",
         ),
     ] {
-        let error = scenario::parse(&text.replacen(&from, &to, 1), "random").unwrap_err().to_string();
+        let error =
+            scenario::parse(&text.replacen(&from, &to, 1), "random").unwrap_err().to_string();
         assert!(error.contains(why), "{why}: {error}");
     }
 }

@@ -1,5 +1,5 @@
-//! Areas above random hills, flown by companions that follow the ground: all photographed, by where each picture was truly
-//! taken and how high the ground is there, and nobody touches a hill.
+//! Areas above random hills, flown by companions that follow the ground: all photographed, by where
+//! each picture was truly taken and how high the ground is there, and nobody touches a hill.
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
@@ -21,11 +21,20 @@ fn drawn(seed: u64, folder: &std::path::Path, draw: impl Fn(&mut Pcg32) -> Strin
     let text = draw(&mut random);
     let [climb, descend] = [0, 1].map(|_| 1.0 + 2.0 * areas::unit(&mut random));
     let speeds = format!("climb_mps = {climb:.1}\ndescend_mps = {descend:.1}\nspeed_max_mps");
-    hills.under(&text.replace("speed_max_mps", &speeds), &folder.join(format!("{seed}.asc")), tolerance_m)
+    hills.under(
+        &text.replace("speed_max_mps", &speeds),
+        &folder.join(format!("{seed}.asc")),
+        tolerance_m,
+    )
 }
 
 /// Flies all; `Err` says what is wrong, `Ok` whether it was flown, and photographed whole.
-fn all_flown(name: &str, from: u64, count: u64, one: impl Fn(u64) -> Result<bool, String> + Send + Sync) {
+fn all_flown(
+    name: &str,
+    from: u64,
+    count: u64,
+    one: impl Fn(u64) -> Result<bool, String> + Send + Sync,
+) {
     let all: Vec<_> = (from..from + count).into_par_iter().map(one).collect();
     let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
     for wrong in wrong.iter().take(10) {
@@ -33,7 +42,11 @@ fn all_flown(name: &str, from: u64, count: u64, one: impl Fn(u64) -> Result<bool
     }
     let flown = all.iter().filter(|outcome| matches!(outcome, Ok(true))).count();
     println!("{name}: {flown} of {count} flown, {} wrong", wrong.len());
-    assert!(wrong.is_empty() && 3 * flown as u64 >= count, "{name}: {flown} flown, {} wrong", wrong.len());
+    assert!(
+        wrong.is_empty() && 3 * flown as u64 >= count,
+        "{name}: {flown} flown, {} wrong",
+        wrong.len()
+    );
 }
 
 /// `FLOCKMATE_HILLS=N` flies more, `FLOCKMATE_HILLS_FROM` others.
@@ -59,11 +72,13 @@ fn areas_above_random_hills_are_photographed_whole() {
     all_flown("hills", number("FLOCKMATE_HILLS_FROM", 0), number("FLOCKMATE_HILLS", 12), one);
 }
 
-/// What a lost vehicle leaves is photographed by the others, which follow the ground too; or a row of the table says why not.
+/// What a lost vehicle leaves is photographed by the others, which follow the ground too; or a row
+/// of the table says why not.
 #[test]
 fn losses_above_random_hills_touch_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
-    let kinds = ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
+    let kinds =
+        ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
     let one = |seed: u64| {
         let count = [3, 5][(seed % 2) as usize];
         let mut text = drawn(seed, folder.path(), |random| areas::lost(random, count, 0.2));
@@ -74,13 +89,15 @@ fn losses_above_random_hills_touch_nothing() {
         match covered::fly_text(&text) {
             Ok((result, log)) => {
                 let safety = &result.safety;
-                let clean = (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
+                let clean =
+                    (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
                 let share = result.coverage.as_ref().map_or(0.0, |coverage| coverage.covered_share);
                 if number("FLOCKMATE_HILLS", 0) == 1 {
                     println!("{log}{text}");
                 }
                 // None of them waits to take over: a vehicle without a part takes none.
-                let had_none = |v: &VehicleResult| v.id == vehicle as u8 || v.end.starts_with("no goal");
+                let had_none =
+                    |v: &VehicleResult| v.id == vehicle as u8 || v.end.starts_with("no goal");
                 let others = || result.vehicles.iter().filter(|v| v.id != vehicle as u8);
                 let explained = result.vehicles.iter().all(had_none)
                     || others().any(|v| covered::says(&log, v.id, &covered::EXPLAINED));

@@ -1,4 +1,5 @@
-//! The deconfliction suite over a few seeds; `cargo xtask bench --only deconfliction` flies a hundred of each case.
+//! The deconfliction suite over a few seeds; `cargo xtask bench --only deconfliction` flies a
+//! hundred of each case.
 
 use std::process::Command;
 
@@ -11,13 +12,17 @@ const SEEDS: u64 = 2;
 fn suite(args: &[&str]) -> Vec<Value> {
     let dir = tempfile::tempdir().unwrap();
     let rows = dir.path().join("rows.json");
-    let suite = Command::new(env!("CARGO_BIN_EXE_deconfliction")).args(args).arg("--out").arg(&rows).status();
+    let suite = Command::new(env!("CARGO_BIN_EXE_deconfliction"))
+        .args(args)
+        .arg("--out")
+        .arg(&rows)
+        .status();
     assert!(suite.unwrap().success());
     serde_json::from_str(&std::fs::read_to_string(rows).unwrap()).unwrap()
 }
 
-/// Each vehicle flies as late as the schedule says, so nobody waits in the air for one that is later; and each lands near enough to
-/// its place for the others to pass.
+/// Each vehicle flies as late as the schedule says, so nobody waits in the air for one that is
+/// later; and each lands near enough to its place for the others to pass.
 #[test]
 fn forty_swap_places_and_none_stands() {
     let rows = suite(&["--only", "circle, 40", "--method", "priority", "--seeds", "1"]);
@@ -44,7 +49,8 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
             row["held_up"].as_u64().is_some_and(|held_up| held_up <= if lost { SEEDS } else { 0 }),
             "{row}"
         );
-        // Not solved yet: where many meet and a third of the messages is lost, the safety filter keeps some of them standing.
+        // Not solved yet: where many meet and a third of the messages is lost, the safety filter
+        // keeps some of them standing.
         let stands = row["name"].as_str().is_some_and(|name| name.starts_with("circle, 30 %"));
         let counts: &[&str] = if stands {
             &["violations", "wall_contacts"]
@@ -57,12 +63,14 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
     }
 }
 
-/// Three meetings of the seeds 101 to 400 that came too near beside a silent vehicle on the ground: it lay at the end of the stretch that
-/// others keep off (123, 160), or where gates that opened had led it since it was heard last (360).
+/// Three meetings of the seeds 101 to 400 that came too near beside a silent vehicle on the ground:
+/// it lay at the end of the stretch that others keep off (123, 160), or where gates that opened had
+/// led it since it was heard last (360).
 #[test]
 fn a_vehicle_that_only_hears_lies_where_others_look_for_it() {
     for seed in ["123", "160", "360"] {
-        let case = ["--only", "radio only hears", "--method", "priority", "--seeds", "1", "--first", seed];
+        let case =
+            ["--only", "radio only hears", "--method", "priority", "--seeds", "1", "--first", seed];
         let rows = suite(&case);
         assert_eq!(rows.len(), 1, "{rows:?}");
         for count in ["violations", "wall_contacts", "deadlocks"] {

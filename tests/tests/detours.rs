@@ -1,7 +1,8 @@
-//! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of a planner that has the map.
+//! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of
+//! a planner that has the map.
 //!
-//! A vehicle flies from node to node; another one fell silent above its path and lies on the ground there. With a file of
-//! version 1 the whole column below is kept clear.
+//! A vehicle flies from node to node; another one fell silent above its path and lies on the ground
+//! there. With a file of version 1 the whole column below is kept clear.
 
 use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::shared_data;
@@ -27,7 +28,8 @@ const KEPT_M: f32 = 2.5;
 const NEAREST_M: f32 = 1.2;
 /// Share of the ways around that the ground of the roadmap leaves as they are.
 const SAME_PERCENT: usize = 85;
-/// Where the ground is deeper than the file says, what lies there is not kept off: at most this share of the places.
+/// Where the ground is deeper than the file says, what lies there is not kept off: at most this
+/// share of the places.
 const DEEPER_PERCENT: f64 = 0.25;
 /// Capacity of a board and of the desk.
 const BOARD: usize = 4096;
@@ -114,7 +116,8 @@ fn planned<const N: usize>(
 
 fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
     let files = files(map, clearance_m);
-    let [new, old] = [&files.new, &files.old].map(|file| RoadmapView::parse(file).expect("just written"));
+    let [new, old] =
+        [&files.new, &files.old].map(|file| RoadmapView::parse(file).expect("just written"));
     let dice = &mut Dice::new(7);
     grounds(name, map, &new, dice);
     let mut board = Box::new(SearchWorkspace::<BOARD>::new());
@@ -135,7 +138,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         let silent = a + (b - a) * dice.real(0.0, 1.0);
         let Some(ground_m) = map.ground_below(&silent) else { continue };
         let lies = Point::new(silent.x, silent.y, ground_m);
-        let descent_m = map.ground_below(&new.node(goal)).map_or(1.0, |ground_m| new.node(goal).z - ground_m);
+        let descent_m =
+            map.ground_below(&new.node(goal)).map_or(1.0, |ground_m| new.node(goal).z - ground_m);
         if (lies - here).norm() < KEPT_M + 1.0 {
             continue;
         }
@@ -151,7 +155,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
             fence: None,
         };
         let deep = Point::new(silent.x, silent.y, silent.z - 60.0);
-        let column = KeepOutZone { from: silent, to: deep, radius_m: KEPT_M, kind: ZoneKind::Grounded };
+        let column =
+            KeepOutZone { from: silent, to: deep, radius_m: KEPT_M, kind: ZoneKind::Grounded };
         let exact = KeepOutZone { from: lies, to: lies, ..column };
         let by_desk = planned(&new, &request, column, &mut desk);
         let by_board = planned(&new, &request, column, &mut board);
@@ -175,7 +180,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         "{name}: of {cases} vehicles {found} find a way with the map; the same way {same} with the ground of the \
          roadmap, {found_by_old} without; the nearest passes what lies there at {nearest_m:.2} m"
     );
-    // A vehicle that is nearer to where something may lie than it should be has to come no nearer, so it may pass nearer than KEPT_M.
+    // A vehicle that is nearer to where something may lie than it should be has to come no nearer,
+    // so it may pass nearer than KEPT_M.
     assert!(nearest_m > NEAREST_M, "{name}: {nearest_m}");
     assert!(same * 100 >= found * SAME_PERCENT, "{name}: {same} of {found}");
     assert!(found_by_old < same, "{name}: the ground makes no difference");

@@ -1,8 +1,9 @@
-//! A vehicle fails where its radio no longer reaches the others: two that nothing struck come too near to nobody, and nobody
-//! touches another.
+//! A vehicle fails where its radio no longer reaches the others: two that nothing struck come too
+//! near to nobody, and nobody touches another.
 //!
-//! `FLOCKMATE_EDGES=60 FLOCKMATE_EDGES_FROM=1000 cargo test --release -p flockmate-tests --test edge` flies others, and
-//! `range --strikes 8` the same as a bench. A sweep still finds some: docs/safety.md, "Figures".
+//! `FLOCKMATE_EDGES=60 FLOCKMATE_EDGES_FROM=1000 cargo test --release -p flockmate-tests --test edge`
+//! flies others, and `range --strikes 8` the same as a bench. A sweep still finds some:
+//! docs/safety.md, "Figures".
 
 use flockmate_tests::edge::Edge;
 use flockmate_tests::swarms::number;

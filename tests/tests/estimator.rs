@@ -24,8 +24,14 @@ fn demo(seed: u64, margin_m: f32, separation_m: f32) -> Result<Scenario, Scenari
 #[test]
 fn the_default_margin_and_separation_are_refused_with_the_metres_that_are_missing() {
     let refused = demo(1, 0.5, 2.0).unwrap_err().to_string();
-    assert!(refused.contains("safety_margin_m is 0.50 m, 0.40 m less than the 0.90 m it takes"), "{refused}");
-    assert!(refused.contains("separation_m is 2.00 m, 1.30 m less than the 3.30 m it takes"), "{refused}");
+    assert!(
+        refused.contains("safety_margin_m is 0.50 m, 0.40 m less than the 0.90 m it takes"),
+        "{refused}"
+    );
+    assert!(
+        refused.contains("separation_m is 2.00 m, 1.30 m less than the 3.30 m it takes"),
+        "{refused}"
+    );
     // Either alone is not enough.
     assert!(demo(1, 0.9, 3.2).is_err() && demo(1, 0.85, 3.3).is_err());
     let scenario = demo(1, 0.9, 3.3).unwrap();
@@ -36,9 +42,13 @@ fn the_default_margin_and_separation_are_refused_with_the_metres_that_are_missin
 
 #[test]
 fn the_demo_flies_clean_by_the_truth_at_the_margins_for_recorded_errors() {
-    let seeds = std::env::var("FLOCKMATE_ESTIMATOR_SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(SEEDS);
+    let seeds = std::env::var("FLOCKMATE_ESTIMATOR_SEEDS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(SEEDS);
     for seed in 1..=seeds {
-        let mut mission = Mission::prepare(demo(seed, 0.9, 3.3).unwrap(), &Progress::hidden()).unwrap();
+        let mut mission =
+            Mission::prepare(demo(seed, 0.9, 3.3).unwrap(), &Progress::hidden()).unwrap();
         let plan = mission.plan().unwrap();
         let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).unwrap();
         let safety = &flight.result.safety;
@@ -49,7 +59,11 @@ fn the_demo_flies_clean_by_the_truth_at_the_margins_for_recorded_errors() {
             safety.min_separation_m,
             flight.result.totals.makespan_s
         );
-        assert_eq!((safety.wall_contacts, safety.violations, safety.deadlocks), (0, 0, 0), "seed {seed}");
+        assert_eq!(
+            (safety.wall_contacts, safety.violations, safety.deadlocks),
+            (0, 0, 0),
+            "seed {seed}"
+        );
         assert!(flight.result.vehicles.iter().all(|v| v.landed), "seed {seed}");
     }
 }

@@ -1,14 +1,17 @@
-//! Every kind of fault strikes a vehicle of the ten-UAV building mission, each seed another vehicle and another time.
+//! Every kind of fault strikes a vehicle of the ten-UAV building mission, each seed another vehicle
+//! and another time.
 //!
-//! Whatever strikes, no other vehicle touches anything, none comes nearer than the safety distance to another that was not
-//! struck, and all others reach their goals. The vehicle struck ends in a row of the companion's table, and the log says so. A
-//! fault that passes leaves the mission complete. One thing nobody can help is let pass: to be hit by a vehicle that falls, where
-//! it is shown that there was no time to leave ([`is_unavoidable`]).
+//! Whatever strikes, no other vehicle touches anything, none comes nearer than the safety distance
+//! to another that was not struck, and all others reach their goals. The vehicle struck ends in a
+//! row of the companion's table, and the log says so. A fault that passes leaves the mission
+//! complete. One thing nobody can help is let pass: to be hit by a vehicle that falls, where it is
+//! shown that there was no time to leave ([`is_unavoidable`]).
 //!
-//! What is counted and not asserted: vehicles nearer than the safety distance to the one struck, where that comes down without
-//! looking, or to one that it hit; touching it is asserted. `FLOCKMATE_FAULT_SEEDS=20 cargo test --release --workspace --test faults -- --nocapture`
-//! sweeps twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose lines hold that,
-//! `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
+//! What is counted and not asserted: vehicles nearer than the safety distance to the one struck,
+//! where that comes down without looking, or to one that it hit; touching it is asserted.
+//! `FLOCKMATE_FAULT_SEEDS=20 cargo test --release --workspace --test faults -- --nocapture` sweeps
+//! twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose
+//! lines hold that, `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
 use flockmate_tests::vehicle::ahead;
 use host_sim::mission::{Mission, SwarmPlan};
@@ -38,8 +41,8 @@ use Then::{GoesOn, Out};
 
 /// One kind of fault.
 struct Case {
-    /// The lines of `[[faults]]` beside `at_s` and `vehicle`; ID and LATER stand for the vehicle and 8 s later, AHEAD for
-    /// a place on its path.
+    /// The lines of `[[faults]]` beside `at_s` and `vehicle`; ID and LATER stand for the vehicle
+    /// and 8 s later, AHEAD for a place on its path.
     script: &'static str,
     then: Then,
     /// One of these is in the log of a vehicle struck on its path.
@@ -87,7 +90,8 @@ const CASES: &[Case] = &[
 
 const CANCELLED: &str = "Start cancelled as commanded";
 const UNFOLLOWED: &str = "Setpoint not followed: landing";
-/// Not solved yet: beside a vehicle whose autopilot is silent for good others may land short of their goals.
+/// Not solved yet: beside a vehicle whose autopilot is silent for good others may land short of
+/// their goals.
 const OTHERS_LAND_SHORT: &str = "duration_s = 600";
 /// States in which the mission of a vehicle struck may rest.
 const RESTS: &[&str] = &["Done", "Aborted", "WaitAutopilot", "Killed", "PilotControl", "Scheduled"];
@@ -116,13 +120,15 @@ fn prepare(seed: u64) -> (Mission, Box<SwarmPlan>) {
     let mut scenario = scenario::parse(DEMO, "demo.toml").expect("the demo is good");
     scenario.seed = seed;
     scenario.simulation.time_limit_s = TIME_LIMIT_S;
-    let mut mission = Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo has room");
+    let mut mission =
+        Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo has room");
     let plan = mission.plan().expect("the demo has a plan");
     (mission, plan)
 }
 
 fn fly(mission: &Mission, plan: &SwarmPlan) -> Flight {
-    swarm::fly(mission, plan, "fly", false, &Progress::on_terminal()).expect("the script can be played")
+    swarm::fly(mission, plan, "fly", false, &Progress::on_terminal())
+        .expect("the script can be played")
 }
 
 /// What came of one flight; whatever must not be is a text in `wrong`.
@@ -141,13 +147,17 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     let said = |text: &str| flight.log.iter().any(|e| is_struck(e) && e.text.contains(text));
     // A vehicle that is out comes down where it is, whatever is there.
     let own_contacts_count = case.then == GoesOn;
-    // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet up, the autopilot disarms; and a
-    // pilot who takes over at the end of a landing has landed.
+    // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet
+    // up, the autopilot disarms; and a pilot who takes over at the end of a landing has landed.
     let goes_on = case.then == GoesOn
-        && !["start cancelled", "Disarmed in flight", "landing stopped"].iter().any(|text| said(text));
+        && !["start cancelled", "Disarmed in flight", "landing stopped"]
+            .iter()
+            .any(|text| said(text));
     let (mut too_near, mut hit) = (0, 0);
-    // A vehicle that could not help being hit is struck from then on; that it flies on at all is the simulation's.
-    let is_hit = |e: &&Event| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
+    // A vehicle that could not help being hit is struck from then on; that it flies on at all is
+    // the simulation's.
+    let is_hit =
+        |e: &&Event| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
     let hit_at: Vec<(u8, f32)> =
         flight.log.iter().filter(is_hit).filter_map(|e| Some((e.vehicle?, e.t_s))).collect();
     for e in &flight.log {
@@ -174,12 +184,14 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
         }
     }
     let did_its_task = |v: &&VehicleResult| v.reached && v.landed && v.end == "Done";
-    // It hangs on an obstacle over others: it can neither leave nor land before its battery is nearly empty.
+    // It hangs on an obstacle over others: it can neither leave nor land before its battery is
+    // nearly empty.
     let hangs = said(UNFOLLOWED) && said("Vehicle still below: landing waits");
     for v in result.vehicles.iter().filter(|v| !did_its_task(v)) {
         let state = v.end.split(':').next().unwrap_or_default();
         let others_short = (hangs || case.script.contains(OTHERS_LAND_SHORT)) && v.landed;
-        let rests = RESTS.contains(&state) || (hangs && struck.contains(&v.id) && state == "LandingHeld");
+        let rests =
+            RESTS.contains(&state) || (hangs && struck.contains(&v.id) && state == "LandingHeld");
         if goes_on || !(struck.contains(&v.id) || others_short) || !rests {
             wrong.push(format!("vehicle {} ends in {}", v.id, v.end));
         }
@@ -197,10 +209,11 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     Outcome { complete: result.complete, hit, too_near, notes, wrong }
 }
 
-/// Whether nobody could have got out of the way of a wreck. Nobody knows that a vehicle falls before there was a second without
-/// positions (a shorter gap is everyday: see the stall of 0.8 s), 0.2 s to the next word, 0.05 s on the air and two steps of
-/// 0.05 s; the airframe answers 0.55 s later, and then gains room at 1.5 m/s². What was missing is what the bodies (0.3 m each)
-/// overlap across the fall.
+/// Whether nobody could have got out of the way of a wreck. Nobody knows that a vehicle falls
+/// before there was a second without positions (a shorter gap is everyday: see the stall of 0.8 s), 0.2
+/// s to the next word, 0.05 s on the air and two steps of 0.05 s; the airframe answers 0.55 s
+/// later, and then gains room at 1.5 m/s². What was missing is what the bodies (0.3 m each) overlap
+/// across the fall.
 fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
     let wreck = hit.text.rsplit(' ').next().and_then(|n| n.parse::<usize>().ok());
     let (Some(wreck), Some(vehicle)) = (wreck, hit.vehicle) else { return false };
@@ -209,13 +222,16 @@ fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
         let off = |point: &&(f32, Point)| (point.0 - hit.t_s).abs();
         flight.tracks[i].iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|point| point.1)
     };
-    let (Some(a), Some(b)) = (place(usize::from(vehicle) - 1), place(wreck - 1)) else { return false };
+    let (Some(a), Some(b)) = (place(usize::from(vehicle) - 1), place(wreck - 1)) else {
+        return false;
+    };
     let missing_m = 0.6 - (a - b).xy().norm();
     let left_s = (hit.t_s - at_s - 1.0 - 0.2 - 0.05 - 0.1 - 0.55).max(0.0);
     missing_m > 0.5 * 1.5 * left_s * left_s
 }
 
-/// A box that the paths of one to three vehicles leave and those of the others keep off by most, and these vehicles.
+/// A box that the paths of one to three vehicles leave and those of the others keep off by most,
+/// and these vehicles.
 fn fence_for_some(plan: &SwarmPlan) -> (Vec<u8>, Geofence) {
     let reach = |axis: usize, sign: f32, i: usize| {
         let points = plan.flights[i].path.waypoints().iter();
@@ -262,7 +278,10 @@ fn print_log(flight: &Flight) {
 #[test]
 fn every_kind_of_fault_has_a_case() {
     for kind in FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]) {
-        assert!(CASES.iter().any(|case| case.script.contains(&format!("'{kind}'"))), "no case of {kind}");
+        assert!(
+            CASES.iter().any(|case| case.script.contains(&format!("'{kind}'"))),
+            "no case of {kind}"
+        );
     }
 }
 
@@ -298,8 +317,9 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
                 print_log(&flight);
             }
             let outcome = judge(case, &flight, at_s, &struck);
-            let tell =
-                |wrong| format!("seed {seed}, vehicle {struck:?} at {at_s} s, {}: {wrong}", case.script);
+            let tell = |wrong| {
+                format!("seed {seed}, vehicle {struck:?} at {at_s} s, {}: {wrong}", case.script)
+            };
             let notes = outcome.notes.into_iter().map(tell).collect();
             Outcome { wrong: outcome.wrong.into_iter().map(tell).collect(), notes, ..outcome }
         };
@@ -308,8 +328,9 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
     let flown: Vec<Vec<Outcome>> = seeds.into_par_iter().map(by_seed).collect();
     println!("{:62} flights complete hit too-near wrong", "fault");
     for (k, case) in CASES.iter().filter(|case| chosen(case)).enumerate() {
-        let sum =
-            |count: fn(&Outcome) -> usize| flown.iter().map(|outcomes| count(&outcomes[k])).sum::<usize>();
+        let sum = |count: fn(&Outcome) -> usize| {
+            flown.iter().map(|outcomes| count(&outcomes[k])).sum::<usize>()
+        };
         println!(
             "{:62} {:7} {:8} {:3} {:8} {:5}",
             case.script.replace('\n', ", "),
@@ -323,7 +344,8 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
     for note in flown.iter().flatten().flat_map(|o| &o.notes) {
         println!("{note}");
     }
-    let wrong: Vec<&str> = flown.iter().flatten().flat_map(|o| &o.wrong).map(String::as_str).collect();
+    let wrong: Vec<&str> =
+        flown.iter().flatten().flat_map(|o| &o.wrong).map(String::as_str).collect();
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
@@ -333,7 +355,8 @@ fn a_struck_flight_is_the_same_each_time() {
     mission.scenario.simulation.serial_corruption = 1e-4;
     mission.scenario.simulation.radio_loss = 0.1;
     let some = CASES.iter().filter(|case| !case.on_ground()).step_by(2);
-    mission.scenario.faults = some.zip(1..=10).flat_map(|(case, id)| case.faults(12.0, id, &plan)).collect();
+    mission.scenario.faults =
+        some.zip(1..=10).flat_map(|(case, id)| case.faults(12.0, id, &plan)).collect();
     let once = || {
         let flight = fly(&mission, &plan);
         let log: Vec<_> = flight.log.iter().map(|e| (e.t_s, e.vehicle, e.text.clone())).collect();

@@ -1,11 +1,14 @@
-//! Simulated autopilots fly what the recorded ones flew: `cargo xtask bench --only fidelity` prints the whole table.
+//! Simulated autopilots fly what the recorded ones flew: `cargo xtask bench --only fidelity` prints
+//! the whole table.
 
 use flockmate_tests::fidelity::{Correction, Estimator, RUNS, Recording, allowed_m, recordings};
 use sim_autopilot::AutopilotKind;
 
 /// The recorded flights that nobody interrupted.
 fn plain() -> impl Iterator<Item = (Recording, f64)> {
-    RUNS.iter().flat_map(|run| recordings(run)).filter_map(|r| allowed_m(&r).map(|allowed_m| (r, allowed_m)))
+    RUNS.iter()
+        .flat_map(|run| recordings(run))
+        .filter_map(|r| allowed_m(&r).map(|allowed_m| (r, allowed_m)))
 }
 
 #[test]
@@ -69,7 +72,10 @@ fn errors_of_another_flight_with_the_same_noise_do_as_well() {
         ("a_lobby", "x_drift_demo"),
     ];
     for (run, other) in pairs {
-        let (Some(recording), Some(other)) = (recordings(run).pop(), recordings(other).pop()) else { return };
+        let (Some(recording), Some(other)) = (recordings(run).pop(), recordings(other).pop())
+        else {
+            return;
+        };
         let alike = recording.err_alike(&other);
         let c = recording.compare(Estimator::Of(&other), Correction::Recorded);
         println!("{run} under the errors of {}: {alike:.2} {c:.2?}", other.run);

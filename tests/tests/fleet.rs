@@ -1,10 +1,12 @@
-//! The agreement on what lost vehicles left, among whole fleets with bad radios: random losses, leavings, partitions, one-way
-//! links, bursts, delays. Vehicles are points on numbered waypoints; what they agree by is the code that flies.
+//! The agreement on what lost vehicles left, among whole fleets with bad radios: random losses,
+//! leavings, partitions, one-way links, bursts, delays. Vehicles are points on numbered waypoints;
+//! what they agree by is the code that flies.
 //!
 //! - No waypoint has two owners at a time, whatever happens.
 //! - What does not fit into a path is asked for, and photographed in the end as well.
 //! - Nothing is left out while a majority lives and hears each other in the end.
-//! - Without loss of messages an agreement takes seconds, and no vehicle's part is given away while it is heard.
+//! - Without loss of messages an agreement takes seconds, and no vehicle's part is given away while
+//!   it is heard.
 //!
 //! `FLOCKMATE_FLEETS=N` draws N fleets in place of [`FLEETS`], `FLOCKMATE_FLEETS_FROM` others.
 
@@ -33,7 +35,8 @@ const STOP_S: f32 = 3.0;
 /// After the lease has run out a vehicle hovers so long before it lands, seconds.
 const HOVERS_S: f32 = 20.0;
 const ENDS_S: f32 = 900.0;
-/// Whoever has photographed its part flies home for so long, then says that it has finished, and takes so long to come down.
+/// Whoever has photographed its part flies home for so long, then says that it has finished, and
+/// takes so long to come down.
 const HOME_S: f32 = 10.0;
 const DESCENT_S: f32 = 15.0;
 
@@ -82,13 +85,14 @@ impl Vehicle {
 
 struct Outcome {
     wrong: Option<String>,
-    /// From when the first vehicle knew of the loss until each knew that all have the same division, seconds; where one is lost
-    /// and links fail by chance alone.
+    /// From when the first vehicle knew of the loss until each knew that all have the same
+    /// division, seconds; where one is lost and links fail by chance alone.
     agreed_s: Option<f32>,
     loss: f32,
     left_out: usize,
     majority: bool,
-    /// Divisions that nobody was lost for, or a vehicle that was heard all the time, and whose part others took.
+    /// Divisions that nobody was lost for, or a vehicle that was heard all the time, and whose part
+    /// others took.
     needless: Option<String>,
 }
 
@@ -111,7 +115,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let delay_s = [0.05, 0.5, 1.9][(random.next_u32() % 3) as usize];
     let deaf = |random: &mut Pcg32| uniform(random) < 0.1;
     // Links that fail for good, one way, and a partition for a while.
-    let fails: Vec<Vec<bool>> = (0..count).map(|_| (0..count).map(|_| deaf(&mut random)).collect()).collect();
+    let fails: Vec<Vec<bool>> =
+        (0..count).map(|_| (0..count).map(|_| deaf(&mut random)).collect()).collect();
     let apart = (uniform(&mut random) < 0.5).then(|| {
         let from_s = 300.0 * uniform(&mut random);
         (from_s, from_s + 120.0 * uniform(&mut random), random.next_u32())
@@ -128,11 +133,13 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         })
         .collect();
     // Every third fleet has more to photograph than fits into its paths.
-    let most = if seed.is_multiple_of(3) { whole.len().div_ceil(count) * 3 / 5 } else { usize::MAX };
+    let most =
+        if seed.is_multiple_of(3) { whole.len().div_ceil(count) * 3 / 5 } else { usize::MAX };
     let zero = Instant::ZERO;
     let mut vehicles: Vec<Vehicle> = (0..count)
         .map(|own| {
-            let mut fleet = Whole::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
+            let mut fleet =
+                Whole::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
             fleet.begin_flight(zero);
             let part = parts(&whole, &fleet, count).0.swap_remove(own);
             Vehicle {
@@ -180,7 +187,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                     vehicle.fleet.handle_roster(from, &roster, false);
                 }
             }
-            let fresh = |at: Option<Instant>| at.is_some_and(|at| now - at <= Duration::from_secs(1));
+            let fresh =
+                |at: Option<Instant>| at.is_some_and(|at| now - at <= Duration::from_secs(1));
             let (heard_at, bits) = (vehicle.heard_at.clone(), vehicle.heard_bits.clone());
             let hearing = |rank: usize| MemberReception {
                 heard_at: heard_at[rank],
@@ -203,11 +211,13 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 (true, true) => MemberStatus::Finished,
             };
             vehicle.down |= ends;
-            let stop_dm = vehicle.along_dm.saturating_add((STOP_S * PER_S * f32::from(WAYPOINT_DM)) as u16);
+            let stop_dm =
+                vehicle.along_dm.saturating_add((STOP_S * PER_S * f32::from(WAYPOINT_DM)) as u16);
             // On its path home it promises a place beyond its waypoints.
             let last_dm = if goes_on { length as u16 * WAYPOINT_DM } else { u16::MAX };
             let promise_dm = stop_dm.next_multiple_of(WAYPOINT_DM).min(last_dm);
-            let holds = vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);
+            let holds =
+                vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);
             let own_view = OwnReport {
                 status: standing,
                 waits: false,
@@ -237,7 +247,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             if lease == Lease::Ignored || vehicle.fleet.has_lease(now) {
                 vehicle.unheld_s = 0.0;
                 let most = vehicle.fleet.commitment_dm().unwrap_or(u16::MAX);
-                let next = (vehicle.along_dm + (PER_S * STEP_S * f32::from(WAYPOINT_DM)) as u16).min(most);
+                let next =
+                    (vehicle.along_dm + (PER_S * STEP_S * f32::from(WAYPOINT_DM)) as u16).min(most);
                 for k in vehicle.along_dm / WAYPOINT_DM..next / WAYPOINT_DM {
                     if let Some(waypoint) = vehicle.path().0.get(usize::from(k)) {
                         taken[*waypoint as usize] = true;
@@ -250,10 +261,14 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
         }
         wrong = wrong.or_else(|| {
-            owned_twice(&vehicles, &whole, lease, now).map(|what| format!("seed {seed}, {t_s} s: {what}"))
+            owned_twice(&vehicles, &whole, lease, now)
+                .map(|what| format!("seed {seed}, {t_s} s: {what}"))
         });
         if let Some(detected_s) = detected_s
-            && vehicles.iter().filter(|v| !v.down).all(|v| v.division > 0 || has_all_hashes(&v.fleet))
+            && vehicles
+                .iter()
+                .filter(|v| !v.down)
+                .all(|v| v.division > 0 || has_all_hashes(&v.fleet))
         {
             agreed_s.get_or_insert(t_s - detected_s);
         }
@@ -275,7 +290,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 if to == own || cut || (!clean && fails[own][to]) || uniform(&mut random) < loss {
                     continue;
                 }
-                let at_s = t_s + delay_s * if clean { 1.0 } else { 0.5 + 0.5 * uniform(&mut random) };
+                let at_s =
+                    t_s + delay_s * if clean { 1.0 } else { 0.5 + 0.5 * uniform(&mut random) };
                 vehicle.inbox.push_back((at_s, own, bits, roster.clone()));
             }
         }
@@ -307,11 +323,15 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         majority: alive > 0,
         needless: vehicles.iter().enumerate().filter(|_| clean).find_map(|(rank, vehicle)| {
             let given_away = vehicle.fleet.is_excluded() && !lost(rank);
-            // Where half of the messages are lost, what others said may be known before what a vehicle said of itself.
+            // Where half of the messages are lost, what others said may be known before what a
+            // vehicle said of itself.
             let needless = given_away
-                || (loss < 0.5 && most == usize::MAX && vehicle.fleet.division_count() > losses.len());
-            needless
-                .then(|| format!("seed {seed}, vehicle {rank}: given away {given_away}, {:?}", vehicle.fleet))
+                || (loss < 0.5
+                    && most == usize::MAX
+                    && vehicle.fleet.division_count() > losses.len());
+            needless.then(|| {
+                format!("seed {seed}, vehicle {rank}: given away {given_away}, {:?}", vehicle.fleet)
+            })
         }),
     }
 }
@@ -335,11 +355,14 @@ fn owned_twice(vehicles: &[Vehicle], whole: &[u32], lease: Lease, now: Instant) 
         if vehicle.down || (lease == Lease::Obeyed && !vehicle.fleet.has_lease(now)) {
             continue;
         }
-        let end = vehicle.fleet.commitment_dm().map_or(usize::MAX, |dm| usize::from(dm / WAYPOINT_DM));
+        let end =
+            vehicle.fleet.commitment_dm().map_or(usize::MAX, |dm| usize::from(dm / WAYPOINT_DM));
         let from = usize::from(vehicle.along_dm / WAYPOINT_DM);
         for waypoint in vehicle.path().0.iter().take(end).skip(from) {
             if let Some(other) = owner[*waypoint as usize].replace(rank) {
-                return Some(format!("waypoint {waypoint} is vehicle {other}'s and vehicle {rank}'s"));
+                return Some(format!(
+                    "waypoint {waypoint} is vehicle {other}'s and vehicle {rank}'s"
+                ));
             }
         }
     }
@@ -352,7 +375,8 @@ fn no_waypoint_has_two_owners_and_none_is_left_out() {
     let all: Vec<Outcome> =
         (from..from + count).into_par_iter().map(|seed| fly(seed, Lease::Obeyed)).collect();
     let wrong: Vec<&String> = all.iter().filter_map(|outcome| outcome.wrong.as_ref()).collect();
-    let left_out: Vec<usize> = (0..all.len()).filter(|i| all[*i].left_out > 0 && all[*i].majority).collect();
+    let left_out: Vec<usize> =
+        (0..all.len()).filter(|i| all[*i].left_out > 0 && all[*i].majority).collect();
     println!(
         "{count} fleets: {} with two owners, {} with waypoints left out though somebody flew on",
         wrong.len(),
@@ -363,15 +387,24 @@ fn no_waypoint_has_two_owners_and_none_is_left_out() {
         let mut agreed: Vec<f32> = of.filter_map(|outcome| outcome.agreed_s).collect();
         agreed.sort_by(f32::total_cmp);
         let p99 = agreed.get(agreed.len().saturating_sub(1) * 99 / 100);
-        println!("{loss} of messages lost: agreed within {p99:?} s, 99th percentile of {}", agreed.len());
+        println!(
+            "{loss} of messages lost: agreed within {p99:?} s, 99th percentile of {}",
+            agreed.len()
+        );
         // A single fleet has no 99th percentile.
         assert!(count < FLEETS || p99.is_some_and(|p99| *p99 <= most_s), "{loss}: {p99:?}");
     }
     println!("left out: {:?}", &left_out[..left_out.len().min(20)]);
     assert!(wrong.is_empty(), "{:#?}", &wrong[..wrong.len().min(5)]);
     assert!(left_out.is_empty());
-    let needless: Vec<&String> = all.iter().filter_map(|outcome| outcome.needless.as_ref()).collect();
-    assert!(needless.is_empty(), "{} needless, {:#?}", needless.len(), &needless[..needless.len().min(2)]);
+    let needless: Vec<&String> =
+        all.iter().filter_map(|outcome| outcome.needless.as_ref()).collect();
+    assert!(
+        needless.is_empty(),
+        "{} needless, {:#?}",
+        needless.len(),
+        &needless[..needless.len().min(2)]
+    );
 }
 
 /// The test sees what it is there for.
@@ -392,7 +425,11 @@ fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);
         let hears = MemberReception { heard_at: Some(now), hears_us: true, heard_by_others: false };
-        fleet.step(now, &own, |rank| if rank == heard { hears } else { MemberReception::default() });
+        fleet.step(
+            now,
+            &own,
+            |rank| if rank == heard { hears } else { MemberReception::default() },
+        );
     };
     (1..50).for_each(|at_s| step(&mut fleet, at_s, 0));
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");

@@ -1,4 +1,5 @@
-//! Forged frames for companions in flight; `cargo xtask bench --only hostile --n 1000000000` gives more.
+//! Forged frames for companions in flight; `cargo xtask bench --only hostile --n 1000000000` gives
+//! more.
 
 use flockmate_tests::hostile;
 
@@ -28,12 +29,13 @@ fn forged_rosters_break_no_rule() {
     assert!(seen >= 10, "only {seen} states were attacked");
 }
 
-/// Attacks that once broke a rule: floods of requests after positions that jump, setpoints that followed them; EKF origins a
-/// thousand kilometres away, which round a setpoint out of the fence; a place that moved 12 m while no setpoint was sent.
+/// Attacks that once broke a rule: floods of requests after positions that jump, setpoints that
+/// followed them; EKF origins a thousand kilometres away, which round a setpoint out of the fence;
+/// a place that moved 12 m while no setpoint was sent.
 const ONCE_BROKEN: [u64; 29] = [
-    309, 979, 1069, 1079, 1141, 1301, 1458, 1603, 1644, 1731, 1987, 105_762, 106_380, 110_700, 112_885,
-    373_325, 392_626, 214_779, 113_333, 116_978, 117_203, 101_349, 12_140, 15_858, 65_229, 87_555, 92_621,
-    98_829, 90_771,
+    309, 979, 1069, 1079, 1141, 1301, 1458, 1603, 1644, 1731, 1987, 105_762, 106_380, 110_700,
+    112_885, 373_325, 392_626, 214_779, 113_333, 116_978, 117_203, 101_349, 12_140, 15_858, 65_229,
+    87_555, 92_621, 98_829, 90_771,
 ];
 
 #[test]

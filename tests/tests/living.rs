@@ -1,5 +1,5 @@
-//! A companion lives with what real autopilots were seen to do, here done by the simulated ones: docs/autopilots.md has the
-//! list. In memory, byte by byte, on flat ground.
+//! A companion lives with what real autopilots were seen to do, here done by the simulated ones:
+//! docs/autopilots.md has the list. In memory, byte by byte, on flat ground.
 
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
@@ -108,8 +108,12 @@ impl Pair {
         }
         while let Some(event) = self.companion.poll_event() {
             match event {
-                Event::RestartRequested | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
-                Event::PlanRequested(wanted) => self.companion.handle_plan(self.now(), wanted, Ok(&plan())),
+                Event::RestartRequested
+                | Event::WaitsForStart { .. }
+                | Event::FlownAround { .. } => {}
+                Event::PlanRequested(wanted) => {
+                    self.companion.handle_plan(self.now(), wanted, Ok(&plan()))
+                }
                 Event::StateChanged { to, .. } => self.states.push((self.now_us, to)),
             }
         }
@@ -146,7 +150,8 @@ impl Pair {
         let header = Header { system: 255, component: 190, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         let mut out = [0; frame::MAX_FRAME_LEN];
-        let length = frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
+        let length =
+            frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
         if component == 1 {
             self.autopilot.handle_bytes(&out[..length]);
         } else {
@@ -185,7 +190,15 @@ fn plan() -> VehiclePlan<16, 8> {
     path.push(START, 2.0).unwrap();
     path.push(GOAL, 2.0).unwrap();
     let gates = heapless::Vec::new();
-    VehiclePlan { task: Task::Goto(0), path, climb_m: 1.7, descent_m: 1.7, depart_s: 0.0, gates, plan_crc: 5 }
+    VehiclePlan {
+        task: Task::Goto(0),
+        path,
+        climb_m: 1.7,
+        descent_m: 1.7,
+        depart_s: 0.0,
+        gates,
+        plan_crc: 5,
+    }
 }
 
 #[test]
@@ -207,7 +220,8 @@ fn px4s_failsafe_is_left_alone_to_the_ground() {
     pair.stalled = false;
     let resumed_us = pair.now_us;
     pair.until(State::Failsafe);
-    // One setpoint would bring it back to Offboard by itself; the gimbal commands it sends are not ours to answer.
+    // One setpoint would bring it back to Offboard by itself; the gimbal commands it sends are not
+    // ours to answer.
     pair.until(State::Aborted);
     assert!(!pair.autopilot.true_state().armed && pair.at().z < 0.31, "landed by its failsafe");
     assert_eq!((pair.count(resumed_us, SETPOINT), pair.count(resumed_us, 77)), (0, 0));
@@ -235,7 +249,10 @@ fn a_hold_px4s_pilot_chose_stays_until_offboard_and_a_word() {
     let since_us = pair.now_us;
     pair.run(5.0);
     assert_eq!(pair.companion.state(), State::PilotControl);
-    assert!(pair.count(since_us, SETPOINT) > 40, "the place it is at, so that Offboard can be entered");
+    assert!(
+        pair.count(since_us, SETPOINT) > 40,
+        "the place it is at, so that Offboard can be entered"
+    );
     pair.autopilot.return_from_pilot();
     pair.run(5.0);
     assert_eq!(pair.companion.state(), State::PilotReturned, "Offboard without a resume");
@@ -272,7 +289,8 @@ fn arducopters_armed_bit_may_come_a_second_late() {
         assert!(pair.asked(0, ARM).iter().all(|arm| *arm == 1.0), "no disarming in between");
         // A setpoint before it has lifted off would end the take-off.
         let taking_off = pair.entered(State::TakeOff)..pair.entered(State::Climb);
-        let early = pair.said.iter().filter(|(at, f)| taking_off.contains(at) && f.message_id == SETPOINT);
+        let early =
+            pair.said.iter().filter(|(at, f)| taking_off.contains(at) && f.message_id == SETPOINT);
         assert_eq!(early.count(), 0, "phase {phase}");
         pair.until(State::Done);
     }

@@ -1,7 +1,9 @@
-//! All logs of the shared data: read as pymavlink reads them, and survived in whatever state they arrive.
+//! All logs of the shared data: read as pymavlink reads them, and survived in whatever state they
+//! arrive.
 //!
-//! Damage is seeded by the log's place in the folder and the round. `FLOCKMATE_FUZZ_ROUNDS=20 cargo test -p flockmate-tests
-//! --test logs` continues for twenty rounds instead of one.
+//! Damage is seeded by the log's place in the folder and the round.
+//! `FLOCKMATE_FUZZ_ROUNDS=20 cargo test -p flockmate-tests --test logs` continues for twenty rounds
+//! instead of one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -81,7 +83,8 @@ fn messages_are_counted_as_pymavlink_counts_them() {
     let script = workspace().join("tests/conformance/log_counts.py");
     let output = Command::new(python).arg(script).args(&paths).output().expect("Python starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let theirs: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one line of JSON");
+    let theirs: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("one line of JSON");
     for path in &paths {
         let (_, mut ours) = counts(path);
         let mut expected = Counts::default();
@@ -102,7 +105,11 @@ fn messages_are_counted_as_pymavlink_counts_them() {
         }
         assert_eq!(ours, expected, "{path:?}");
         let messages: usize = ours.known.values().sum();
-        println!("{}: {messages} messages of {} ids as pymavlink", path.display(), ours.known.len());
+        println!(
+            "{}: {messages} messages of {} ids as pymavlink",
+            path.display(),
+            ours.known.len()
+        );
     }
 }
 
@@ -120,7 +127,10 @@ struct Victims {
 impl Victims {
     fn new() -> Self {
         let autopilot = |personality| {
-            let config = sim_autopilot::Config { autopilot: personality, ..sim_autopilot::Config::default() };
+            let config = sim_autopilot::Config {
+                autopilot: personality,
+                ..sim_autopilot::Config::default()
+            };
             Autopilot::new(&config).unwrap()
         };
         Self {
@@ -147,7 +157,10 @@ impl Victims {
         for at in 0..2 {
             self.autopilots[at].step(0.004, 0.0);
             let truth = self.autopilots[at].true_state();
-            assert!(truth.position.iter().chain(truth.velocity.iter()).all(|x| x.is_finite()), "{truth:?}");
+            assert!(
+                truth.position.iter().chain(truth.velocity.iter()).all(|x| x.is_finite()),
+                "{truth:?}"
+            );
             let mut out = [0; 2048];
             loop {
                 let length = self.autopilots[at].poll_transmit(&mut out);
@@ -229,10 +242,12 @@ fn below(rng: &mut Pcg32, end: usize) -> usize {
 
 /// Runs a kind of damage on a piece of every log, several at a time.
 fn on_every_log(damage: impl Fn(&mut Victims, &[Vec<u8>], &mut Pcg32) + Sync) {
-    let rounds = std::env::var("FLOCKMATE_FUZZ_ROUNDS").map_or(1, |n| n.parse().expect("a number of rounds"));
+    let rounds = std::env::var("FLOCKMATE_FUZZ_ROUNDS")
+        .map_or(1, |n| n.parse().expect("a number of rounds"));
     let work: Vec<_> = logs::all().into_iter().enumerate().collect();
     work.par_iter().for_each(|(place, path)| {
-        let records: Vec<Vec<u8>> = logs::read(path).into_iter().map(|record| record.bytes).collect();
+        let records: Vec<Vec<u8>> =
+            logs::read(path).into_iter().map(|record| record.bytes).collect();
         for round in 0..rounds {
             let mut rng = Pcg32::seed_from_u64(*place as u64 + 1000 * round);
             let from = if round == 0 { 0 } else { below(&mut rng, records.len()) };
@@ -299,13 +314,16 @@ fn shuffled_pieces_are_survived() {
     });
 }
 
-/// A random bit passes no checksum: here the checksum fits, the sender is the one listened to, and the content is damaged.
+/// A random bit passes no checksum: here the checksum fits, the sender is the one listened to, and
+/// the content is damaged.
 #[test]
 fn forged_payloads_are_survived() {
     on_every_log(|victims, records, rng| {
         let senders = [(1, 1), (1, 191), (2, 191), (255, 190)];
         for (sequence, record) in records.iter().enumerate() {
-            let Some(frame) = Framer::new().next(Instant::ZERO, &mut record.as_slice()) else { continue };
+            let Some(frame) = Framer::new().next(Instant::ZERO, &mut record.as_slice()) else {
+                continue;
+            };
             let (system, component) = senders[below(rng, senders.len())];
             let mut payload = *frame.padded();
             let used = frame.payload().len();
@@ -319,7 +337,8 @@ fn forged_payloads_are_survived() {
             let header = Header { system, component, sequence: sequence as u8 };
             let extra = frame::extra_crc(frame.message_id).expect("the framer knew it");
             let mut out = [0; frame::MAX_FRAME_LEN];
-            let length = frame::encode_raw(header, frame.message_id, extra, &payload[..used], &mut out);
+            let length =
+                frame::encode_raw(header, frame.message_id, extra, &payload[..used], &mut out);
             victims.hear(&out[..length], Duration::from_millis(4));
         }
     });

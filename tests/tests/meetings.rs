@@ -1,5 +1,5 @@
-//! Whole companions meet at random; `cargo xtask bench --only meetings --n 10000` flies more, and can replay a seed.
-//! `FLOCKMATE_CATCHES=N` flies N meetings in which something catches a vehicle,
+//! Whole companions meet at random; `cargo xtask bench --only meetings --n 10000` flies more, and
+//! can replay a seed. `FLOCKMATE_CATCHES=N` flies N meetings in which something catches a vehicle,
 //! `FLOCKMATE_CATCHES_FROM=SEED` begins at another seed; the first that fails is traced.
 
 use flockmate_tests::meeting::autopilot::Catch;
@@ -19,14 +19,19 @@ const ACCEL_MPS2: f32 = 3.5;
 const STOP_S: f32 = 0.5;
 
 fn report(outcomes: &[Outcome]) {
-    outcomes.iter().filter(|o| o.is_bad()).for_each(|outcome| println!("{}", meeting::line(outcome)));
+    outcomes
+        .iter()
+        .filter(|o| o.is_bad())
+        .for_each(|outcome| println!("{}", meeting::line(outcome)));
     println!("{}", meeting::summary(outcomes));
 }
 
 #[test]
 fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
-    let outcomes: Vec<Outcome> =
-        (0..PASSINGS).into_par_iter().map(|seed| meeting::fly(&scene::passing(seed), false)).collect();
+    let outcomes: Vec<Outcome> = (0..PASSINGS)
+        .into_par_iter()
+        .map(|seed| meeting::fly(&scene::passing(seed), false))
+        .collect();
     report(&outcomes);
     let stops: u32 = outcomes.iter().map(|outcome| outcome.filter_stops).sum();
     println!("{stops} stops by the safety filter in {PASSINGS} passings");
@@ -47,12 +52,16 @@ const CATCHES: u64 = 100;
 
 #[test]
 fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
-    let (first, catches) = (number("FLOCKMATE_CATCHES_FROM", 1), number("FLOCKMATE_CATCHES", CATCHES));
+    let (first, catches) =
+        (number("FLOCKMATE_CATCHES_FROM", 1), number("FLOCKMATE_CATCHES", CATCHES));
     let outcomes: Vec<(bool, Outcome)> = (first..first + catches)
         .into_par_iter()
         .map(|seed| {
             let scene = scene::caught(seed);
-            let windy = scene.happenings.iter().any(|happening| happening.what == What::Caught(Catch::Wind));
+            let windy = scene
+                .happenings
+                .iter()
+                .any(|happening| happening.what == What::Caught(Catch::Wind));
             (windy, meeting::fly(&scene, false))
         })
         .collect();
@@ -63,22 +72,29 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
     };
     if let Some((_, bad)) = outcomes.iter().find(bad) {
         println!("{}", meeting::line(bad));
-        meeting::fly(&scene::caught(bad.seed), true).trace.iter().for_each(|line| println!("{line}"));
+        meeting::fly(&scene::caught(bad.seed), true)
+            .trace
+            .iter()
+            .for_each(|line| println!("{line}"));
     }
-    let bad: Vec<_> = outcomes.iter().filter(bad).map(|(_, outcome)| meeting::line(outcome)).collect();
+    let bad: Vec<_> =
+        outcomes.iter().filter(bad).map(|(_, outcome)| meeting::line(outcome)).collect();
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
 /// Meetings in which no stop would have kept the distance.
 const UNAVOIDABLE_MOST: f32 = 0.05;
 
-/// More often no vehicle finds its path blocked: it stays so until it is free, or the vehicle flies around.
+/// More often no vehicle finds its path blocked: it stays so until it is free, or the vehicle flies
+/// around.
 const BLOCKED_MOST: u32 = 15;
 
 #[test]
 fn companions_that_meet_at_random_keep_apart() {
-    let outcomes: Vec<Outcome> =
-        (1..=MEETINGS).into_par_iter().map(|seed| meeting::fly(&scene::scene(seed), false)).collect();
+    let outcomes: Vec<Outcome> = (1..=MEETINGS)
+        .into_par_iter()
+        .map(|seed| meeting::fly(&scene::scene(seed), false))
+        .collect();
     report(&outcomes);
     let sum = meeting::summary(&outcomes);
     // Of 10 000 some are left: `docs/safety.md`.

@@ -1,5 +1,6 @@
-//! Missions by latitude and longitude, anywhere on earth, flown by autopilots that share neither origin nor home nor
-//! projection: everybody is where the mission frame says, and goes where it says.
+//! Missions by latitude and longitude, anywhere on earth, flown by autopilots that share neither
+//! origin nor home nor projection: everybody is where the mission frame says, and goes where it
+//! says.
 //!
 //! Seeds are the numbers of the missions; a failing one is named.
 
@@ -23,7 +24,8 @@ use rayon::prelude::*;
 const MISSIONS: u64 = 200;
 /// Right to this, metres: 0.1 m, and what the estimate errs by, 0.1 m across and 0.15 m in height.
 const RIGHT_M: f32 = 0.1 + 0.18;
-/// A broadcast position is the last one heard of the autopilot, and the radio takes its time: no older than this, µs.
+/// A broadcast position is the last one heard of the autopilot, and the radio takes its time: no
+/// older than this, µs.
 const AGE_US: u64 = 200_000;
 /// Simulated time given to a mission, seconds: ArduCopter's estimator takes 40 of it.
 const LIMIT_S: u64 = 120;
@@ -34,9 +36,13 @@ fn uniform(rng: &mut Pcg32, low: f64, high: f64) -> f64 {
 
 /// A place up to `reach_m` away, and up to 60 m higher or lower.
 fn around(rng: &mut Pcg32, of: &Geodetic, reach_m: f64) -> Geodetic {
-    let (bearing, far) = (uniform(rng, 0.0, std::f64::consts::TAU), reach_m * uniform(rng, 0.0, 1.0).sqrt());
+    let (bearing, far) =
+        (uniform(rng, 0.0, std::f64::consts::TAU), reach_m * uniform(rng, 0.0, 1.0).sqrt());
     let up = uniform(rng, -60.0, 60.0);
-    enu_to_geodetic(of, &Point::new((far * bearing.cos()) as f32, (far * bearing.sin()) as f32, up as f32))
+    enu_to_geodetic(
+        of,
+        &Point::new((far * bearing.cos()) as f32, (far * bearing.sin()) as f32, up as f32),
+    )
 }
 
 fn toml(place: &Geodetic) -> String {
@@ -100,15 +106,19 @@ impl Errors {
 fn fly(seed: u64) -> Errors {
     let mut rng = Pcg32::seed_from_u64(seed);
     let text = scenario_text(&mut rng);
-    let scenario = scenario::parse(&text, "mixed frames").unwrap_or_else(|e| panic!("mission {seed}: {e}"));
+    let scenario =
+        scenario::parse(&text, "mixed frames").unwrap_or_else(|e| panic!("mission {seed}: {e}"));
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
     let plan = mission.plan().expect("they fly side by side");
     let mut members = vehicles_on_pads(&mission).expect("good vehicles");
     // One station more than vehicles: it listens.
     let listener = members.len();
-    let mut radio = Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);
-    let (mut framer, mut ground_station, mut log) = (Framer::new(), GroundStation::new(255), Vec::new());
-    let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.true_state().position).collect();
+    let mut radio =
+        Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);
+    let (mut framer, mut ground_station, mut log) =
+        (Framer::new(), GroundStation::new(255), Vec::new());
+    let mut places: Vec<Point> =
+        members.iter().map(|m| m.autopilot.true_state().position).collect();
     places.push(Point::zeros());
     let mut tracks: Vec<Vec<Point>> = vec![Vec::new(); members.len()];
     let mut nearest_m = vec![f32::INFINITY; members.len()];
@@ -129,7 +139,8 @@ fn fly(seed: u64) -> Errors {
             if telemetry.position_at == Some(Instant::from_micros(now_us)) {
                 errors.known_m = errors.known_m.max((telemetry.position - truth).norm());
             }
-            let goal = mission.goals[usize::from(plan.flights[i].task.goal().expect("a goal for each"))];
+            let goal =
+                mission.goals[usize::from(plan.flights[i].task.goal().expect("a goal for each"))];
             nearest_m[i] = nearest_m[i].min((truth - goal).norm());
         }
         ground_station.step(now_us, &mut members, &mut radio, &places);
@@ -137,7 +148,10 @@ fn fly(seed: u64) -> Errors {
             let mut bytes = &packet[..];
             while let Some(frame) = framer.next(Instant::from_micros(now_us), &mut bytes) {
                 let Some(said) = frame.decode::<GLOBAL_POSITION_INT_DATA>() else { continue };
-                let i = members.iter().position(|m| m.system_id() == frame.system).expect("one of ours");
+                let i = members
+                    .iter()
+                    .position(|m| m.system_id() == frame.system)
+                    .expect("one of ours");
                 let place = Geodetic {
                     lat_deg: f64::from(said.lat) * 1e-7,
                     lon_deg: f64::from(said.lon) * 1e-7,
@@ -155,11 +169,19 @@ fn fly(seed: u64) -> Errors {
         }
     }
     errors.goal_m = nearest_m.into_iter().fold(0.0, f32::max);
-    let log: Vec<_> = log.iter().map(|e| format!("{:.1} s {:?}: {}", e.t_s, e.vehicle, e.text)).collect();
+    let log: Vec<_> =
+        log.iter().map(|e| format!("{:.1} s {:?}: {}", e.t_s, e.vehicle, e.text)).collect();
     let ends: Vec<_> = members.iter().map(SimulatedVehicle::describe_end).collect();
-    assert!(ends.iter().all(|end| end == "Done"), "mission {seed}: {ends:?}\n{text}\n{}", log.join("\n"));
+    assert!(
+        ends.iter().all(|end| end == "Done"),
+        "mission {seed}: {ends:?}\n{text}\n{}",
+        log.join("\n")
+    );
     assert!(heard > 100, "mission {seed}: {heard} positions heard");
-    assert!(errors.known_m < RIGHT_M && errors.broadcast_m < RIGHT_M, "mission {seed}: {errors:?}\n{text}");
+    assert!(
+        errors.known_m < RIGHT_M && errors.broadcast_m < RIGHT_M,
+        "mission {seed}: {errors:?}\n{text}"
+    );
     errors
 }
 

@@ -1,7 +1,10 @@
-//! Recordings of real autopilots: what was said to them is said to the simulated one, and its answers are compared.
+//! Recordings of real autopilots: what was said to them is said to the simulated one, and its
+//! answers are compared.
 //!
-//! A `.tlog` holds the frames of both directions with their times. What the autopilot (component 1 of system 1) did not send is sent to the simulated one at the same times; its acks must be the same results for
-//! the same commands in the same order, and it must have gone through the same modes and landed states.
+//! A `.tlog` holds the frames of both directions with their times. What the autopilot (component 1
+//! of system 1) did not send is sent to the simulated one at the same times; its acks must be the
+//! same results for the same commands in the same order, and it must have gone through the same
+//! modes and landed states.
 
 use std::path::Path;
 
@@ -18,7 +21,8 @@ const HEARTBEAT: u32 = 0;
 const EXTENDED_SYS_STATE: u32 = 245;
 const STEP_S: f64 = 0.004;
 
-/// One recorded frame: seconds since the first, its bytes, and what they say if the dialect knows it.
+/// One recorded frame: seconds since the first, its bytes, and what they say if the dialect knows
+/// it.
 struct Recorded {
     t_s: f64,
     bytes: Vec<u8>,
@@ -40,7 +44,8 @@ fn recording(path: &Path) -> Vec<Recorded> {
 struct Story {
     /// Acknowledged: when, command, result.
     acks: Vec<(f64, u16, u8)>,
-    /// HEARTBEAT's custom mode, each time it changed. The armed bit may be on and off between two heartbeats.
+    /// HEARTBEAT's custom mode, each time it changed. The armed bit may be on and off between two
+    /// heartbeats.
     modes: Vec<u32>,
     /// MAV_LANDED_STATE, each time it changed.
     landed: Vec<u8>,
@@ -67,7 +72,8 @@ impl Story {
     }
 }
 
-/// Says to a simulated autopilot what was said to the real one, which had booted `booted_s` before the recording.
+/// Says to a simulated autopilot what was said to the real one, which had booted `booted_s` before
+/// the recording.
 fn replay(recorded: &[Recorded], config: &Config, booted_s: f64) -> (Story, Story) {
     let mut autopilot = Autopilot::new(config).unwrap();
     let (mut framer, mut buffer) = (Framer::new(), [0; 2048]);
@@ -111,7 +117,13 @@ fn assert_same_acks(real: &Story, simulated: &Story) {
     assert!(real.acks.len() > 15);
     assert_eq!(real.results(), simulated.results());
     for (a, b) in real.acks.iter().zip(&simulated.acks) {
-        assert!((a.0 - b.0).abs() < 0.02, "command {} acknowledged at {} s, not at {} s", a.1, b.0, a.0);
+        assert!(
+            (a.0 - b.0).abs() < 0.02,
+            "command {} acknowledged at {} s, not at {} s",
+            a.1,
+            b.0,
+            a.0
+        );
     }
 }
 
@@ -156,12 +168,18 @@ struct Seen {
     frames: u32,
 }
 
-/// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global position was sent, the
-/// companion's own, from local metres by that autopilot's projection, must be the same place.
-fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_ORIGIN_DATA>) -> (Seen, Seen) {
+/// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global
+/// position was sent, the companion's own, from local metres by that autopilot's projection, must
+/// be the same place.
+fn play(
+    recorded: &[Recorded],
+    origin: Geodetic,
+    announced: Option<&GPS_GLOBAL_ORIGIN_DATA>,
+) -> (Seen, Seen) {
     let mut companion: Companion<2, 4, 2> =
         Companion::new(CompanionConfig::new(1, Point::zeros(), origin)).unwrap();
-    let (mut story, mut seen, mut compared, mut buffer) = (Story::default(), Seen::default(), 0, [0; 512]);
+    let (mut story, mut seen, mut compared, mut buffer) =
+        (Story::default(), Seen::default(), 0, [0; 512]);
     let (mut grounded, mut sent) = (Vec::new(), 0);
     let from_autopilot =
         |entry: &&Recorded| entry.frame.as_ref().is_none_or(|f| (f.system, f.component) == (1, 1));
@@ -171,7 +189,8 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
         sent += u32::from(entry.frame.is_some());
         if let (20, Some(announced)) = (number, announced) {
             let sequence = entry.frame.as_ref().map_or(0, |f| f.sequence.wrapping_add(1));
-            let length = frame::encode(Header { system: 1, component: 1, sequence }, announced, &mut buffer);
+            let length =
+                frame::encode(Header { system: 1, component: 1, sequence }, announced, &mut buffer);
             companion.handle_bytes(Link::Autopilot, now, &buffer[..length]);
             sent += 1;
         }
@@ -205,9 +224,14 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
                 alt_m: f64::from(global.alt) * 1e-3,
             };
             let age_s = (now - at).as_secs_f32();
-            let apart = telemetry.position + telemetry.velocity * age_s - geodetic_to_enu(&origin, &place);
+            let apart =
+                telemetry.position + telemetry.velocity * age_s - geodetic_to_enu(&origin, &place);
             // The two are sent up to a stream's period apart.
-            assert!(age_s > 0.2 || apart.xy().norm() < 0.1, "{apart} at {} s, {age_s} s old", entry.t_s);
+            assert!(
+                age_s > 0.2 || apart.xy().norm() < 0.1,
+                "{apart} at {} s, {age_s} s old",
+                entry.t_s
+            );
             compared += 1;
         }
     }
@@ -220,7 +244,8 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
 #[test]
 fn the_companion_sees_px4s_recorded_flight_as_it_was() {
     let Some(path) = shared_data("mavlink/px4-1.17-offboard.tlog") else { return };
-    // The recording holds no GPS_GLOBAL_ORIGIN; it follows from its HOME_POSITION (planner-core's tests of frames).
+    // The recording holds no GPS_GLOBAL_ORIGIN; it follows from its HOME_POSITION (planner-core's
+    // tests of frames).
     let announced =
         GPS_GLOBAL_ORIGIN_DATA { latitude: 473_977_415, longitude: 85_455_963, altitude: 489_824 };
     let origin = Geodetic { lat_deg: 47.405, lon_deg: 8.55, alt_m: 480.0 };

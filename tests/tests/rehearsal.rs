@@ -1,5 +1,6 @@
-//! What docs/companion.md says, rehearsed: `host-sim companion` in a process of its own beside an autopilot in another, over
-//! every kind of link, through a pilot's takeover, lost setpoints and a reboot. All in real time; waits are patient.
+//! What docs/companion.md says, rehearsed: `host-sim companion` in a process of its own beside an
+//! autopilot in another, over every kind of link, through a pilot's takeover, lost setpoints and a
+//! reboot. All in real time; waits are patient.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
@@ -38,7 +39,9 @@ impl Flight {
             .expect("the companion starts");
         let output = BufReader::new(child.stdout.take().expect("stdout is piped"));
         let (sender, lines) = channel();
-        thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        thread::spawn(move || {
+            output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line))
+        });
         Self { process: Guard(child), lines, seen: Vec::new() }
     }
 
@@ -50,7 +53,9 @@ impl Flight {
             match self.lines.recv_timeout(Duration::from_millis(500)) {
                 Ok(line) => self.seen.push(line),
                 Err(RecvTimeoutError::Timeout) => meanwhile(),
-                Err(RecvTimeoutError::Disconnected) => panic!("it ended without {text:?}: {:#?}", self.seen),
+                Err(RecvTimeoutError::Disconnected) => {
+                    panic!("it ended without {text:?}: {:#?}", self.seen)
+                }
             }
         }
     }
@@ -86,7 +91,8 @@ impl Ground {
         let header = Header { sequence: self.sequence, ..GROUND_STATION };
         self.sequence = self.sequence.wrapping_add(1);
         let mut out = [0; frame::MAX_FRAME_LEN];
-        let length = frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
+        let length =
+            frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
         self.link.send(&out[..length]).unwrap();
     }
 
@@ -132,7 +138,10 @@ impl Ground {
 }
 
 fn assert_done((code, lines): (Option<i32>, Vec<String>)) {
-    assert!(code == Some(0) && lines.iter().any(|line| line.contains("Landed")), "{code:?} {lines:#?}");
+    assert!(
+        code == Some(0) && lines.iter().any(|line| line.contains("Landed")),
+        "{code:?} {lines:#?}"
+    );
 }
 
 /// A radio with this share of losses, and the addresses of its links.
@@ -147,7 +156,8 @@ fn radio(links: usize, loss: &str) -> (Guard, Vec<String>) {
 
 /// Uploads a file; what is printed.
 fn upload(link: &str, file: &std::path::Path) -> String {
-    let done = Command::new(host_sim(Profile::Debug)).args(["upload", "--link", link]).arg(file).output();
+    let done =
+        Command::new(host_sim(Profile::Debug)).args(["upload", "--link", link]).arg(file).output();
     let done = done.expect("the upload starts");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     String::from_utf8_lossy(&done.stdout).into_owned()
@@ -199,7 +209,8 @@ fn arducopter_is_flown_over_a_serial_line() {
 #[test]
 fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
     let port = free_port();
-    let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+    let (_autopilot, at) =
+        autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut operator = Ground::new(&format!("udp:127.0.0.1:{port}"));
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
@@ -216,7 +227,8 @@ fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
 #[test]
 fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
     let port = free_port();
-    let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+    let (_autopilot, at) =
+        autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
     // Again and again: an address that is silent for long is sent nothing any more.
@@ -255,7 +267,8 @@ fn files_go_up_through_the_autopilot_and_over_a_radio_that_loses() {
     plan.arg("plan").arg(&lobby).arg("--out").arg(files.path()).stdout(Stdio::null());
     assert!(plan.status().expect("host-sim starts").success());
     let port = free_port();
-    let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+    let (_autopilot, at) =
+        autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let (_radio, ends) = radio(2, "0.1");
     let companion = Command::new(host_sim(Profile::Debug))
         .args(["companion", "--id", "1", "--autopilot", &format!("udp-listen:127.0.0.1:{port}")])

@@ -1,7 +1,8 @@
-//! The report page in headless Chromium: it opens clean, and map, paths and moving vehicles are on the picture.
+//! The report page in headless Chromium: it opens clean, and map, paths and moving vehicles are on
+//! the picture.
 //!
-//! Chromium is the one named by `FLOCKMATE_CHROMIUM`, else `chromium` or `google-chrome` of the path; without one the
-//! tests say so and pass.
+//! Chromium is the one named by `FLOCKMATE_CHROMIUM`, else `chromium` or `google-chrome` of the
+//! path; without one the tests say so and pass.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -11,8 +12,8 @@ use std::time::Duration;
 
 use flockmate_tests::{Guard, Profile, chromium, host_sim};
 use host_sim::report::{
-    Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
-    page as page_of, vehicle_color,
+    Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint,
+    VehicleTrack, page as page_of, vehicle_color,
 };
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
@@ -34,7 +35,9 @@ fn building() -> MapSurface {
         (slab && !shaft) || (hull && !window) || (i == 24 && !door)
     };
     let mut words = vec![0; shape.brick_count()];
-    for (i, j, k) in (0..48).flat_map(|i| (0..32).flat_map(move |j| (0..24).map(move |k| (i, j, k)))) {
+    for (i, j, k) in
+        (0..48).flat_map(|i| (0..32).flat_map(move |j| (0..24).map(move |k| (i, j, k))))
+    {
         if filled(i, j, k) {
             let (word, mask) = shape.address([i, j, k]);
             words[word] |= mask;
@@ -56,7 +59,16 @@ fn vehicle(id: u8, path: Vec<Point>) -> VehicleTrack {
         }));
     }
     let (start, goal) = (path[0], path.last().copied());
-    VehicleTrack { id, radius_m: 0.3, color: None, goal_index: Some(0), start, goal, planned: path, track }
+    VehicleTrack {
+        id,
+        radius_m: 0.3,
+        color: None,
+        goal_index: Some(0),
+        start,
+        goal,
+        planned: path,
+        track,
+    }
 }
 
 fn report() -> ReportData {
@@ -64,11 +76,23 @@ fn report() -> ReportData {
     let vehicles = vec![
         vehicle(
             1,
-            vec![p(2.0, 2.0, 0.5), p(2.0, 3.7, 1.5), p(9.7, 3.7, 1.5), p(9.7, 1.7, 1.5), p(9.7, 1.7, 4.5)],
+            vec![
+                p(2.0, 2.0, 0.5),
+                p(2.0, 3.7, 1.5),
+                p(9.7, 3.7, 1.5),
+                p(9.7, 1.7, 1.5),
+                p(9.7, 1.7, 4.5),
+            ],
         ),
         vehicle(
             7,
-            vec![p(2.0, 6.5, 0.5), p(3.0, 6.5, 1.5), p(3.0, 3.7, 1.5), p(8.5, 3.7, 1.5), p(8.5, 6.5, 0.5)],
+            vec![
+                p(2.0, 6.5, 0.5),
+                p(3.0, 6.5, 1.5),
+                p(3.0, 3.7, 1.5),
+                p(8.5, 3.7, 1.5),
+                p(8.5, 6.5, 0.5),
+            ],
         ),
     ];
     let curve = |name: &str, vehicle| Curve {
@@ -78,9 +102,14 @@ fn report() -> ReportData {
         values: vec![4.5, 1.9, f32::NAN, 3.0],
     };
     let limit = Some(Limit { value: 1.5, label: "safety distance".to_owned() });
-    let plot =
-        |title: &str, limit, curves| Plot { title: title.to_owned(), unit: "m".to_owned(), limit, curves };
-    let event = |t_s, vehicle, level, text: &str| Event { t_s, vehicle, level, text: text.to_owned() };
+    let plot = |title: &str, limit, curves| Plot {
+        title: title.to_owned(),
+        unit: "m".to_owned(),
+        limit,
+        curves,
+    };
+    let event =
+        |t_s, vehicle, level, text: &str| Event { t_s, vehicle, level, text: text.to_owned() };
     ReportData {
         title: "Two rooms </script><b>&".to_owned(),
         command: "fly".to_owned(),
@@ -139,7 +168,8 @@ fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
     bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect()
 }
 
-/// Runs Chromium to its end, fails on anything the page wrote to the console, and returns its standard output.
+/// Runs Chromium to its end, fails on anything the page wrote to the console, and returns its
+/// standard output.
 fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
     let profile = tempfile::tempdir().expect("a profile directory");
     let (out, err) = (profile.path().join("stdout"), profile.path().join("stderr"));
@@ -175,15 +205,18 @@ fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
 impl Opened {
     /// A number the page left on its body.
     fn count(&self, name: &str) -> f64 {
-        let (_, rest) =
-            self.dom.split_once(&format!("data-{name}=\"")).unwrap_or_else(|| panic!("no data-{name}"));
+        let (_, rest) = self
+            .dom
+            .split_once(&format!("data-{name}=\""))
+            .unwrap_or_else(|| panic!("no data-{name}"));
         rest.split('"')
             .next()
             .and_then(|n| n.parse().ok())
             .unwrap_or_else(|| panic!("data-{name} is no number"))
     }
 
-    /// Places in the scene (left of the side panel, above the plots) of this colour, `tolerance` steps a channel.
+    /// Places in the scene (left of the side panel, above the plots) of this colour, `tolerance`
+    /// steps a channel.
     fn places(&self, color: [u8; 3], tolerance: u8) -> Vec<(u32, u32)> {
         let at = |i: usize| (i as u32 % WINDOW.0, i as u32 / WINDOW.0);
         let matches = self
@@ -211,7 +244,10 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
     assert_eq!(start.count("ready"), 1.0);
     assert!(start.count("faces") > 20.0 && start.count("triangles") > 2.0 * start.count("faces"));
     assert!(start.count("lines") > 100.0);
-    assert_eq!((start.count("roadmap-edges"), start.count("paths"), start.count("tracks")), (3.0, 2.0, 2.0));
+    assert_eq!(
+        (start.count("roadmap-edges"), start.count("paths"), start.count("tracks")),
+        (3.0, 2.0, 2.0)
+    );
     assert_eq!((start.count("vehicles"), start.count("t")), (2.0, 0.0));
     assert!(start.dom.contains("<h1 id=\"title\">Two rooms &lt;/script&gt;&lt;b&gt;&amp;</h1>"));
     assert!(!start.dom.contains("<img"));
@@ -223,7 +259,12 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
         let (before, after) = (start.places(color, 3), later.places(color, 3));
         // Before the start only the disc and the markers are full colour; later the flown track is.
         assert!(before.len() > 60, "{color:?}: {} pixels at the start", before.len());
-        assert!(after.len() > before.len() + 100, "{color:?}: {} then {}", before.len(), after.len());
+        assert!(
+            after.len() > before.len() + 100,
+            "{color:?}: {} then {}",
+            before.len(),
+            after.len()
+        );
         let appeared = after.iter().filter(|place| !before.contains(place)).count();
         let left = before.iter().filter(|place| !after.contains(place)).count();
         // Planned paths cover 85 % of the ground behind them.
@@ -238,18 +279,25 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
 fn page_of_the_demo_opens_clean_and_shows_every_vehicle_move() {
     let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
-    let demo = Command::new(host_sim(Profile::Release)).args(["demo", "--out"]).arg(dir.path()).output();
+    let demo =
+        Command::new(host_sim(Profile::Release)).args(["demo", "--out"]).arg(dir.path()).output();
     assert!(demo.expect("the demo runs").status.success());
     let page = dir.path().join("report.html");
     assert!(fs::metadata(&page).expect("the page is there").len() < 6_000_000);
     let opened = open(&chromium, &page, "#t=12&view=iso");
-    assert_eq!((opened.count("ready"), opened.count("vehicles"), opened.count("paths")), (1.0, 10.0, 10.0));
+    assert_eq!(
+        (opened.count("ready"), opened.count("vehicles"), opened.count("paths")),
+        (1.0, 10.0, 10.0)
+    );
     assert!(opened.count("faces") > 1_000.0 && opened.count("roadmap-edges") > 10_000.0);
     let later = picture(&chromium, &page, "#t=30&view=iso");
     let moved = opened.pixels.iter().zip(&later).filter(|(a, b)| a != b).count();
     assert!(moved > 500, "{moved} pixels differ between two times");
     for index in 0..10 {
-        assert!(opened.places(vehicle_color(index), 3).len() > 20, "vehicle {index} cannot be seen");
+        assert!(
+            opened.places(vehicle_color(index), 3).len() > 20,
+            "vehicle {index} cannot be seen"
+        );
     }
 }
 
@@ -262,8 +310,12 @@ fn map_style_and_roadmap_change_the_picture() {
     std::fs::write(&whole, page_of(&report()).expect("a page")).expect("the page is written");
     let plain = page_of(&ReportData { roadmap: None, ..report() }).expect("a page");
     std::fs::write(&bare, plain).expect("the page is written");
-    let pictures =
-        [(&whole, "#map=x-ray"), (&whole, "#map=off"), (&whole, "#map=solid&cut=2.5"), (&bare, "#map=off")];
+    let pictures = [
+        (&whole, "#map=x-ray"),
+        (&whole, "#map=off"),
+        (&whole, "#map=solid&cut=2.5"),
+        (&bare, "#map=off"),
+    ];
     let [glass, none, solid, bare] = pictures.map(|(page, hash)| picture(&chromium, page, hash));
     let changed = |a: &[[u8; 3]], b: &[[u8; 3]]| a.iter().zip(b).filter(|(p, q)| p != q).count();
     assert!(changed(&glass, &none) > 20_000, "x-ray: {}", changed(&glass, &none));
@@ -303,7 +355,8 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     let scenario = dir.path().join("lost.toml");
     fs::write(&scenario, LOST).expect("the scenario is written");
     let mut fly = Command::new(host_sim(Profile::Release));
-    let flown = fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path()).output().expect("it flies");
+    let flown =
+        fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path()).output().expect("it flies");
     assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stdout));
     let page = dir.path().join("report.html");
     let text = fs::read_to_string(&page).expect("the page is there");
@@ -334,9 +387,13 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     let (before, later) =
         (open(&chromium, &page, "#t=60&view=top"), open(&chromium, &page, "#t=220&view=top"));
     assert_eq!((before.count("divisions"), before.count("paths")), (2.0, 5.0));
-    assert_eq!(before.count("footprints"), data["result"]["coverage"]["photos"].as_f64().expect("a number"));
+    assert_eq!(
+        before.count("footprints"),
+        data["result"]["coverage"]["photos"].as_f64().expect("a number")
+    );
     let now = |opened: &Opened| {
-        let (_, rest) = opened.dom.split_once("<li class=\"now\"><time>").expect("a division that counts");
+        let (_, rest) =
+            opened.dom.split_once("<li class=\"now\"><time>").expect("a division that counts");
         rest.contains("Without UAV 2") && !rest.contains("<b>Plan</b>")
     };
     assert_eq!((now(&before), now(&later)), (false, true));
@@ -355,7 +412,8 @@ fn page_of_a_paper_draws_its_figures() {
     let (data, _) = data.split_once("</script>").expect("their end");
     let data: serde_json::Value = serde_json::from_str(data).expect("JSON");
     let figures = data["figures"].as_array().expect("figures");
-    let names: Vec<_> = figures.iter().map(|figure| figure["name"].as_str().expect("a name")).collect();
+    let names: Vec<_> =
+        figures.iter().map(|figure| figure["name"].as_str().expect("a name")).collect();
     assert_eq!(names, ["Fig. 8", "Fig. 9", "Fig. 10", "Fig. 12", "Fig. 13"]);
     let tables = fs::read(dir.path().join("tables.json")).expect("the tables are there");
     let tables: serde_json::Value = serde_json::from_slice(&tables).expect("JSON");
@@ -371,7 +429,8 @@ fn page_of_a_paper_draws_its_figures() {
         let values = series.flat_map(|series| series["values"].as_array().expect("values"));
         let mut drawn: Vec<f64> = values.map(|value| value.as_f64().expect("a number")).collect();
         let both = rows.iter().flat_map(|row| [&row["ours_summary"], &row["theirs_summary"]]);
-        let mut told: Vec<f64> = both.map(|summary| summary[value].as_f64().expect("a number")).collect();
+        let mut told: Vec<f64> =
+            both.map(|summary| summary[value].as_f64().expect("a number")).collect();
         assert_eq!(told.len(), 2 * 12 * 6);
         drawn.sort_by(f64::total_cmp);
         told.sort_by(f64::total_cmp);

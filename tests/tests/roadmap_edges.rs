@@ -1,4 +1,5 @@
-//! The spatial index finds the same edges as the all-pairs loop of Algorithm 1 with the same segment check.
+//! The spatial index finds the same edges as the all-pairs loop of Algorithm 1 with the same
+//! segment check.
 
 use flockmate_tests::shared_data;
 use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
@@ -26,7 +27,8 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
             sampling: Sampling::Uniform,
         };
         let nodes = roadmap::sample(map, &[], &config).expect("there is free space");
-        let joined = roadmap::join(&grid, &tree, &nodes, &config, &mut workspace).expect("it joins");
+        let joined =
+            roadmap::join(&grid, &tree, &nodes, &config, &mut workspace).expect("it joins");
         let mut indexed: Vec<_> = joined.iter().map(|e| prm::Edge { a: e.a, b: e.b }).collect();
         let mut all_pairs = Vec::new();
         prm::connect_all_pairs(&map.grid(), &nodes, &config, |edge| all_pairs.push(edge))
@@ -37,8 +39,8 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
         if seed == 1 {
             for edge in &joined {
                 let ends = prm::Edge { a: edge.a, b: edge.b };
-                let by_cells_m =
-                    prm::edge_clearance(&grid, &nodes, ends, MAX_STORED_CLEARANCE_M).expect("they are nodes");
+                let by_cells_m = prm::edge_clearance(&grid, &nodes, ends, MAX_STORED_CLEARANCE_M)
+                    .expect("they are nodes");
                 let apart_m = (by_cells_m - edge.clearance_m).abs();
                 assert!(apart_m < 0.001, "{name}: {edge:?} has a clearance of {by_cells_m} m");
             }

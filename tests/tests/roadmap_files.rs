@@ -1,4 +1,5 @@
-//! Roadmap files that somebody changed and gave the right CRC: refused, or every search is right and bounded.
+//! Roadmap files that somebody changed and gave the right CRC: refused, or every search is right
+//! and bounded.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,8 @@ const OF_ONE: usize = 50;
 /// `FLOCKMATE_FILES` sets how many; CI forges a few.
 #[test]
 fn forged_files_are_refused_or_searched_right() {
-    let files = std::env::var("FLOCKMATE_FILES").map_or(20_000, |count| count.parse().expect("a number"));
+    let files =
+        std::env::var("FLOCKMATE_FILES").map_or(20_000, |count| count.parse().expect("a number"));
     let mut dice = Dice::new(1);
     let mut forger = Forger::new(&mut dice);
     let mut verdicts: BTreeMap<String, usize> = BTreeMap::new();

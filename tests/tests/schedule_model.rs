@@ -1,20 +1,25 @@
 //! Every way in which small swarms can fly their plans, searched breadth first.
 //!
-//! Plans and gates come from the planner as vehicles get them; the model knows nothing else of the schedule. The state is the
-//! progress of each vehicle: the stretch between two marks that it is on. Marks are its own gates, its waypoints, and
-//! where a report, wrong by as much as may be, opens a gate of another vehicle. Actions: each vehicle advances by a stretch, or
-//! stops where it is; what it reports is wrong by up to 0.25 m either way; it leaves the plan, and its gates open.
-//! A message that is heard late is a step of the other vehicle that is not taken yet: the search takes the steps in every order.
+//! Plans and gates come from the planner as vehicles get them; the model knows nothing else of the
+//! schedule. The state is the progress of each vehicle: the stretch between two marks that it is
+//! on. Marks are its own gates, its waypoints, and where a report, wrong by as much as may be,
+//! opens a gate of another vehicle. Actions: each vehicle advances by a stretch, or stops where it
+//! is; what it reports is wrong by up to 0.25 m either way; it leaves the plan, and its gates open.
+//! A message that is heard late is a step of the other vehicle that is not taken yet: the search
+//! takes the steps in every order.
 //!
-//! - No conflict: where two vehicles that fly the plan can be at the same time, they are no nearer than the safety distance.
-//!   A gate counts as open as soon as some report may open it.
-//! - No deadlock: some vehicle can continue until all have landed. A gate counts as open only if every report opens it.
+//! - No conflict: where two vehicles that fly the plan can be at the same time, they are no nearer
+//!   than the safety distance. A gate counts as open as soon as some report may open it.
+//! - No deadlock: some vehicle can continue until all have landed. A gate counts as open only if
+//!   every report opens it.
 //!
-//! Planted errors must be found. Which plans they spoil is known without the search: gates only open, so two vehicles can be at
-//! two places at once if they come there when each goes as far as it may and no further than its place, with all others out of the
-//! plan. So a dropped gate *matters* in a plan, and every gate that does is dropped. Likewise for vehicles that do not stop
-//! at a gate when they already stand at it (`<` for `≤` in the gate's place). Gates that open only beyond their progress (`<` for
-//! `≤` there) matter where somebody is stuck when each goes as far as it may; those plans are looked for among more.
+//! Planted errors must be found. Which plans they spoil is known without the search: gates only
+//! open, so two vehicles can be at two places at once if they come there when each goes as far as
+//! it may and no further than its place, with all others out of the plan. So a dropped gate *matters*
+//! in a plan, and every gate that does is dropped. Likewise for vehicles that do not stop at a gate
+//! when they already stand at it (`<` for `≤` in the gate's place). Gates that open only beyond
+//! their progress (`<` for `≤` there) matter where somebody is stuck when each goes as far as it
+//! may; those plans are looked for among more.
 //!
 //! `FLOCKMATE_MODELS=N` searches N plans each in place of [`PLANS`].
 
@@ -87,7 +92,8 @@ impl Model {
             let waypoints = flight.path.waypoints().iter().map(|w| w.along_m);
             let waits = gates[i].iter().map(|g| g.at_m);
             let heard = gates.iter().flatten().filter(|g| g.id == flight.id);
-            let reports = heard.flat_map(|g| [g.until_m - PROGRESS_ERROR_M, g.until_m + PROGRESS_ERROR_M]);
+            let reports =
+                heard.flat_map(|g| [g.until_m - PROGRESS_ERROR_M, g.until_m + PROGRESS_ERROR_M]);
             let all = waypoints.chain(waits).chain(reports).chain([end]);
             let mut marks: Vec<f32> = all.filter(|&m| m > pad_m + ROUNDING_M && m <= end).collect();
             // On the pad from mark 0 to mark 1, which is the same place.
@@ -105,7 +111,9 @@ impl Model {
             let stretch = |k: usize| {
                 let (from, to) = (marks[k], marks.get(k + 1).copied().unwrap_or(marks[k]));
                 let steps = ((to - from) / 0.1).ceil().max(1.0) as usize;
-                (0..=steps).map(|s| place(flight, from + (to - from) * s as f32 / steps as f32)).collect()
+                (0..=steps)
+                    .map(|s| place(flight, from + (to - from) * s as f32 / steps as f32))
+                    .collect()
             };
             let points = (0..marks.len()).map(stretch).collect();
             courses.push(Course { marks, gates: at, points });
@@ -144,8 +152,11 @@ impl Model {
             let reported_m = match (k, most) {
                 (0, _) => other.marks[0],
                 _ if landed => other.marks[k] + 1.0,
-                // It may be anywhere on its stretch: some report is this high, but none is beyond the ground ...
-                (_, true) => (other.marks[k] + PROGRESS_ERROR_M).min(other.marks[usize::from(other.last())]),
+                // It may be anywhere on its stretch: some report is this high, but none is beyond
+                // the ground ...
+                (_, true) => {
+                    (other.marks[k] + PROGRESS_ERROR_M).min(other.marks[usize::from(other.last())])
+                }
                 // ... and once it stands at the end of it, none is lower than this.
                 (_, false) => other.marks[k + 1] - PROGRESS_ERROR_M,
             };
@@ -157,7 +168,8 @@ impl Model {
         })
     }
 
-    /// Where each vehicle ends up that goes as far as it may, and no further than `most`; vehicles may begin out of the plan.
+    /// Where each vehicle ends up that goes as far as it may, and no further than `most`; vehicles
+    /// may begin out of the plan.
     fn furthest(&self, begin: State, until: State, most: bool) -> State {
         let mut state = begin;
         loop {
@@ -173,7 +185,8 @@ impl Model {
         }
     }
 
-    /// Whether two vehicles can come too near, found without a search: no other vehicle has to wait for them.
+    /// Whether two vehicles can come too near, found without a search: no other vehicle has to wait
+    /// for them.
     fn meets(&self) -> bool {
         (0..self.courses.len()).flat_map(|i| (0..i).map(move |j| (i, j))).any(|(i, j)| {
             let mut begin = [OUT; 4];
@@ -279,7 +292,8 @@ impl Short {
 /// The plan of one seed, if there is one in which a dropped gate matters.
 fn one(seed: u64, count: usize) -> Option<Sum> {
     let short = Short::random(seed, count)?;
-    let each = short.gates.iter().enumerate().flat_map(|(i, gates)| (0..gates.len()).map(move |g| (i, g)));
+    let each =
+        short.gates.iter().enumerate().flat_map(|(i, gates)| (0..gates.len()).map(move |g| (i, g)));
     let without: Vec<Model> = each.clone().map(|(i, g)| short.dropped(i, g)).collect();
     let matter: Vec<&Model> = without.iter().filter(|model| model.meets()).collect();
     if matter.is_empty() {
@@ -307,7 +321,8 @@ fn one(seed: u64, count: usize) -> Option<Sum> {
     if right.meets() || right.sticks() {
         expect("found without a search", &right, |_| false);
     }
-    if let Outcome::Good(states) = expect("as planned", &right, |outcome| matches!(outcome, Outcome::Good(_)))
+    if let Outcome::Good(states) =
+        expect("as planned", &right, |outcome| matches!(outcome, Outcome::Good(_)))
     {
         (sum.states, sum.largest) = (states, states);
     }
@@ -320,7 +335,8 @@ fn search(count: usize) {
     let mut all = Sum::default();
     let mut seed = 0;
     while all.plans < wanted {
-        let sums: Vec<Sum> = (seed..seed + 256).into_par_iter().filter_map(|s| one(s, count)).collect();
+        let sums: Vec<Sum> =
+            (seed..seed + 256).into_par_iter().filter_map(|s| one(s, count)).collect();
         seed += 256;
         for sum in sums {
             all.plans += sum.plans;
@@ -337,8 +353,16 @@ fn search(count: usize) {
          found; gates that open beyond are found in {}",
         all.plans, all.states, all.largest, all.dropped, all.gates, all.beyond
     );
-    assert!(all.wrong.is_empty(), "{} wrong: {:#?}", all.wrong.len(), &all.wrong[..all.wrong.len().min(10)]);
-    assert!(all.beyond * PLANS_FOR_ONE_STUCK >= wanted, "too few in which gates that open beyond matter");
+    assert!(
+        all.wrong.is_empty(),
+        "{} wrong: {:#?}",
+        all.wrong.len(),
+        &all.wrong[..all.wrong.len().min(10)]
+    );
+    assert!(
+        all.beyond * PLANS_FOR_ONE_STUCK >= wanted,
+        "too few in which gates that open beyond matter"
+    );
 }
 
 #[test]

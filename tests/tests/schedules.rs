@@ -1,10 +1,12 @@
-//! Random swarms, planned and then flown by progress alone: a vehicle obeys its gates and nothing else. None may come nearer
-//! to another than the safety distance, none may wait forever, and a plan that is `Ok` has a part for every vehicle.
+//! Random swarms, planned and then flown by progress alone: a vehicle obeys its gates and nothing
+//! else. None may come nearer to another than the safety distance, none may wait forever, and a
+//! plan that is `Ok` has a part for every vehicle.
 //!
-//! Rooms, corridors with side rooms, shafts, and ways of up to 1.5 km; climbs and descents of 0.5 m to 30 m; pads on one floor
-//! or anywhere; 2 to 32 vehicles of several sizes with the capacities of a board; safety distances of 0.8 m to 3 m. Delays, speeds,
-//! pauses and the error of the reported progress are random.
-//! `FLOCKMATE_SCHEDULES=N` flies N swarms in place of [`SWARMS`], `FLOCKMATE_SCHEDULES_FROM=SEED` begins at another seed.
+//! Rooms, corridors with side rooms, shafts, and ways of up to 1.5 km; climbs and descents of 0.5 m
+//! to 30 m; pads on one floor or anywhere; 2 to 32 vehicles of several sizes with the capacities of
+//! a board; safety distances of 0.8 m to 3 m. Delays, speeds, pauses and the error of the reported
+//! progress are random. `FLOCKMATE_SCHEDULES=N` flies N swarms in place of [`SWARMS`],
+//! `FLOCKMATE_SCHEDULES_FROM=SEED` begins at another seed.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +37,8 @@ impl Manner {
         };
         let (delay_s, pause_s) = (drawn([0.0, 40.0, 400.0]), drawn([0.0, 20.0, 200.0]));
         let speed_mps = 0.2 + drawn([0.5, 4.0, 12.0]);
-        let between_m = if pause_s > 0.0 { rng.uniform(0.5, 15.0).max(0.02 * pause_s) } else { 1e9 };
+        let between_m =
+            if pause_s > 0.0 { rng.uniform(0.5, 15.0).max(0.02 * pause_s) } else { 1e9 };
         Self { delay_s, speed_mps, pause: (pause_s, between_m) }
     }
 }
@@ -53,10 +56,16 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
     let count = flights.len();
     let manners: Vec<Manner> = (0..count).map(|_| Manner::random(rng)).collect();
     let step_s = STEP_M / manners.iter().map(|m| m.speed_mps).fold(0.0, f32::max);
-    let index = |id: u8| flights.iter().position(|f| f.id == id).expect("a gate names a vehicle of the plan");
+    let index = |id: u8| {
+        flights.iter().position(|f| f.id == id).expect("a gate names a vehicle of the plan")
+    };
     let awaited = |g: &Gate| Awaited { at_m: g.at_m, other: index(g.id), until_m: g.until_m };
-    let gates: Vec<Vec<Awaited>> = owns.iter().map(|own| own.gates.iter().map(awaited).collect()).collect();
-    assert!(gates.iter().all(|gates| gates.is_sorted_by_key(|g| g.at_m)), "gates come along the path");
+    let gates: Vec<Vec<Awaited>> =
+        owns.iter().map(|own| own.gates.iter().map(awaited).collect()).collect();
+    assert!(
+        gates.iter().all(|gates| gates.is_sorted_by_key(|g| g.at_m)),
+        "gates come along the path"
+    );
     let on_time = rng.one_in(2);
     let mut along: Vec<f32> = flights.iter().map(|f| -f.climb_m).collect();
     let (mut paused_s, mut next_pause_m) = (vec![0.0; count], vec![0.0; count]);
@@ -71,7 +80,9 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
             .map(|i| match along[i] {
                 m if m <= -flights[i].climb_m => m,
                 m if flights[i].task.leaves_pad() && m >= end_m(&flights[i]) => m + 1.0,
-                m => (m + rng.uniform(-1.0, 1.0).signum() * PROGRESS_ERROR_M).min(end_m(&flights[i])),
+                m => {
+                    (m + rng.uniform(-1.0, 1.0).signum() * PROGRESS_ERROR_M).min(end_m(&flights[i]))
+                }
             })
             .collect();
         let mut moved = false;
@@ -103,7 +114,8 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
                 let apart = (place(&flights[i], along[i]) - place(&flights[j], along[j])).norm();
                 smallest = smallest.min(apart);
                 if apart < safety_m - 1e-3 {
-                    let [i, j] = [i, j].map(|i| format!("vehicle {} at {} m", flights[i].id, along[i]));
+                    let [i, j] =
+                        [i, j].map(|i| format!("vehicle {} at {} m", flights[i].id, along[i]));
                     return Err(format!("{apart:.2} m apart at {t_s:.1} s: {i}, {j}"));
                 }
             }
@@ -179,8 +191,10 @@ fn one(seed: u64) -> Sum {
 
 #[test]
 fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
-    let (first, count) =
-        (swarms::number("FLOCKMATE_SCHEDULES_FROM", 1), swarms::number("FLOCKMATE_SCHEDULES", SWARMS));
+    let (first, count) = (
+        swarms::number("FLOCKMATE_SCHEDULES_FROM", 1),
+        swarms::number("FLOCKMATE_SCHEDULES", SWARMS),
+    );
     let sums: Vec<Sum> = (first..first + count).into_par_iter().map(one).collect();
     let mut all = Sum::default();
     for sum in sums {
@@ -189,7 +203,9 @@ fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
         all.flights += sum.flights;
         all.unfit += sum.unfit;
         all.makespan_s += sum.makespan_s;
-        sum.refused.into_iter().for_each(|(name, count)| *all.refused.entry(name).or_default() += count);
+        sum.refused
+            .into_iter()
+            .for_each(|(name, count)| *all.refused.entry(name).or_default() += count);
         all.failures.extend(sum.failures);
     }
     println!(

@@ -1,5 +1,5 @@
-//! The page docs/worst-case.md: every public call of planner-core and companion is on it, and an emulated board needs no more
-//! than its table says.
+//! The page docs/worst-case.md: every public call of planner-core and companion is on it, and an
+//! emulated board needs no more than its table says.
 
 use std::fs;
 use std::path::Path;
@@ -19,8 +19,8 @@ const SLACK: f64 = 1.25;
 const STEP: u64 = 75_000;
 /// Instructions of the safety filter in the worst case seen; its budget is 12 k.
 const FILTER: u64 = 13_500;
-/// Of a coverage mission: its whole plan, with and without zones, and the whole division of what is left after a loss, among 3
-/// vehicles, with and without zones, and among 32 on 512 lanes.
+/// Of a coverage mission: its whole plan, with and without zones, and the whole division of what is
+/// left after a loss, among 3 vehicles, with and without zones, and among 32 on 512 lanes.
 const COVERAGE: [(&str, u64); 5] = [
     ("a coverage plan, 3", 20_000_000),
     ("planner::coverage::plan_flights, 3", 20_000_000),
@@ -28,8 +28,10 @@ const COVERAGE: [(&str, u64); 5] = [
     ("losses::redivide_work, 3", 1_000_000),
     ("losses::redivide_work, 32", 10_000_000),
 ];
-/// Modules and folders of companion that are its own, where no call is public, and doubles of its tests.
-const PRIVATE: [&str; 7] = ["guidance", "testing", "sweep", "journal", "packet", "memory", "stream"];
+/// Modules and folders of companion that are its own, where no call is public, and doubles of its
+/// tests.
+const PRIVATE: [&str; 7] =
+    ["guidance", "testing", "sweep", "journal", "packet", "memory", "stream"];
 /// Where the page names the calls that are not counted by themselves.
 const OTHERS: &str = "## Not counted by themselves";
 
@@ -41,7 +43,8 @@ struct Call {
 }
 
 impl Call {
-    /// Whether a path of the page, as `file::Type::name`, is this call's: its name, and nothing that this call is not in.
+    /// Whether a path of the page, as `file::Type::name`, is this call's: its name, and nothing
+    /// that this call is not in.
     fn is(&self, words: &[&str]) -> bool {
         let Some((name, path)) = words.split_last() else { return false };
         *name == self.name
@@ -56,7 +59,9 @@ fn page() -> String {
 
 /// The public functions in a folder's sources.
 fn public_calls(folder: &Path, path: &[String], calls: &mut Vec<Call>) {
-    for entry in fs::read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("readable")) {
+    for entry in
+        fs::read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("readable"))
+    {
         let file = entry.path();
         let module = file.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
         let is_private = path[0] == "companion" && PRIVATE.contains(&module.as_str());
@@ -76,15 +81,17 @@ fn public_calls(folder: &Path, path: &[String], calls: &mut Vec<Call>) {
     }
 }
 
-/// The paths that the page names: rows of the table of what was counted, and calls by module in the table of the others.
+/// The paths that the page names: rows of the table of what was counted, and calls by module in the
+/// table of the others.
 fn named(page: &str) -> Vec<Vec<String>> {
     let (counted, others) = page.split_once(OTHERS).expect("it names the others");
     let path = |code: &str| -> Vec<String> {
         let code = code.split(',').next().unwrap_or_default();
         code.split("::").map(str::to_owned).collect()
     };
-    let codes =
-        |line: &str| -> Vec<String> { line.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+    let codes = |line: &str| -> Vec<String> {
+        line.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+    };
     let rows = |text: &str| -> Vec<Vec<String>> {
         text.lines().filter(|line| line.starts_with("| `")).map(codes).collect()
     };
@@ -107,8 +114,9 @@ fn every_public_call_is_on_the_page() {
     public_calls(&workspace().join("companion/src"), &["companion".to_owned()], &mut calls);
     assert!(calls.len() > 400, "{}", calls.len());
     let named = named(&page);
-    let is_named =
-        |call: &Call| named.iter().any(|path| call.is(&path.iter().map(String::as_str).collect::<Vec<_>>()));
+    let is_named = |call: &Call| {
+        named.iter().any(|path| call.is(&path.iter().map(String::as_str).collect::<Vec<_>>()))
+    };
     let missing: Vec<&Call> = calls.iter().filter(|call| !is_named(call)).collect();
     assert!(missing.is_empty(), "not in {}: {missing:?}", bounds::PAGE);
     // What the page names is there: but for rows of more than one call, which have no path.
@@ -129,8 +137,10 @@ fn the_board_needs_no_more_than_the_table_says() {
     assert_eq!(table.lines().count(), BOUNDS.len() + 2, "a row for each call");
     for (name, bound) in BOUNDS {
         let start = format!("| `{name}` | {bound} | ");
-        let line =
-            table.lines().find_map(|line| line.strip_prefix(&start)).unwrap_or_else(|| panic!("{start}"));
+        let line = table
+            .lines()
+            .find_map(|line| line.strip_prefix(&start))
+            .unwrap_or_else(|| panic!("{start}"));
         let (count, bytes) = line.trim_end_matches(" |").split_once(" | ").expect("four columns");
         let most = bounds::parsed(count).expect("a count");
         let seen = calls[*name];

@@ -1,4 +1,5 @@
-//! Programs for boards: by rustup's target where there is one, else by Debian's toolchain, which builds `core` itself.
+//! Programs for boards: by rustup's target where there is one, else by Debian's toolchain, which
+//! builds `core` itself.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
@@ -58,7 +59,13 @@ impl Board {
 
     /// Its memories, as its `memory.x` has them, and how much of each statics may take.
     pub fn regions(self) -> &'static [Region] {
-        const fn region(name: &'static str, at: u64, len: usize, most: usize, has_stack: bool) -> Region {
+        const fn region(
+            name: &'static str,
+            at: u64,
+            len: usize,
+            most: usize,
+            has_stack: bool,
+        ) -> Region {
             Region { name, at, len: len << 10, most: most << 10, has_stack }
         }
         // The companion, crash record and guard have 40 kB of DTCM, the stack the rest.
@@ -125,7 +132,8 @@ pub struct Built {
 pub fn build(board: Board) -> Result<Built> {
     let target = board.target();
     let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
-    let arguments = ["build", "--release", "--locked", "--target", target, "-p", "firmware", "--features"];
+    let arguments =
+        ["build", "--release", "--locked", "--target", target, "-p", "firmware", "--features"];
     let products = target_dir().join("firmware");
     let mut flags = String::new();
     let mut building = if rustup_has(target) {
@@ -148,7 +156,11 @@ pub fn build(board: Board) -> Result<Built> {
     };
     // Level 2, below, inlines as much as level 3: roadmaps are built as fast.
     flags += &format!("-Ctarget-cpu={} -Cllvm-args=-inline-threshold=275", board.cpu());
-    building.args(arguments).arg(board.name()).args(programs).env(variable(target, "RUSTFLAGS"), flags);
+    building
+        .args(arguments)
+        .arg(board.name())
+        .args(programs)
+        .env(variable(target, "RUSTFLAGS"), flags);
     // Either would take the place of the flags above.
     building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
     building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
@@ -158,7 +170,8 @@ pub fn build(board: Board) -> Result<Built> {
     // The chip's drivers set registers: small is as fast.
     building.args(["--config", "profile.release.package.embassy-stm32.opt-level='s'"]);
     let warnings = compile(&mut building)?;
-    // Programs of two boards have one name, and what they are made of is shared: so the programs are put aside.
+    // Programs of two boards have one name, and what they are made of is shared: so the programs
+    // are put aside.
     let aside = products.join(board.name());
     std::fs::create_dir_all(&aside)?;
     for program in board.programs() {
@@ -194,5 +207,6 @@ fn variable(target: &str, name: &str) -> String {
 
 fn rustup_has(target: &str) -> bool {
     let installed = command("rustup").args(["target", "list", "--installed"]).output();
-    installed.is_ok_and(|out| String::from_utf8_lossy(&out.stdout).lines().any(|line| line == target))
+    installed
+        .is_ok_and(|out| String::from_utf8_lossy(&out.stdout).lines().any(|line| line == target))
 }

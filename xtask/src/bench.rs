@@ -17,8 +17,9 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover, swarm, steps,
-    /// worst-case, boards; or one of the suites: deconfliction, meetings, hostile, range.
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover,
+    /// swarm, steps, worst-case, boards; or one of the suites: deconfliction, meetings, hostile,
+    /// range.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// A checkout of cvar-upm/multi_uav_planning_binpat, which the coverage rows are beside.
@@ -35,7 +36,8 @@ pub struct Args {
     n: Option<u64>,
 }
 
-/// Runs every bench; the rows that need the baseline are skipped with a line where it cannot be built.
+/// Runs every bench; the rows that need the baseline are skipped with a line where it cannot be
+/// built.
 pub fn run_bench(args: &Args) -> Result<()> {
     let run_release = ["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin"];
     let mut bench = cargo();

@@ -14,7 +14,9 @@ pub struct Args {
 
 /// Builds the firmware and says where it is.
 pub fn run(args: &Args) -> Result<()> {
-    for board in Board::ALL.into_iter().filter(|board| args.board.is_none_or(|wanted| wanted == *board)) {
+    for board in
+        Board::ALL.into_iter().filter(|board| args.board.is_none_or(|wanted| wanted == *board))
+    {
         let programs = bare_metal::build(board)?.folder;
         for program in board.programs() {
             println!("{}", programs.join(program).display());

@@ -1,7 +1,8 @@
 //! `cargo xtask emulate`: the demo's first vehicles flown by boards in QEMU.
 //!
-//! Each board is the firmware as it is flashed, roadmap and mission in its flash. `host-sim fly --emulate` is autopilots, radio and
-//! ground station to them, in lock step: the flight depends on no clock and no load.
+//! Each board is the firmware as it is flashed, roadmap and mission in its flash.
+//! `host-sim fly --emulate` is autopilots, radio and ground station to them, in lock step: the
+//! flight depends on no clock and no load.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -38,8 +39,8 @@ impl Default for Args {
     }
 }
 
-/// Builds and flies; fails if the mission was not complete and clean. Returns how much of its stack a board used at most,
-/// bytes.
+/// Builds and flies; fails if the mission was not complete and clean. Returns how much of its stack
+/// a board used at most, bytes.
 pub fn run_emulate(args: &Args) -> Result<usize> {
     install::debian(install::EMULATOR)?;
     let firmware = bare_metal::build(Board::Qemu)?.folder.join("flockmate");
@@ -49,7 +50,11 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
     let (scenario, boards) = (out.join("scenario.toml"), usize::from(args.vehicles));
     std::fs::write(&scenario, cut_demo(boards)?)?;
     let Reported { gaps_ms, stacks } = fly(&firmware, &scenario, &out)?;
-    ensure!(gaps_ms.len() == boards, "{} of {boards} boards reported their setpoints", gaps_ms.len());
+    ensure!(
+        gaps_ms.len() == boards,
+        "{} of {boards} boards reported their setpoints",
+        gaps_ms.len()
+    );
     ensure!(
         gaps_ms.iter().all(|gap| *gap <= GAP_MS),
         "setpoints were {gaps_ms:?} ms apart: {GAP_MS} are allowed"
@@ -90,7 +95,8 @@ fn number(line: &str, name: &str, before: &str) -> Option<usize> {
 
 /// The demo's first vehicles.
 fn cut_demo(vehicles: usize) -> Result<String> {
-    let demo = std::fs::read_to_string(root().join(DEMO)).with_context(|| format!("cannot read: {DEMO}"))?;
+    let demo = std::fs::read_to_string(root().join(DEMO))
+        .with_context(|| format!("cannot read: {DEMO}"))?;
     let parts: Vec<_> = demo.split(VEHICLE).take(1 + vehicles).collect();
     ensure!(parts.len() == 1 + vehicles, "{DEMO} has only {} vehicles", parts.len() - 1);
     Ok(parts.join(VEHICLE))

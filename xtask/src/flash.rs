@@ -20,7 +20,10 @@ pub fn run_flash(args: &Args) -> Result<()> {
         Board::NucleoH743 => "STM32H743ZITx",
         Board::Pico2 => "RP235x",
     };
-    ensure!(find("probe-rs").is_some(), "probe-rs is not on the path: cargo install probe-rs-tools --locked");
+    ensure!(
+        find("probe-rs").is_some(),
+        "probe-rs is not on the path: cargo install probe-rs-tools --locked"
+    );
     let program = bare_metal::build(args.board)?.folder.join("flockmate");
     run(command("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&program))?;
     run(command("probe-rs").args(["reset", "--chip", chip]))

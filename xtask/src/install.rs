@@ -23,7 +23,8 @@ pub const BARE_METAL: &[Package] = &[
     Package { name: "lld", file: "/usr/bin/ld.lld" },
 ];
 /// What emulates a board.
-pub const EMULATOR: &[Package] = &[Package { name: "qemu-system-arm", file: "/usr/bin/qemu-system-arm" }];
+pub const EMULATOR: &[Package] =
+    &[Package { name: "qemu-system-arm", file: "/usr/bin/qemu-system-arm" }];
 /// The browser that opens reports.
 pub const BROWSER: &[Package] = &[Package { name: "chromium", file: "/usr/bin/chromium" }];
 /// The program the roadmap bench is measured beside.
@@ -35,9 +36,11 @@ pub const PEER: &[Package] = &[
 pub const COUNTER: &[Package] = &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
 const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink", "MAVProxy"];
 
-/// Installs what is missing of `packages`, as root on Debian; else says in one line what to install.
+/// Installs what is missing of `packages`, as root on Debian; else says in one line what to
+/// install.
 pub fn debian(packages: &[Package]) -> Result<()> {
-    let missing: Vec<_> = packages.iter().filter(|p| !Path::new(p.file).exists()).map(|p| p.name).collect();
+    let missing: Vec<_> =
+        packages.iter().filter(|p| !Path::new(p.file).exists()).map(|p| p.name).collect();
     if missing.is_empty() {
         return Ok(());
     }
@@ -47,7 +50,10 @@ pub fn debian(packages: &[Package]) -> Result<()> {
     }
     println!("installing {list}");
     let apt = |args: &[&str]| {
-        run(command("apt-get").args(args).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()))
+        run(command("apt-get")
+            .args(args)
+            .env("DEBIAN_FRONTEND", "noninteractive")
+            .stdout(Stdio::null()))
     };
     apt(&["update", "-qq"])?;
     apt(&[&["install", "-y", "-qq", "--no-install-recommends"], missing.as_slice()].concat())
@@ -58,7 +64,8 @@ fn is_root() -> bool {
     id.is_ok_and(|out| out.stdout.trim_ascii() == b"0")
 }
 
-/// The Python of a venv with MAVSDK, pymavlink and MAVProxy, made in the target directory at the first call.
+/// The Python of a venv with MAVSDK, pymavlink and MAVProxy, made in the target directory at the
+/// first call.
 pub fn python_clients() -> Result<PathBuf> {
     let venv = target_dir().join("venv");
     let python = venv.join("bin/python");

@@ -1,4 +1,5 @@
-//! The developer's one entry: `cargo xtask test`, `bench`, and the firmware's `build`, `size`, `emulate` and `flash`.
+//! The developer's one entry: `cargo xtask test`, `bench`, and the firmware's `build`, `size`,
+//! `emulate` and `flash`.
 #![forbid(unsafe_code)]
 
 mod bare_metal;

@@ -13,7 +13,8 @@ pub fn root() -> &'static Path {
 
 /// Where build products go: `CARGO_TARGET_DIR` or `target`.
 pub fn target_dir() -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
+    std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
 /// A command run in the checkout, without standard input.

@@ -1,8 +1,8 @@
 //! `cargo xtask size`: what the firmware takes of a board's memory, by part.
 //!
-//! Flash and statics are read from the linked program. The stack is measured in emulation: it is painted at the start, and what
-//! lost its paint in the emulated flight was used. The other boards run the same code, on nearly the same core: they get the
-//! same figure.
+//! Flash and statics are read from the linked program. The stack is measured in emulation: it is
+//! painted at the start, and what lost its paint in the emulated flight was used. The other boards
+//! run the same code, on nearly the same core: they get the same figure.
 
 use std::path::{Path, PathBuf};
 
@@ -55,7 +55,13 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
         ("constants_bytes", constants, flash_budget),
         ("flash_bytes", flash, flash_budget),
     ];
-    rows.extend(board.regions().iter().zip(regions).map(|(region, bytes)| (region.name, bytes, region.most)));
+    rows.extend(
+        board
+            .regions()
+            .iter()
+            .zip(regions)
+            .map(|(region, bytes)| (region.name, bytes, region.most)),
+    );
     rows.push(("stack_bytes", stack, STACK));
     println!("{}", board.name());
     for (name, ours, most) in &rows {
@@ -95,7 +101,8 @@ struct Parts {
 
 /// Adds up the sections of a program that take memory.
 fn parts(program: &Path, board: Board) -> Result<Parts> {
-    let bytes = std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;
+    let bytes =
+        std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;
     let elf = object::File::parse(&*bytes)
         .with_context(|| format!("no program for a board: {}", program.display()))?;
     let mut parts = Parts { regions: vec![0; board.regions().len()], ..Parts::default() };
@@ -116,7 +123,8 @@ fn parts(program: &Path, board: Board) -> Result<Parts> {
             let at = section.address();
             let lies = |region: &Region| (region.at..region.at + region.len as u64).contains(&at);
             let region = board.regions().iter().position(lies);
-            let region = region.with_context(|| format!("{:?} lies nowhere: {at:#x}", section.name()))?;
+            let region =
+                region.with_context(|| format!("{:?} lies nowhere: {at:#x}", section.name()))?;
             parts.regions[region] += size;
         }
     }

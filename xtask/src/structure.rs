@@ -1,7 +1,8 @@
 //! `cargo xtask structure`: which file imports which, and the shape of structs and functions.
 //!
-//! Read from the sources with `syn`. An import is any path that leaves its file: a `use`, a type, a call. What a `pub use` passes on counts
-//! as an import of the file that defines it. Test modules may import what they like; a `mod` line is no import.
+//! Read from the sources with `syn`. An import is any path that leaves its file: a `use`, a type, a
+//! call. What a `pub use` passes on counts as an import of the file that defines it. Test modules
+//! may import what they like; a `mod` line is no import.
 
 mod distances;
 mod imports;
@@ -18,8 +19,8 @@ use self::sources::Tree;
 const CRATES: [&str; 8] =
     ["fpu", "planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 
-/// Prints every cycle of imports and every struct or function beyond the limits; fails if there is one without a reason, or if
-/// docs/margins.md is not that of the sources.
+/// Prints every cycle of imports and every struct or function beyond the limits; fails if there is
+/// one without a reason, or if docs/margins.md is not that of the sources.
 pub fn run() -> Result<()> {
     let mut wrong = 0;
     for name in CRATES {

@@ -36,7 +36,17 @@ fn sources() -> Result<()> {
     })?;
     step("documents", || {
         let mut doc = cargo();
-        doc.args(["doc", "--no-deps", "--locked", "-p", "fpu", "-p", "planner-core", "-p", "companion"]);
+        doc.args([
+            "doc",
+            "--no-deps",
+            "--locked",
+            "-p",
+            "fpu",
+            "-p",
+            "planner-core",
+            "-p",
+            "companion",
+        ]);
         shell::run(doc.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
     step("structure", structure::run)
@@ -66,7 +76,9 @@ fn steps(args: &Args) -> Result<()> {
         Ok(())
     })?;
     // Release once, so that tests can hold it beside debug.
-    step("release build", || shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"])))?;
+    step("release build", || {
+        shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))
+    })?;
     step("host tests", || {
         let mut tests = cargo();
         tests.args(["test", "--workspace", "--no-fail-fast", "--locked"]);
@@ -81,7 +93,15 @@ fn steps(args: &Args) -> Result<()> {
     })?;
     step("examples", || {
         for (package, example) in EXAMPLES {
-            shell::run(cargo().args(["run", "--quiet", "--locked", "-p", package, "--example", example]))?;
+            shell::run(cargo().args([
+                "run",
+                "--quiet",
+                "--locked",
+                "-p",
+                package,
+                "--example",
+                example,
+            ]))?;
         }
         Ok(())
     })?;

@@ -1,5 +1,6 @@
-//! ArduCopter's numbers: flight modes, setpoint masks, the estimator's flags and the streams a companion needs. Source:
-//! ArduCopter 4.6 `mode.h`, `GCS_MAVLink_Copter.cpp` and what its recording shows. The shape is that of `px4`.
+//! ArduCopter's numbers: flight modes, setpoint masks, the estimator's flags and the streams a
+//! companion needs. Source: ArduCopter 4.6 `mode.h`, `GCS_MAVLink_Copter.cpp` and what its
+//! recording shows. The shape is that of `px4`.
 
 use crate::autopilot::limits::{Limit, LimitParameter};
 
@@ -64,7 +65,7 @@ pub const STREAMS: [(u16, f32); 5] = [
     (32, 33_333.0),   // LOCAL_POSITION_NED
     (245, 200_000.0), // EXTENDED_SYS_STATE
     (193, 200_000.0), // EKF_STATUS_REPORT
-    (33, 200_000.0),  // GLOBAL_POSITION_INT, with the height above home that NAV_TAKEOFF counts from
+    (33, 200_000.0), // GLOBAL_POSITION_INT, with the height above home that NAV_TAKEOFF counts from
     (1, 1_000_000.0), // SYS_STATUS, with the battery
 ];
 
@@ -75,7 +76,9 @@ mod tests {
     #[test]
     fn the_estimator_is_ready_as_it_was_seen_to_be() {
         // Uninitialised, without GPS, flying, and dead reckoning after a loss.
-        for (flags, ready) in [(0x400, false), (0xA7, false), (0x33F, true), (0x73F, false), (0x0A7, false)] {
+        for (flags, ready) in
+            [(0x400, false), (0xA7, false), (0x33F, true), (0x73F, false), (0x0A7, false)]
+        {
             assert_eq!(estimator_ready(flags), ready, "{flags:#x}");
         }
         assert_eq!(mode_params(GUIDED), (4.0, 0.0));

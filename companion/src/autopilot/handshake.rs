@@ -32,11 +32,13 @@ pub(crate) struct Handshake {
     denied: bool,
     /// When arming was accepted: from then on it is not requested again.
     accepted_at: Option<Instant>,
-    /// HEARTBEAT was missing since arming was last requested: it may have been armed, and disarmed by its pilot, unseen.
+    /// HEARTBEAT was missing since arming was last requested: it may have been armed, and disarmed
+    /// by its pilot, unseen.
     heartbeat_gap: bool,
     /// Disarming was refused.
     disarm_refused: bool,
-    /// Offboard or Guided was entered for this mission, and no other mode but landing was seen since.
+    /// Offboard or Guided was entered for this mission, and no other mode but landing was seen
+    /// since.
     in_own_mode: bool,
     /// The landing detector reported flight since arming was requested.
     flown: bool,
@@ -61,7 +63,8 @@ impl Handshake {
     pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
         let kind = t.kind.unwrap_or_default();
         let on_ground = t.on_ground != Some(false);
-        self.in_own_mode &= t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
+        self.in_own_mode &=
+            t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
         if !on_ground && t.armed {
             self.flown = true;
         }
@@ -93,7 +96,9 @@ impl Handshake {
             None => true,
             Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
             Some(at) => {
-                now - at >= ARMED_TIMEOUT && self.unanswered < MAX_ARMING_TRIES && !self.heartbeat_gap
+                now - at >= ARMED_TIMEOUT
+                    && self.unanswered < MAX_ARMING_TRIES
+                    && !self.heartbeat_gap
             }
         };
         let asks = due && !armed && self.accepted_at.is_none();
@@ -124,8 +129,8 @@ impl Handshake {
         self.heartbeat_gap = true;
     }
 
-    /// Takes the autopilot's answer to a request: what became of arming. Returns a refusal that is to be reported: text, command
-    /// and result.
+    /// Takes the autopilot's answer to a request: what became of arming. Returns a refusal that is
+    /// to be reported: text, command and result.
     pub(crate) fn handle_ack(
         &mut self,
         state: State,

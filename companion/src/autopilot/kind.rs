@@ -103,8 +103,8 @@ impl AutopilotKind {
         }
     }
 
-    /// Whether it needs a command to take off: PX4 lifts off towards a setpoint, ArduCopter only by NAV_TAKEOFF, which a
-    /// setpoint before the lift-off would cancel.
+    /// Whether it needs a command to take off: PX4 lifts off towards a setpoint, ArduCopter only by
+    /// NAV_TAKEOFF, which a setpoint before the lift-off would cancel.
     pub fn takes_off_by_command(self) -> bool {
         self == Self::ArduPilot
     }

@@ -1,7 +1,8 @@
 //! What the autopilot's parameters allow: limits of speed, acceleration and jerk.
 //!
-//! They are read on connecting. A value that did not come, or that no vehicle has, counts as the default of its kind. Source: PX4
-//! 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
+//! They are read on connecting. A value that did not come, or that no vehicle has, counts as the
+//! default of its kind. Source: PX4 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and
+//! `PSC_*`.
 
 /// The quantity that an autopilot's parameter limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

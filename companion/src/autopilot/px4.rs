@@ -1,5 +1,6 @@
 //! PX4's numbers: flight modes, the setpoint mask, and the streams a companion needs. Source: PX4 1.17
-//! `px4_custom_mode.h` and what AUTOPILOTS recordings show. Another autopilot gets a module of the same shape.
+//! `px4_custom_mode.h` and what AUTOPILOTS recordings show. Another autopilot gets a module of the
+//! same shape.
 
 use crate::autopilot::limits::{Limit, LimitParameter};
 
@@ -12,7 +13,8 @@ pub const HOLD: u32 = 0x0304_0000;
 /// AUTO.RTL.
 pub const RTL: u32 = 0x0504_0000;
 
-/// Position, with velocity and acceleration as feed-forward; yaw and yaw rate ignored (the heading stays as it is).
+/// Position, with velocity and acceleration as feed-forward; yaw and yaw rate ignored (the heading
+/// stays as it is).
 pub const MASK_POSITION_VELOCITY_ACCELERATION: u16 = 0xC00;
 
 /// Parameters that limit what it flies, with 1.17's defaults; all are floats.
@@ -34,8 +36,8 @@ pub fn mode_params(custom_mode: u32) -> (f32, f32) {
     (((custom_mode >> 16) & 0xFF) as f32, (custom_mode >> 24) as f32)
 }
 
-/// Streams to set on connecting: message id and interval in microseconds, −1 off. PX4 floods about 18 kB/s unasked;
-/// these leave about 3 kB/s.
+/// Streams to set on connecting: message id and interval in microseconds, −1 off. PX4 floods about
+/// 18 kB/s unasked; these leave about 3 kB/s.
 pub const STREAMS: [(u16, f32); 19] = [
     (32, 33_333.0),     // LOCAL_POSITION_NED
     (245, 200_000.0),   // EXTENDED_SYS_STATE

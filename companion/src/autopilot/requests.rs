@@ -1,4 +1,5 @@
-//! What is requested of the autopilot until it is so: streams, EKF origin, limits, mode, arming, take-off, landing.
+//! What is requested of the autopilot until it is so: streams, EKF origin, limits, mode, arming,
+//! take-off, landing.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
@@ -26,8 +27,8 @@ const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Time after which the take-off is requested again: longer than ArduCopter takes to spin up and
 /// lift off (2.3 s).
 const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
-/// When no position arrives for this long while HEARTBEAT still does, the autopilot has rebooted and
-/// lost its streams.
+/// When no position arrives for this long while HEARTBEAT still does, the autopilot has rebooted
+/// and lost its streams.
 const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Least time between two requests for all streams.
 const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
@@ -81,7 +82,13 @@ pub(crate) struct Requests {
 impl Default for Requests {
     fn default() -> Self {
         let limits = AutopilotKind::default().default_limits();
-        Self { handshake: Handshake::default(), limits, limits_read: 0, tries: 0, next_stream: usize::MAX }
+        Self {
+            handshake: Handshake::default(),
+            limits,
+            limits_read: 0,
+            tries: 0,
+            next_stream: usize::MAX,
+        }
     }
 }
 
@@ -106,7 +113,8 @@ impl Requests {
         self.handshake.update_mode_and_landed(state, telemetry);
     }
 
-    /// Starts requesting the streams from the first, and on the ground the limits. Returns whether those are others now.
+    /// Starts requesting the streams from the first, and on the ground the limits. Returns whether
+    /// those are others now.
     pub(crate) fn start_on_connect(
         &mut self,
         telemetry: &Telemetry,
@@ -143,8 +151,9 @@ impl Requests {
         let all = kind.limits();
         let from = usize::from(self.tries);
         // Parameters are requested in turn, so that one that does not exist holds back none.
-        let missing =
-            (from..from + all.len()).map(|i| i % all.len()).find(|i| self.limits_read & 1 << i == 0);
+        let missing = (from..from + all.len())
+            .map(|i| i % all.len())
+            .find(|i| self.limits_read & 1 << i == 0);
         let Some(limit) = missing.and_then(|i| all.get(i)) else {
             self.tries = 0;
             return;
@@ -154,8 +163,8 @@ impl Requests {
         links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
     }
 
-    /// PARAM_VALUE of the autopilot; whether a limit changed. Read by field: a type newer than the crate's must not hide the
-    /// value.
+    /// PARAM_VALUE of the autopilot; whether a limit changed. Read by field: a type newer than the
+    /// crate's must not hide the value.
     pub(crate) fn handle_limit(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
         const ID: core::ops::Range<usize> = 8..24;
         let p = frame.padded();
@@ -186,11 +195,16 @@ impl Requests {
             self.request_next_limit(kind, now, timers, links);
         }
         let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
-        let tunes =
-            lost && timers.is_due(Timer::Streams, now) && self.start_on_connect(telemetry, s, timers, links);
+        let tunes = lost
+            && timers.is_due(Timer::Streams, now)
+            && self.start_on_connect(telemetry, s, timers, links);
         let doubts = telemetry.is_origin_doubtful();
-        if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now) {
-            timers.set(Timer::Origin, now + if doubts { ORIGIN_RETRY_EVERY } else { REQUEST_RETRY_EVERY });
+        if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now)
+        {
+            timers.set(
+                Timer::Origin,
+                now + if doubts { ORIGIN_RETRY_EVERY } else { REQUEST_RETRY_EVERY },
+            );
             links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
         }
         for _ in 0..STREAM_REQUESTS_PER_STEP {
@@ -236,7 +250,9 @@ impl Requests {
         match s.state {
             State::Engaging => push(change_to(kind.setpoint_mode())),
             // HEARTBEAT may not show the mode yet in which a landing was requested.
-            State::LandingHeld if s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode() => {
+            State::LandingHeld
+                if s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode() =>
+            {
                 push(change_to(kind.setpoint_mode()));
             }
             State::CancelStart => push(Outgoing::Arm(false)),
@@ -276,8 +292,16 @@ impl Requests {
         }
     }
 
-    /// Takes the autopilot's answer to a request, and reports what it refused; `own` is this vehicle's system id.
-    pub(crate) fn handle_ack(&mut self, ack: &Ack, own: u8, state: State, now: Instant, links: &mut Links) {
+    /// Takes the autopilot's answer to a request, and reports what it refused; `own` is this
+    /// vehicle's system id.
+    pub(crate) fn handle_ack(
+        &mut self,
+        ack: &Ack,
+        own: u8,
+        state: State,
+        now: Instant,
+        links: &mut Links,
+    ) {
         if ack.to != (0, 0) && ack.to != (own, crate::COMPANION_COMPONENT) {
             return;
         }
@@ -288,13 +312,19 @@ impl Requests {
 }
 
 impl RequestContext {
-    /// Whether a landing may be requested: once the safety filter has looked down and the column is clear, or whatever is below.
-    pub(crate) fn may_request_landing(in_state: Duration, column_clear: bool, must_land: bool) -> bool {
+    /// Whether a landing may be requested: once the safety filter has looked down and the column is
+    /// clear, or whatever is below.
+    pub(crate) fn may_request_landing(
+        in_state: Duration,
+        column_clear: bool,
+        must_land: bool,
+    ) -> bool {
         must_land || (in_state >= LAND_REQUEST_AFTER && column_clear)
     }
 }
 
-/// Whether the battery's charge was reported lately, or does not count (`low_percent` not above zero).
+/// Whether the battery's charge was reported lately, or does not count (`low_percent` not above
+/// zero).
 pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
     low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= MAX_BATTERY_AGE
 }

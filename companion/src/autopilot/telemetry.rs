@@ -1,14 +1,16 @@
 //! What the autopilot says of itself, turned into the mission frame.
 //!
-//! Only component 1 of the own system is listened to. Frames that repeat or come out of order are dropped by their
-//! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
-//! EKF origin moved or that the estimate was wrong, before or now: the position counts as lost until the origin is heard
-//! again and [`POSITION_SETTLE_TIME`] has passed without another jump.
+//! Only component 1 of the own system is listened to. Frames that repeat or come out of order are
+//! dropped by their sequence number, positions also by their time. A position that jumps further
+//! than a vehicle flies means that the EKF origin moved or that the estimate was wrong, before or
+//! now: the position counts as lost until the origin is heard again and [`POSITION_SETTLE_TIME`]
+//! has passed without another jump.
 //!
-//! While the motors are armed the EKF origin that setpoints are computed with does not change, whatever is heard: a GPS_GLOBAL_ORIGIN
-//! that an autopilot forwards from its radio looks like its own. Another origin is in doubt until the autopilot, asked again, has
-//! named no other for 0.8 s (`ORIGIN_DOUBT_TIME`); then it has moved, and the mission lands. An origin further than 30 km (`MAX_ORIGIN_DISTANCE_M`)
-//! from the mission's counts as none.
+//! While the motors are armed the EKF origin that setpoints are computed with does not change,
+//! whatever is heard: a GPS_GLOBAL_ORIGIN that an autopilot forwards from its radio looks like its
+//! own. Another origin is in doubt until the autopilot, asked again, has named no other for 0.8 s
+//! (`ORIGIN_DOUBT_TIME`); then it has moved, and the mission lands. An origin further than 30 km
+//! (`MAX_ORIGIN_DISTANCE_M`) from the mission's counts as none.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -140,7 +142,8 @@ pub struct Telemetry {
     pub velocity: Point,
     /// The last answer to a command, until it is taken.
     pub(crate) ack: Option<Ack>,
-    /// When each stream of [`AutopilotKind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
+    /// When each stream of [`AutopilotKind::streams`] that is on was last heard, in that order;
+    /// `Instant::ZERO`: never.
     streams: [Instant; MAX_STREAMS],
     boot_ms: u32,
     /// Time of the last position used, by the autopilot's clock, milliseconds.
@@ -154,8 +157,8 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Telemetry before any frame. With `accept_any_origin` (a board without a mission) an EKF origin is
-    /// accepted anywhere.
+    /// Telemetry before any frame. With `accept_any_origin` (a board without a mission) an EKF
+    /// origin is accepted anywhere.
     pub fn new(anywhere: bool) -> Self {
         Self { battery_percent: -1, accept_any_origin: anywhere, ..Self::default() }
     }
@@ -213,7 +216,8 @@ impl Telemetry {
         mission_origin: &Geodetic,
         frame: &Frame,
     ) -> TelemetryChange {
-        // An origin is confirmed while armed, so a forwarded one needs no place in the sequence, and takes none from the true ones.
+        // An origin is confirmed while armed, so a forwarded one needs no place in the sequence,
+        // and takes none from the true ones.
         let confirmed = self.armed && frame.message_id == GPS_GLOBAL_ORIGIN_DATA::ID;
         if !confirmed && !self.sequence.accept(frame.sequence, now) {
             return TelemetryChange::None;
@@ -231,7 +235,9 @@ impl Telemetry {
             // autopilot silent.
             HEARTBEAT => {
                 let p = frame.padded();
-                let Some(kind) = AutopilotKind::from_heartbeat(p[5]) else { return TelemetryChange::None };
+                let Some(kind) = AutopilotKind::from_heartbeat(p[5]) else {
+                    return TelemetryChange::None;
+                };
                 if *self.kind.get_or_insert(kind) != kind {
                     return TelemetryChange::None;
                 }
@@ -266,11 +272,16 @@ impl Telemetry {
             EKF_STATUS_REPORT_DATA::ID => {
                 // Decoded field by field: flags newer than the crate's must not hide the others.
                 let p = frame.padded();
-                self.estimator_ready = ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
-                let ratio = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
-                // Velocity, horizontal and vertical position, compass. It reports no metres: 0 leaves what is vouched for.
+                self.estimator_ready =
+                    ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
+                let ratio =
+                    |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+                // Velocity, horizontal and vertical position, compass. It reports no metres: 0
+                // leaves what is vouched for.
                 let sound = self.estimator_ready
-                    && [0, 4, 8, 12].into_iter().all(|at| ardupilot::is_variance_ratio_good(ratio(at)));
+                    && [0, 4, 8, 12]
+                        .into_iter()
+                        .all(|at| ardupilot::is_variance_ratio_good(ratio(at)));
                 self.accuracy = Some((if sound { 0.0 } else { f32::INFINITY }, now));
                 if !self.estimator_ready && self.kind == Some(AutopilotKind::ArduPilot) {
                     self.position_at = None;
@@ -280,7 +291,8 @@ impl Telemetry {
             ESTIMATOR_STATUS_DATA::ID if self.kind == Some(AutopilotKind::Px4) => {
                 // Decoded field by field: flags newer than the crate's must not hide the accuracy.
                 let p = frame.padded();
-                let metres = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+                let metres =
+                    |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
                 let (across_m, height_m) = (metres(32), metres(36));
                 // NaN, and what is less than nothing, is not known.
                 let known = across_m >= 0.0 && height_m >= 0.0;
@@ -376,7 +388,8 @@ impl Telemetry {
         if self.origin_moved {
             (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
         }
-        (self.last_armed_origin, self.origin_doubtful_since, self.origin_moved) = (None, None, false);
+        (self.last_armed_origin, self.origin_doubtful_since, self.origin_moved) =
+            (None, None, false);
     }
 
     fn handle_position(
@@ -393,7 +406,9 @@ impl Telemetry {
             return TelemetryChange::None;
         }
         self.boot_ms = d.time_boot_ms;
-        let Some(kind) = self.kind.filter(|kind| *kind == AutopilotKind::Px4 || self.estimator_ready) else {
+        let Some(kind) =
+            self.kind.filter(|kind| *kind == AutopilotKind::Px4 || self.estimator_ready)
+        else {
             return TelemetryChange::None;
         };
         let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
@@ -417,7 +432,8 @@ impl Telemetry {
         }
         (self.position_read_at, self.position_boot_ms) = (Some(now), d.time_boot_ms);
         self.position = position;
-        // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
+        // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left
+        // out for velocity.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
         if !self.is_settling(now) && now >= self.positions_valid_from {
             self.position_at = Some(now);
@@ -433,7 +449,8 @@ impl Telemetry {
         TelemetryChange::OriginLost
     }
 
-    /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while the origin is unknown.
+    /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while
+    /// the origin is unknown.
     pub fn to_ned(&self, mission_origin: &Geodetic, point: &Point) -> Option<Vector3<f32>> {
         let geodetic = frames::enu_to_geodetic(mission_origin, point);
         let ned = frames::geodetic_to_ned(self.kind?.projection(), &self.ekf_origin?, &geodetic);

@@ -11,8 +11,8 @@ use crate::time::{Duration, Instant};
 const NO_AUTOPILOT_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Gives it a flash to keep its files and parameters in, and uses those; without one there are no files, and parameters are
-    /// forgotten.
+    /// Gives it a flash to keep its files and parameters in, and uses those; without one there are
+    /// no files, and parameters are forgotten.
     pub fn attach_store(&mut self, store: Store) {
         self.services.attach_store(store);
         let Self { services, mission, config, .. } = self;
@@ -26,14 +26,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.set_limits(&self.config, self.requests.limits());
     }
 
-    /// What the shell has to do with the flash next; once each, then [`Self::handle_flash`] takes the result. Drained like the
-    /// other `poll_*`, but it may take long: nothing else waits for it.
+    /// What the shell has to do with the flash next; once each, then [`Self::handle_flash`] takes
+    /// the result. Drained like the other `poll_*`, but it may take long: nothing else waits for
+    /// it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
         let erasing = self.erase_permission();
         self.services.poll_flash(self.now, erasing, &mut self.links)
     }
 
-    /// Handles how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
+    /// Handles how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an
+    /// erasure or a program.
     pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], FlashFault>) {
         self.now = now;
         self.services.handle_flash(outcome);
@@ -43,7 +45,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn erase_permission(&self) -> ErasePermission {
         let idle = matches!(
             self.mission.state(),
-            State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
+            State::WaitAutopilot
+                | State::WaitPosition
+                | State::Ready
+                | State::Done
+                | State::Aborted
         );
         let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > NO_AUTOPILOT_AFTER;
         match self.mission.state() {

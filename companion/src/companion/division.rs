@@ -1,4 +1,5 @@
-//! A coverage mission whose vehicles are lost: what this one says of itself, where it holds, and what it asks the shell for.
+//! A coverage mission whose vehicles are lost: what this one says of itself, where it holds, and
+//! what it asks the shell for.
 
 use planner_core::flight::{Task, VehiclePlan};
 use planner_core::{Length, Point};
@@ -32,8 +33,8 @@ fn to_decimetres(along_m: f32) -> Option<u16> {
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// The losses of the division that the shell is asked for by [`PlanKind::Division`], division by division: the lots of all
-    /// vehicles by rank.
+    /// The losses of the division that the shell is asked for by [`PlanKind::Division`], division
+    /// by division: the lots of all vehicles by rank.
     pub fn losses(&self) -> impl Iterator<Item = &[DivisionInput]> {
         self.neighbours.fleet().into_iter().flat_map(Fleet::losses)
     }
@@ -49,7 +50,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(fleet) = self.neighbours.fleet() else { return };
         let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
         // A vehicle that has left the mission is on its way to the ground.
-        let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing(now, MISSED_AFTER));
+        let waits =
+            fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing(now, MISSED_AFTER));
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
             // The end of a way around is not its pad.
@@ -79,7 +81,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let beside = self.detours.is_beside_plan();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
-            PilotControl | PilotReturned => self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER,
+            PilotControl | PilotReturned => {
+                self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER
+            }
             _ => off_plan && !beside,
         };
         let along_m = self.guidance.progress_m(state, &self.guidance_inputs());
@@ -98,7 +102,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             status: standing,
             waits: self.is_not_started(),
             division: self.mission.division_count(),
-            progress_dm: if flies { (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16 } else { 0 },
+            progress_dm: if flies {
+                (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16
+            } else {
+                0
+            },
             commitment_dm: if on_pad { Some(0) } else { self.commitment_dm().filter(|_| flies) },
             // Beside its path it waits for its own plan, to fly on to where it promised to hold.
             holds: on_pad || (state == Dividing && !beside),
@@ -111,7 +119,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(plan) = self.mission.plan() else { return false };
         let Task::Photograph(photographs) = &plan.task else { return false };
         let soon_m = self.guidance.along_m() + COMMITMENT_S * self.config.cruise_mps;
-        photographs.goes_on && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
+        photographs.goes_on
+            && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
     /// Whether it has not been started: it may take part as a vehicle that is new.
@@ -120,7 +129,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
     }
 
-    /// Whether the vehicle would resume its part after it has reported that it leaves: the others may have divided that part by then.
+    /// Whether the vehicle would resume its part after it has reported that it leaves: the others
+    /// may have divided that part by then.
     fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
@@ -157,26 +167,32 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let fleet = self.neighbours.fleet()?;
         let moves = matches!(self.mission.state(), Follow | Paused | Alone | Blocked | Replanning);
-        if !moves || !(fleet.is_dividing() || self.wants_division()) || fleet.commitment_dm().is_some() {
+        if !moves
+            || !(fleet.is_dividing() || self.wants_division())
+            || fleet.commitment_dm().is_some()
+        {
             return None;
         }
         let plan = self.mission.plan()?;
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
         // A vehicle whose path is blocked comes no further.
-        let promise_s = if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
+        let promise_s =
+            if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let clear_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
         let stop_m = (self.guidance.stopping_point_m() + EXTRA_STOPPING_MARGIN_M).min(most_m);
-        let picture_m = photographs.last_picture_before_m(&plan.path, most_m).filter(|at_m| *at_m >= stop_m);
+        let picture_m =
+            photographs.last_picture_before_m(&plan.path, most_m).filter(|at_m| *at_m >= stop_m);
         to_decimetres(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
     }
 
     /// Place where this vehicle is to hold for a division, metres along its path: while the
     /// division is under way, and until the new path of this vehicle has come.
     pub(super) fn division_hold_m(&self) -> Option<f32> {
-        // The fleet does not know yet what this vehicle was commanded since the last step. A promise is a place of its own path.
+        // The fleet does not know yet what this vehicle was commanded since the last step. A
+        // promise is a place of its own path.
         let elsewhere = self.is_landing_off_plan() || self.detours.is_beside_plan();
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
         let behind = fleet.division_count() > self.mission.division_count();
@@ -186,15 +202,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether it stands at that place.
     pub(super) fn is_holding_for_division(&self) -> bool {
-        self.division_hold_m()
-            .is_some_and(|at_m| self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.is_standing())
+        self.division_hold_m().is_some_and(|at_m| {
+            self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.is_standing()
+        })
     }
 
     /// Whether no division is under way or to be flown.
     pub(super) fn is_undivided(&self) -> bool {
         self.neighbours.fleet().is_none_or(|fleet| {
-            let flown =
-                fleet.division_count() == self.mission.division_count() && !self.mission.has_division();
+            let flown = fleet.division_count() == self.mission.division_count()
+                && !self.mission.has_division();
             flown && !fleet.is_dividing()
         })
     }
@@ -214,13 +231,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return;
         };
         let back = plan.path.point_at(back_m);
-        let here = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
+        let here =
+            self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
         let near = |place: Point| (position - place).length() < AT_HOLD_M;
         let meets = back.is_some_and(near) && here.is_some_and(near);
         if meets {
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
             if left > 0 {
-                self.links.send_text_with_numbers(true, "Flown around: # waypoints are left", [left, 0]);
+                self.links.send_text_with_numbers(
+                    true,
+                    "Flown around: # waypoints are left",
+                    [left, 0],
+                );
                 // Full only if the shell does not drain.
                 let _ = self.events.push_back(Event::FlownAround { left });
             }
@@ -231,7 +253,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Handles the plan that the shell computed for the division.
-    pub(super) fn handle_division_plan(&mut self, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
+    pub(super) fn handle_division_plan(
+        &mut self,
+        outcome: Result<&VehiclePlan<W, G>, PlanFailure>,
+    ) {
         let may_take = self.is_at_division_start();
         let Some(fleet) = self.neighbours.fleet_mut() else { return };
         if !self.mission.take_division_request(fleet.division_hash()) {
@@ -255,7 +280,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Err(_) => {}
             Ok(plan) if fleet.needs_division() => fleet.take_plan_crc(plan.plan_crc),
             Ok(plan)
-                if may_take && division == self.mission.division_count() && self.detours.is_beside_plan() =>
+                if may_take
+                    && division == self.mission.division_count()
+                    && self.detours.is_beside_plan() =>
             {
                 self.resume_own_plan(plan);
             }

@@ -26,7 +26,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Returns whether the mission table has to be evaluated.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
         let own = self.config.system_id;
-        let sender = SenderKind::from_system_id(link, frame.system, own, &self.config.ground_stations);
+        let sender =
+            SenderKind::from_system_id(link, frame.system, own, &self.config.ground_stations);
         if let Some(command) = commands::read_command(frame, self.config.system_id) {
             if sender != SenderKind::GroundStation && command.needs_authority() {
                 self.reject_command(link, sender, &command);
@@ -53,7 +54,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         match link {
             Link::Autopilot => {
-                if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT_COMPONENT {
+                if frame.system != self.config.system_id
+                    || frame.component != crate::AUTOPILOT_COMPONENT
+                {
                     return false;
                 }
                 if frame.message_id == PARAM_VALUE_DATA::ID {
@@ -65,7 +68,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 let change = self.telemetry.handle_frame(self.now, &self.config.origin, frame);
                 if let Some(ack) = self.telemetry.ack.take() {
-                    self.requests.handle_ack(&ack, own, self.mission.state(), self.now, &mut self.links);
+                    self.requests.handle_ack(
+                        &ack,
+                        own,
+                        self.mission.state(),
+                        self.now,
+                        &mut self.links,
+                    );
                     self.mission.handle_ack(&ack, &mut self.links);
                 }
                 self.requests.update_mode_and_landed(self.mission.state(), &self.telemetry);
@@ -75,7 +84,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if let TelemetryChange::OriginFar(km) = change {
                     if self.timers.take_due(Timer::OriginReport, self.now, REPORT_EVERY) {
-                        self.links.send_text_with_numbers(true, "EKF origin # km away: not used", [km, 0]);
+                        self.links.send_text_with_numbers(
+                            true,
+                            "EKF origin # km away: not used",
+                            [km, 0],
+                        );
                     }
                     return true;
                 }
@@ -88,7 +101,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                         self.request_streams();
                     }
                 }
-                change == TelemetryChange::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
+                change == TelemetryChange::Updated
+                    && frame.message_id != LOCAL_POSITION_NED_DATA::ID
             }
             Link::Swarm => {
                 self.handle_neighbour(frame);
@@ -136,7 +150,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 return;
             }
-            let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
+            let echo =
+                intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
             let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
             if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().arrived(&echo)) {
                 self.guidance.note_reported_way(sent.at, sent.ends_m);
@@ -165,7 +180,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
             self.links.queue_answer(self.now, link, sender, AnswerKind::Ack, ack);
         }
-        let numbers = [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
+        let numbers =
+            [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
         self.links.send_sender_text(
             self.now,
             sender,
@@ -175,8 +191,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         );
     }
 
-    /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
-    pub(super) fn handle_command(&mut self, link: Link, sender: SenderKind, command: &Command) -> Option<u8> {
+    /// Returns the answer; none is due to a broadcast, nor to a command that is another
+    /// component's.
+    pub(super) fn handle_command(
+        &mut self,
+        link: Link,
+        sender: SenderKind,
+        command: &Command,
+    ) -> Option<u8> {
         let (before, known) = (*self.mission.pending(), self.detours.obstacle_count());
         let inputs = self.guard_inputs();
         let result = match self.mission.handle_command(&inputs, command) {
@@ -205,7 +227,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         command.to_us.then_some(result)
     }
 
-    pub(super) fn handle_message_request(&mut self, link: Link, sender: SenderKind, message: f32) -> u8 {
+    pub(super) fn handle_message_request(
+        &mut self,
+        link: Link,
+        sender: SenderKind,
+        message: f32,
+    ) -> u8 {
         if !self.links.take_answer_token(self.now, link, sender, AnswerKind::Message) {
             return TEMPORARILY_REJECTED;
         }
@@ -217,7 +244,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
             self.links.set_due(link, OnDemandMessage::Version, true);
         } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
-            self.links.set_due(link, OnDemandMessage::Position, self.telemetry.position_at.is_some());
+            self.links.set_due(
+                link,
+                OnDemandMessage::Position,
+                self.telemetry.position_at.is_some(),
+            );
         } else {
             return DENIED;
         }

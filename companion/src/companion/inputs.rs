@@ -21,8 +21,8 @@ const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Silence a second before the lease ends: the row `NeighboursSilent` stops a vehicle a second
 /// after this.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
-/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may sway around a setpoint that stands: in gusts it
-/// sways further there than between walls it may.
+/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may sway around a
+/// setpoint that stands: in gusts it sways further there than between walls it may.
 const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
 /// Greatest distance from its setpoint of a vehicle that sways, metres.
 const MAX_SWAY_M: f32 = 2.0;
@@ -59,9 +59,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let fence = self.config.geofence;
         let standing = self.guidance.is_standing() && t.velocity.length() < MAX_HOVER_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
-        let inside =
-            |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
-        let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
+        let inside = |(low, high): (Point, Point)| {
+            (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a])
+        };
+        let room_below =
+            !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
         let sways = self.config.division.is_some() && self.guidance.lead_m(t) < MAX_SWAY_M;
@@ -78,14 +80,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 State::Follow => now - self.guidance.last_progress_at(),
                 // The vehicle may have stood for a gate long before. Where it can fly home it does
                 // not land for that.
-                State::Blocked if over_field && sought_home.is_none() => self.detours.blocked_for(now),
-                State::Blocked => (now - self.guidance.last_progress_at()).max(self.detours.blocked_for(now)),
+                State::Blocked if over_field && sought_home.is_none() => {
+                    self.detours.blocked_for(now)
+                }
+                State::Blocked => {
+                    (now - self.guidance.last_progress_at()).max(self.detours.blocked_for(now))
+                }
                 _ => Duration::default(),
             },
             unfollowed_for,
             blocked_for: self.detours.blocked_for(now),
-            // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
-            // being heard.
+            // On its way back, or aside to land, it is already on its way to the ground: it does
+            // not stop for want of being heard.
             neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
                 fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER)
             } else {
@@ -130,7 +136,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             may_fly_beside: standing
                 && (self.is_undivided() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_field(&view),
-            around_flown: follow && self.detours.leads_back() && self.guidance.is_at_end(scene) && standing,
+            around_flown: follow
+                && self.detours.leads_back()
+                && self.guidance.is_at_end(scene)
+                && standing,
             own_plan_ready: self.detours.is_own_plan_ready(),
             own_plan_lost: self.detours.is_own_plan_lost(),
             homeward: self.detours.is_homeward(),
@@ -149,7 +158,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             critical: t.is_critical(),
             on_ground,
             has_flown: handshake.has_flown(),
-            vertical: t.position_age(now) < MAX_POSITION_AGE && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
+            vertical: t.position_age(now) < MAX_POSITION_AGE
+                && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
             gates_open: self.guidance.advice.stop_within_m > 0.05
@@ -164,7 +174,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             climb_done: self.mission.state() == State::Climb && self.guidance.is_climb_done(scene),
             // The ground may be higher than where its pad is said to be.
             path_done: follow
-                && (self.guidance.is_path_done(scene, now) || (self.guidance.is_descending() && on_ground)),
+                && (self.guidance.is_path_done(scene, now)
+                    || (self.guidance.is_descending() && on_ground)),
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
                 // These interrupted states do not depend on a place on the path.
@@ -221,7 +232,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether others are heard and hear it: in a coverage mission a majority of those that take part.
+    /// Whether others are heard and hear it: in a coverage mission a majority of those that take
+    /// part.
     fn is_linked(&self) -> bool {
         match self.neighbours.fleet() {
             Some(fleet) => fleet.unheard_for(self.now) < HEARTBEAT_EVERY,
@@ -231,9 +243,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether it may continue its plan although no other vehicle hears it.
     pub(super) fn may_fly_unheard(&self) -> bool {
-        let follows =
-            matches!(self.mission.state(), State::TakeOff | State::Climb | State::Follow | State::Alone);
-        let left = self.detours.is_blocked() || self.detours.has_left_plan() || self.detours.is_on_detour();
+        let follows = matches!(
+            self.mission.state(),
+            State::TakeOff | State::Climb | State::Follow | State::Alone
+        );
+        let left = self.detours.is_blocked()
+            || self.detours.has_left_plan()
+            || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
         ranged && follows && !left && !self.guidance.returning && self.mission.plan().is_some()
     }
@@ -247,24 +263,34 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && (clear_m > self.guidance.along_m() + MIN_GATE_AHEAD_M || clear_m >= length_m)
     }
 
-    /// Place on its plan up to which this vehicle flies while it is unheard, metres along its path, and the seconds by which its
-    /// gates and its climb delay it beyond a flight at the assumed speed from `progress_m`; −1e6 where it does not fly on.
+    /// Place on its plan up to which this vehicle flies while it is unheard, metres along its path,
+    /// and the seconds by which its gates and its climb delay it beyond a flight at the assumed
+    /// speed from `progress_m`; −1e6 where it does not fly on.
     pub(super) fn unheard_reach_m(&self, progress_m: f32) -> (f32, u8) {
         match self.may_fly_unheard() {
             true => {
                 let scene = self.detour_view().scene;
-                let (clear_m, in_s) =
-                    self.guidance.gates_open_up_to_soon_m(&scene, &self.neighbours, progress_m, self.now);
-                // The motors idle at first, and the vehicle comes to rest at the top. A metre a second is slow.
-                let climb_s =
-                    if progress_m < 0.0 { MAX_CLIMB_BEGINS_S + libm::ceilf(-progress_m) } else { 0.0 };
+                let (clear_m, in_s) = self.guidance.gates_open_up_to_soon_m(
+                    &scene,
+                    &self.neighbours,
+                    progress_m,
+                    self.now,
+                );
+                // The motors idle at first, and the vehicle comes to rest at the top. A metre a
+                // second is slow.
+                let climb_s = if progress_m < 0.0 {
+                    MAX_CLIMB_BEGINS_S + libm::ceilf(-progress_m)
+                } else {
+                    0.0
+                };
                 (clear_m, in_s.max(climb_s as u8))
             }
             false => (-1e6, 0),
         }
     }
 
-    /// Whether it comes down whatever is below: with a battery that is nearly empty, or no place known to hold.
+    /// Whether it comes down whatever is below: with a battery that is nearly empty, or no place
+    /// known to hold.
     pub(crate) fn must_land(&self) -> bool {
         let t = &self.telemetry;
         t.charge_below(self.config.battery_low_percent / 2)

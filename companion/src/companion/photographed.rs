@@ -1,4 +1,5 @@
-//! What of the area is photographed: noted in flight, kept in flash, exchanged, and left out by the next plan.
+//! What of the area is photographed: noted in flight, kept in flash, exchanged, and left out by the
+//! next plan.
 
 use mavlink::dialects::ardupilotmega::NAMED_VALUE_FLOAT_DATA;
 use planner_core::flight::WaypointRange;
@@ -18,7 +19,8 @@ const NOTE_EVERY: Duration = Duration::from_millis(1000);
 const OTHERS_REPORT_WITHIN: Duration = Duration::from_secs(5);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Waypoints of the area that the plan asked for by [`crate::events::PlanKind::Mission`] leaves out, those asked for later too.
+    /// Waypoints of the area that the plan asked for by [`crate::events::PlanKind::Mission`] leaves
+    /// out, those asked for later too.
     pub fn excluded_waypoints(&self) -> &[WaypointRange] {
         self.mission.photographed().waypoints_left_out()
     }
@@ -65,7 +67,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn done_report(&mut self) -> DoneReport {
         let (waits, flies) = (self.plans_with_others(), self.has_left_pad());
         let report = self.mission.photographed_mut().report(waits, flies);
-        DoneReport { system_id: self.config.system_id, mission_crc: self.config.mission_crc, ..report }
+        DoneReport {
+            system_id: self.config.system_id,
+            mission_crc: self.config.mission_crc,
+            ..report
+        }
     }
 
     /// Handles a report of photographed waypoints from another vehicle.
@@ -88,13 +94,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it has stood ready for as long as others take to say what they know, and all that are heard have its plan.
+    /// Whether it has stood ready for as long as others take to say what they know, and all that
+    /// are heard have its plan.
     pub(super) fn plans_as_others(&self) -> bool {
         !self.is_area_mission()
-            || (self.mission.time_in_state(self.now) >= OTHERS_REPORT_WITHIN && !self.hears_another_plan())
+            || (self.mission.time_in_state(self.now) >= OTHERS_REPORT_WITHIN
+                && !self.hears_another_plan())
     }
 
-    /// Whether a vehicle that follows another plan of this mission was heard lately: their gates do not fit.
+    /// Whether a vehicle that follows another plan of this mission was heard lately: their gates do
+    /// not fit.
     pub(super) fn hears_another_plan(&self) -> bool {
         self.is_area_mission() && self.neighbours.hears_another_plan(self.now)
     }

@@ -13,7 +13,8 @@ use crate::swarm::detour::asking::RetryOutlook;
 use crate::swarm::detour::flown::{DetourPurpose, RejoinPlace, RejoinPlaces};
 use crate::swarm::view::DetourView;
 
-/// A detour ends at most this far from the place where the vehicle is to come back to its path, metres.
+/// A detour ends at most this far from the place where the vehicle is to come back to its path,
+/// metres.
 const MAX_REJOIN_ERROR_M: f32 = 0.2;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -35,7 +36,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
         let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.is_on_detour());
-        let view = DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        let view =
+            DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
         detours.save_place_before_jump(to, &view);
     }
 
@@ -44,7 +46,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
         let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.is_on_detour());
-        let view = DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        let view =
+            DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
         if let Some(clear_at) = detours.scan_path(&view) {
             self.neighbours.mark_path_clear(clear_at);
         }
@@ -59,7 +62,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
     }
 
-    /// Requests a path aside, from under a vehicle that comes down; over a field another one leads back to its path from there.
+    /// Requests a path aside, from under a vehicle that comes down; over a field another one leads
+    /// back to its path from there.
     pub(super) fn request_detour_aside(&mut self, from: State) {
         // On its way back, or to a place to land at, it was to land already.
         if self.guidance.returning || self.detours.lands_at_end() {
@@ -68,8 +72,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
     }
 
-    /// Where it comes back to its path over a field: where it left that before, or holds for a division, or stands; and beyond
-    /// what blocks the path, if there is such a place and it did not promise to hold before.
+    /// Where it comes back to its path over a field: where it left that before, or holds for a
+    /// division, or stands; and beyond what blocks the path, if there is such a place and it did
+    /// not promise to hold before.
     fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlaces> {
         if !self.detours.keeps_to_plan_over_field(&self.detour_view()) {
             return None;
@@ -79,7 +84,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let holds = from == State::Dividing || self.is_holding_for_division();
         let promised_m = self.division_hold_m();
-        let own = self.place_on_path(promised_m.filter(|_| holds).unwrap_or(self.guidance.along_m()))?;
+        let own =
+            self.place_on_path(promised_m.filter(|_| holds).unwrap_or(self.guidance.along_m()))?;
         let beyond = if promised_m.is_none() { self.place_beyond_block() } else { None };
         Some(RejoinPlaces { own, beyond: beyond.unwrap_or(own) })
     }
@@ -113,8 +119,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The detour that [`PlanKind::Detour`] requests of the shell; `None` if none is requested, or
-    /// none can be planned. `tell` is given all keep-out zones. The next answer counts for this request: one that comes
-    /// before the shell has read a request was to an older one, and is ignored.
+    /// none can be planned. `tell` is given all keep-out zones. The next answer counts for this
+    /// request: one that comes before the shell has read a request was to an older one, and is
+    /// ignored.
     pub fn detour_request(&mut self, tell: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
         self.detours.note_request_read();
@@ -144,8 +151,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The purpose of a detour that has come and ends at `ends`; `None` if it may not be flown by now.
-    fn checked_purpose(&self, purpose: DetourPurpose, ends: Option<Point>) -> Option<DetourPurpose> {
+    /// The purpose of a detour that has come and ends at `ends`; `None` if it may not be flown by
+    /// now.
+    fn checked_purpose(
+        &self,
+        purpose: DetourPurpose,
+        ends: Option<Point>,
+    ) -> Option<DetourPurpose> {
         // A promise made meanwhile is along the vehicle's own path.
         let promised_m = self.division_hold_m();
         match purpose {
@@ -156,10 +168,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             // From aside it comes back no further than there.
             DetourPurpose::Aside(Some(places)) => {
-                let allowed = |place: &RejoinPlace| promised_m.is_none_or(|at_m| place.along_m <= at_m);
+                let allowed =
+                    |place: &RejoinPlace| promised_m.is_none_or(|at_m| place.along_m <= at_m);
                 let holds_at_m =
                     promised_m.filter(|_| !allowed(&places.own) || self.is_holding_for_division());
-                let own = holds_at_m.and_then(|at_m| self.place_on_path(at_m)).unwrap_or(places.own);
+                let own =
+                    holds_at_m.and_then(|at_m| self.place_on_path(at_m)).unwrap_or(places.own);
                 let beyond = if allowed(&places.beyond) { places.beyond } else { own };
                 Some(DetourPurpose::Aside(Some(RejoinPlaces { own, beyond })))
             }

@@ -17,7 +17,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// One step of the control loop: reference, mission table, and requests to the autopilot.
     pub(super) fn step(&mut self) {
         let now = self.now;
-        if self.services.has_unapplied_parameters() && self.erase_permission() == ErasePermission::Allowed {
+        if self.services.has_unapplied_parameters()
+            && self.erase_permission() == ErasePermission::Allowed
+        {
             self.apply_parameters();
         }
         self.check_estimate_error();
@@ -44,7 +46,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.run_mission_table();
         self.step_task();
         let situation = self.request_context();
-        if self.requests.request_due(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
+        if self.requests.request_due(&self.telemetry, &situation, &mut self.timers, &mut self.links)
+        {
             self.guidance.set_limits(&self.config, self.requests.limits());
         }
         let flows = self.mission.state().streams_setpoints();
@@ -56,13 +59,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Sends the task's commands that are due at this place.
     fn step_task(&mut self) {
         let state = self.mission.state();
-        let off_plan = self.guidance.returning || self.guidance.ends_aside || self.detours.is_on_detour();
+        let off_plan =
+            self.guidance.returning || self.guidance.ends_aside || self.detours.is_on_detour();
         self.update_photographed(off_plan);
         let along = PathProgress {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
             // A vehicle that brakes along its path takes the pictures that it passes.
             place: match state.holds_place() {
-                true if self.detours.is_beside_plan() && !self.guidance.returning => PathRelation::Beside,
+                true if self.detours.is_beside_plan() && !self.guidance.returning => {
+                    PathRelation::Beside
+                }
                 true if !off_plan => PathRelation::OnPath,
                 _ => PathRelation::Elsewhere,
             },
@@ -70,17 +76,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.step_task(along, self.now, &mut self.links);
     }
 
-    /// Notes whether something keeps it on its pad: a vehicle in its column, or what is on its path.
+    /// Notes whether something keeps it on its pad: a vehicle in its column, or what is on its
+    /// path.
     fn note_barred_start(&mut self) {
         let due = self.mission.departure_due(self.now) && self.guidance.advice.stop_within_m > 0.05;
-        let waits = due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
+        let waits =
+            due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         let barred = waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked());
         self.mission.note_start_barred(barred, self.now);
     }
 
     /// Reports a vehicle that has not started while this one waits for it.
     fn report_unstarted_vehicle(&mut self) {
-        let flies = matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
+        let flies =
+            matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
         let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
         if self.mission.should_report_wait(id, self.now) {
@@ -101,7 +110,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // The best that a receiver can do was weighed when the margin was chosen.
         let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_M {
             true => 1.0,
-            false => margins::speed_share_for_bound(bound_m, config.required_clearance_m, config.radius_m),
+            false => margins::speed_share_for_bound(
+                bound_m,
+                config.required_clearance_m,
+                config.radius_m,
+            ),
         };
         let before = core::mem::replace(&mut self.guidance.pace, pace);
         self.mission.note_estimate(pace > 0.0, now);
@@ -111,8 +124,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         // Whole centimetres, rounded up; more than a hundred metres is not known.
         let cm = libm::ceilf(libm::fminf(bound_m, 100.0) * 100.0) as u32;
-        let room_m =
-            margins::estimate_margin_m(config.required_clearance_m, config.radius_m, margins::TRACKING_M);
+        let room_m = margins::estimate_margin_m(
+            config.required_clearance_m,
+            config.radius_m,
+            margins::TRACKING_M,
+        );
         let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
         let (warning, text) = match kind(pace) {
             2 => (false, "Estimate within # cm again"),
@@ -126,7 +142,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn run_mission_table(&mut self) {
         for _ in 0..MAX_ROWS_PER_STEP {
             let inputs = self.guard_inputs();
-            let Some(row) = mission::first_applicable_row(self.mission.state(), &inputs) else { return };
+            let Some(row) = mission::first_applicable_row(self.mission.state(), &inputs) else {
+                return;
+            };
             self.apply_row(row);
         }
     }
@@ -134,7 +152,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
         // A landing that sought a place goes on as one, whatever interrupts the search.
-        let lands = self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
+        let lands =
+            self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
         let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, lands, now);
         self.requests.state_changed(from, to);
         self.run_action(from, to, row);
@@ -183,7 +202,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.mission.leave_pad();
                 self.guidance.hold_at(position);
             }
-            Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
+            Action::HoldHere if to == State::PilotReturned => {
+                self.guidance.hold_after_pilot(position)
+            }
             Action::HoldHere => self.guidance.hold_at(position),
             Action::HoldOver => self.timers.set(Timer::Request, now),
             Action::RequestOffboard | Action::RequestArming | Action::RequestTakeOff => {
@@ -232,14 +253,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
-        // Whom no other vehicle hears is kept clear where it may lie: it comes down as straight as it can be led. A
-        // landing that waited continues as it began.
+        // Whom no other vehicle hears is kept clear where it may lie: it comes down as straight as
+        // it can be led. A landing that waited continues as it began.
         if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
             return self.guidance.begin_guided_landing(self.now);
         }
         self.guidance.end_guided_landing();
         match from {
-            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land | Disarm => {
+            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land
+            | Disarm => {
                 self.guidance.begin_braking();
             }
             // Off the path, or not known to be on it: the reference may be beyond a wall.
@@ -254,7 +276,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::TakeOff => self.timers.set(Timer::Request, now),
             State::Land => self.request_landing(from),
             _ => {
-                let climbs = matches!(self.mission.uninterrupted_state(), State::TakeOff | State::Climb);
+                let climbs =
+                    matches!(self.mission.uninterrupted_state(), State::TakeOff | State::Climb);
                 if let Some(plan) = self.mission.plan() {
                     self.guidance.resume_flight(plan, climbs, &position, now);
                 }

@@ -35,7 +35,8 @@ use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 use planner_core::flight::{HeadingMode, PicturePlan, Task, Trigger, WaypointRange};
 
-/// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
+/// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100
+/// ms.
 pub(super) fn assert_no_gap(bench: &Bench) {
     for pair in bench.setpoints.windows(2) {
         assert!(pair[1].0 - pair[0].0 <= Duration::from_millis(100), "{pair:?}");
@@ -63,7 +64,8 @@ fn flies_the_mission_and_lands_at_the_goal() {
     assert_eq!(bench.acks.pop(), Some((300, 0, 255, 190)));
     bench.until(State::Done, 60.0);
     use State::*;
-    let flown = [Scheduled, Streaming, Engaging, Arming, TakeOff, Climb, Follow, Land, Disarm, Done];
+    let flown =
+        [Scheduled, Streaming, Engaging, Arming, TakeOff, Climb, Follow, Land, Disarm, Done];
     assert!(states(&bench).ends_with(&flown), "{:?}", states(&bench));
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
     assert!(!bench.armed);
@@ -86,7 +88,8 @@ fn looks_where_its_task_says() {
         if let Some(heading) = look {
             let mut photographs = PicturePlan::new(2.0, HeadingMode::Fixed(heading), Trigger::None);
             photographs.add_stretch(1, 2, WaypointRange { first: 0, end: 2 }).unwrap();
-            bench.answer_plan = Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
+            bench.answer_plan =
+                Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
         }
         bench.until(State::Ready, 6.0);
         bench.start();
@@ -95,12 +98,16 @@ fn looks_where_its_task_says() {
         for ((at, _, mask), heading) in bench.setpoints.iter().zip(&bench.headings) {
             let wanted = look.filter(|_| *mask != px4::MASK_VELOCITY);
             let near = |(a, b): (f32, f32)| (a - b).abs() < 1e-3;
-            assert!(*heading == wanted || heading.zip(wanted).is_some_and(near), "{heading:?} at {at:?}");
+            assert!(
+                *heading == wanted || heading.zip(wanted).is_some_and(near),
+                "{heading:?} at {at:?}"
+            );
         }
     }
 }
 
-/// Lines 18 to 25 of the paper: waypoint after waypoint, then it lands where it is, without a guided descent.
+/// Lines 18 to 25 of the paper: waypoint after waypoint, then it lands where it is, without a
+/// guided descent.
 #[test]
 fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
     let mut slow = config();
@@ -114,7 +121,8 @@ fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
     for (_, at, _) in &bench.setpoints {
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
     }
-    // Up to the landing no setpoint leads down, and the corner is not left before the vehicle has come to it.
+    // Up to the landing no setpoint leads down, and the corner is not left before the vehicle has
+    // come to it.
     let heights: Vec<f32> = bench.setpoints.iter().map(|(_, at, _)| at.z).collect();
     assert!(heights.windows(2).all(|pair| pair[1] > pair[0] - 1e-3), "{heights:?}");
     let (_, last, _) = bench.setpoints.last().unwrap();
@@ -175,12 +183,17 @@ fn a_jump_of_five_metres_is_not_flown_after() {
                 && lasted < Duration::from_millis(1300),
             "{lasted:?}"
         );
-        // The first setpoint after the jump may still be made before the position is heard, the last is to land.
+        // The first setpoint after the jump may still be made before the position is heard, the
+        // last is to land.
         let mut stops = 0;
         for (at, place, mask) in &bench.setpoints {
             if *at > jumped_at + Duration::from_millis(60) {
                 let stop = *mask == px4::MASK_VELOCITY;
-                assert!(stop || (place - bench.enu).norm() < 0.15, "{place} sent at {:?}", bench.enu);
+                assert!(
+                    stop || (place - bench.enu).norm() < 0.15,
+                    "{place} sent at {:?}",
+                    bench.enu
+                );
                 stops += u32::from(stop);
             }
         }
@@ -240,7 +253,9 @@ fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
     bench.until(State::Ready, 6.0);
     bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.acks.pop(), Some((179, 3, 255, 190)));
-    for (system, component) in [(SYSTEM, 0), (SYSTEM, 1), (0, 0), (SYSTEM + 1, crate::COMPANION_COMPONENT)] {
+    for (system, component) in
+        [(SYSTEM, 0), (SYSTEM, 1), (0, 0), (SYSTEM + 1, crate::COMPANION_COMPONENT)]
+    {
         bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, system, component);
     }
     bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, 1);
@@ -307,7 +322,11 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     };
     for (progress_m, crc) in [(1.0, 5), (5.9, 5), (6.5, 6)] {
         hear(&mut bench, progress_m, crc);
-        assert_eq!((bench.state(), bench.armed), (State::Scheduled, false), "{progress_m} on plan {crc}");
+        assert_eq!(
+            (bench.state(), bench.armed),
+            (State::Scheduled, false),
+            "{progress_m} on plan {crc}"
+        );
     }
     assert_eq!(bench.companion.waiting_for(), 77);
     hear(&mut bench, 6.5, 5);
@@ -316,7 +335,9 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
 
 #[test]
 fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
-    let named = |bench: &Bench| bench.texts.iter().filter(|text| text.contains("it has not started")).count();
+    let named = |bench: &Bench| {
+        bench.texts.iter().filter(|text| text.contains("it has not started")).count()
+    };
     // Never heard; on its pad; flying, whatever waits for it.
     let grounded = crate::link::intent::ON_PLAN | crate::link::intent::GROUNDED;
     let flying = crate::link::intent::ON_PLAN | crate::link::intent::FLYING;

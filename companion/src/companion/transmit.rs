@@ -3,7 +3,8 @@
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     FILE_TRANSFER_PROTOCOL_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavFrame,
-    MavModeFlag, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA, TUNNEL_DATA,
+    MavModeFlag, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    TUNNEL_DATA,
 };
 use planner_core::{Point, frames};
 
@@ -18,14 +19,15 @@ use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
 
-/// Time for which a vehicle flies on its part of an area after it was last heard, seconds: the lease, the age of what renews it,
-/// a message's delay, and half of the longest stop.
+/// Time for which a vehicle flies on its part of an area after it was last heard, seconds: the
+/// lease, the age of what renews it, a message's delay, and half of the longest stop.
 const UNHEARD_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
 /// Bit of a setpoint's type mask: its heading is ignored.
 const MASK_YAW_IGNORED: u16 = 0x400;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_FRAME_LEN`].
+    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than
+    /// [`frame::MAX_FRAME_LEN`].
     pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
         if out.len() < frame::MAX_FRAME_LEN {
             return 0;
@@ -38,7 +40,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return frame::encode(self.links.next_header(link, system), &data, out);
         }
         if self.links.take_due(link, OnDemandMessage::Heartbeat) {
-            return frame::encode(self.links.next_header(link, system), &self.heartbeat_message(), out);
+            return frame::encode(
+                self.links.next_header(link, system),
+                &self.heartbeat_message(),
+                out,
+            );
         }
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Position) {
             let data = self.global_position_message();
@@ -51,7 +57,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if self.guidance.hold.is_on() {
                 self.guidance.hold.note_reported(self.now);
             }
-            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+            return frame::encode_raw(
+                header,
+                TUNNEL_DATA::ID,
+                TUNNEL_DATA::EXTRA_CRC,
+                &payload[..len],
+                out,
+            );
         }
         if link == Link::Swarm
             && self.links.take_due(link, OnDemandMessage::Roster)
@@ -61,13 +73,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let mut payload = [0; roster::MAX_LEN];
             let len = roster.encode(&mut payload);
             let header = self.links.next_header(link, system);
-            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+            return frame::encode_raw(
+                header,
+                TUNNEL_DATA::ID,
+                TUNNEL_DATA::EXTRA_CRC,
+                &payload[..len],
+                out,
+            );
         }
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Done) {
             let mut payload = [0; done::MAX_LEN];
             let len = self.done_report().encode(&mut payload);
             let header = self.links.next_header(link, system);
-            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+            return frame::encode_raw(
+                header,
+                TUNNEL_DATA::ID,
+                TUNNEL_DATA::EXTRA_CRC,
+                &payload[..len],
+                out,
+            );
         }
         if self.links.take_due(link, OnDemandMessage::DoneCount) {
             let data = self.done_count_message();
@@ -137,18 +161,26 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn setpoint_message(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let kind = self.kind();
-        let stop =
-            |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, None, kind.stop_type_mask());
+        let stop = |velocity: &Point| {
+            (still, frames::swap_enu_ned(velocity), still, None, kind.stop_type_mask())
+        };
         let (position, velocity, acceleration, heading, mask) =
             match self.guidance.setpoint(self.mission.state(), &self.guidance_inputs()) {
                 Setpoint::None => return None,
                 Setpoint::Stop(velocity) => stop(&velocity),
-                Setpoint::Move(position, velocity, acceleration, heading) => {
-                    self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
+                Setpoint::Move(position, velocity, acceleration, heading) => self
+                    .telemetry
+                    .to_ned(&self.config.origin, &position)
+                    .map_or(stop(&still), |ned| {
                         let velocity = frames::swap_enu_ned(&velocity);
-                        (ned, velocity, frames::swap_enu_ned(&acceleration), heading, kind.move_type_mask())
-                    })
-                }
+                        (
+                            ned,
+                            velocity,
+                            frames::swap_enu_ned(&acceleration),
+                            heading,
+                            kind.move_type_mask(),
+                        )
+                    }),
             };
         Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
             time_boot_ms: self.now.as_boot_ms(),
@@ -177,8 +209,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn heartbeat_message(&self) -> HEARTBEAT_DATA {
         let system_status = match self.mission.state() {
             State::WaitAutopilot | State::WaitPosition => MavState::MAV_STATE_BOOT,
-            State::Planning | State::Ready | State::Done | State::Aborted => MavState::MAV_STATE_STANDBY,
-            State::AutopilotSilent | State::PositionLost | State::Failsafe => MavState::MAV_STATE_CRITICAL,
+            State::Planning | State::Ready | State::Done | State::Aborted => {
+                MavState::MAV_STATE_STANDBY
+            }
+            State::AutopilotSilent | State::PositionLost | State::Failsafe => {
+                MavState::MAV_STATE_CRITICAL
+            }
             _ => MavState::MAV_STATE_ACTIVE,
         };
         HEARTBEAT_DATA {
@@ -232,7 +268,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Dividing
                     | Paused
             )
-            // One that waits unheard for its gates to open follows the plan, whenever it was heard last.
+            // One that waits unheard for its gates to open follows the plan, whenever it was heard
+            // last.
             || self.mission.state() == Alone && self.may_fly_unheard()
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
                 && self.guidance.is_at_goal(&self.guidance_inputs());
@@ -246,7 +283,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::BLOCKED, self.detours.is_blocked())
             | flag(
                 intent::ON_DETOUR,
-                self.detours.is_on_detour() || self.detours.has_left_plan() || self.guidance.evading,
+                self.detours.is_on_detour()
+                    || self.detours.has_left_plan()
+                    || self.guidance.evading,
             );
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
@@ -260,7 +299,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             flags,
             mission_crc: self.config.mission_crc,
             plan_crc: plan.map_or(0, |plan| plan.plan_crc),
-            progress_m: if self.detours.is_on_detour() { self.detours.left_at_m() } else { along_m },
+            progress_m: if self.detours.is_on_detour() {
+                self.detours.left_at_m()
+            } else {
+                along_m
+            },
             heard_bits: self.neighbours.heard_bits(self.now),
             gates_open_up_to_m: clear_m,
             unheard_delay_s: clear_in_s,
@@ -272,8 +315,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Adds, over an area, the points that it flies along beyond those if no other vehicle hears it any more: as far as
-    /// its lease takes it, or to the end where it has left and needs none.
+    /// Adds, over an area, the points that it flies along beyond those if no other vehicle hears it
+    /// any more: as far as its lease takes it, or to the end where it has left and needs none.
     fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         let flies = self.mission.state().flies_on_lease();
         let descends = self.guidance.along_m() >= 0.0 && self.guidance.is_descending();
@@ -294,7 +337,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         path.point_at(most_m).filter(|_| most_m > stops_m).into_iter().for_each(add);
     }
 
-    /// Place along its path beyond which it does not fly unheard over an area, metres; none elsewhere.
+    /// Place along its path beyond which it does not fly unheard over an area, metres; none
+    /// elsewhere.
     fn unheard_limit_m(&self) -> Option<f32> {
         let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
         let lease_m = UNHEARD_S * self.config.cruise_mps;
@@ -309,11 +353,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_on();
         let Some(plan) = self.mission.plan().filter(|_| flies) else { return from_m };
         // With the setpoint as many as there is room for.
-        let last = plan.path.waypoints().iter().filter(|w| w.along_m > from_m).nth(intent::MAX_POINTS - 2);
+        let last =
+            plan.path.waypoints().iter().filter(|w| w.along_m > from_m).nth(intent::MAX_POINTS - 2);
         self.guidance.stops_at_m.max(from_m).min(last.map_or(f32::INFINITY, |last| last.along_m))
     }
 
-    /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.
+    /// The points that it flies along next, as far as it will go for now, and whether it may come
+    /// down from where it is.
     fn points_ahead(&self) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
         use State::*;
         let mut points = heapless::Vec::new();
@@ -355,7 +401,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let (from_m, most_m) =
                     (self.guidance.setpoint_m, self.unheard_limit_m().unwrap_or(f32::INFINITY));
                 let to_m = self.guidance.stops_at_m.min(most_m);
-                let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
+                let ahead =
+                    path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
                 ahead.for_each(|w| add(w.position));
                 path.point_at(to_m).filter(|_| to_m > from_m).into_iter().for_each(add);
             }

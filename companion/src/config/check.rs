@@ -53,8 +53,9 @@ impl<const V: usize> Config<V> {
         if !self.geofence.is_none_or(sound) {
             return Err(ConfigError::Geofence);
         }
-        let inside =
-            |entry: &&RosterEntry| self.geofence.is_none_or(|fence| box_contains(&fence, &entry.start));
+        let inside = |entry: &&RosterEntry| {
+            self.geofence.is_none_or(|fence| box_contains(&fence, &entry.start))
+        };
         if let Some(outside) = self.roster.iter().find(|entry| !inside(entry)) {
             return Err(ConfigError::StartOutside(outside.system_id));
         }

@@ -36,9 +36,10 @@ impl Guidance {
         self.evade_search.reset();
     }
 
-    /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. One that is
-    /// alone steps back from above one that lies below, to land beside it, but not beyond where others last heard it to be:
-    /// they look for it from there on.
+    /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a
+    /// place ahead is flown on to. One that is alone steps back from above one that lies below, to
+    /// land beside it, but not beyond where others last heard it to be: they look for it from there
+    /// on.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,
@@ -50,7 +51,8 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.linked_within(now, LINKED_WITHIN) {
-            self.known_way.from_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
+            self.known_way.from_m =
+                along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let (alone, follows) = (state == State::Alone, state == State::Follow);
         // On its way down it continues, and on its way aside.
@@ -89,8 +91,9 @@ impl Guidance {
         self.no_better_place = nowhere;
     }
 
-    /// Place along its path up to which others look for it once it is `alone`, metres. Gates that opened since may have led it further
-    /// than it could tell. Over an area, and where the range is known, they expect it further on.
+    /// Place along its path up to which others look for it once it is `alone`, metres. Gates that
+    /// opened since may have led it further than it could tell. Over an area, and where the range
+    /// is known, they expect it further on.
     fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
         let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
         if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
@@ -101,7 +104,9 @@ impl Guidance {
         let barred = blocked || (self.filter.scans_backwards() && self.filter.is_stopped());
         if self.no_better_place || (self.back_to_m.is_some() && barred) {
             self.trapped_since.get_or_insert(now);
-        } else if !self.evading || self.smoother.velocity().norm_squared() > ESCAPES_MPS * ESCAPES_MPS {
+        } else if !self.evading
+            || self.smoother.velocity().norm_squared() > ESCAPES_MPS * ESCAPES_MPS
+        {
             self.trapped_since = None;
         }
     }

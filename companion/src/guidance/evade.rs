@@ -1,13 +1,16 @@
-//! Out from under a vehicle that comes down: one that waits below it flies back along its path until it is beside the column.
+//! Out from under a vehicle that comes down: one that waits below it flies back along its path
+//! until it is beside the column.
 //!
-//! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits
-//! within [`EVADE_MARGIN_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to
-//! wait that is there is exchanged for the nearest one before it on the path; a vehicle that holds its place waits
-//! where it stands. Back is where this vehicle came from, so the way is free of walls; a vehicle behind is not come
-//! nearer to than [`FOLLOWER_STRAY_M`] beyond the safety distance.
+//! A vehicle that left the plan and is still in the air will land, by its autopilot and without
+//! looking. Nobody waits within [`EVADE_MARGIN_M`] beyond the safety distance of the column it may
+//! come down in (`neighbours.rs`): a place to wait that is there is exchanged for the nearest one
+//! before it on the path; a vehicle that holds its place waits where it stands. Back is where this
+//! vehicle came from, so the way is free of walls; a vehicle behind is not come nearer to than
+//! [`FOLLOWER_STRAY_M`] beyond the safety distance.
 //!
-//! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
-//! dozen among the most columns there can be; in theory six for each place, if each is held by a column of its own.
+//! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several
+//! steps: one for the column of one neighbour, a dozen among the most columns there can be; in
+//! theory six for each place, if each is held by a column of its own.
 
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOutZone;
@@ -63,7 +66,8 @@ pub struct EvadeSearch {
 }
 
 impl EvadeSearch {
-    /// Searches on, back from `wait_m` along the path; `tell` gives the columns of a neighbour, of so many.
+    /// Searches on, back from `wait_m` along the path; `tell` gives the columns of a neighbour, of
+    /// so many.
     pub fn continue_search<const W: usize>(
         &mut self,
         path: &Path<W>,
@@ -71,12 +75,14 @@ impl EvadeSearch {
         neighbours: usize,
         tell: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
     ) {
-        // A vehicle that steps back while it searches waits ever further back; one that waits further ahead asks again.
-        let from_m = self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
-            self.columns_found = 0;
-            self.sweep.restart();
-            wait_m
-        });
+        // A vehicle that steps back while it searches waits ever further back; one that waits
+        // further ahead asks again.
+        let from_m =
+            self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
+                self.columns_found = 0;
+                self.sweep.restart();
+                wait_m
+            });
         self.from_m = Some(from_m);
         let mut budget = MAX_SEARCH_COST;
         let found = loop {
@@ -134,9 +140,11 @@ pub fn step_back<const W: usize>(
     if neighbours.iter().find(follows).is_some() {
         return None;
     }
-    let corner_m = path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
+    let corner_m =
+        path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
     let allowed = |end: f32, left_m: f32| fpu::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
-    let ahead = allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
+    let ahead =
+        allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
     // The tracker's speed is that of flying on; back is below zero.
     let speed = ahead.min(MAX_LEG_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
@@ -191,7 +199,9 @@ mod tests {
         for steps in 1.. {
             // A neighbour gives up to 16.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
-            search.continue_search(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
+            search.continue_search(&path, 9.0, 31, |i, tell| {
+                of(i).iter().for_each(|column| tell(*column))
+            });
             if search.found != EvadeTarget::Back(99.0) {
                 return (search.found, steps);
             }
@@ -207,7 +217,11 @@ mod tests {
         };
         assert!((5.0..7.0).contains(&to_m), "{to_m}");
         assert_eq!(search(&[column(0.0, 3.0, 2.1)]), (EvadeTarget::Here, 1));
-        assert_eq!(search(&[column(6.0, 3.0, 20.0)]), (EvadeTarget::Nowhere, 2), "nowhere is better");
+        assert_eq!(
+            search(&[column(6.0, 3.0, 20.0)]),
+            (EvadeTarget::Nowhere, 2),
+            "nowhere is better"
+        );
         // A place to wait at that is no whole number of steps from the start of the path.
         let mut search = EvadeSearch::default();
         search.continue_search(&path(), 1.1, 1, |_, tell| tell(column(2.1, 0.0, 2.0)));
@@ -235,7 +249,10 @@ mod tests {
         while tracker.along_m > 4.0 && steps < 400 {
             step_back(&path, &mut tracker, 4.0, &[follower], 1.5, 0.05).unwrap();
             let corner_m = (tracker.along_m - 6.0).abs();
-            assert!(corner_m > 0.05 || tracker.speed_mps.abs() < MAX_CORNER_MPS + 0.15, "{tracker:?}");
+            assert!(
+                corner_m > 0.05 || tracker.speed_mps.abs() < MAX_CORNER_MPS + 0.15,
+                "{tracker:?}"
+            );
             steps += 1;
         }
         assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");

@@ -1,10 +1,12 @@
-//! The geofence of the smoother: a box that no setpoint leaves, and that the follower does not run into.
+//! The geofence of the smoother: a box that no setpoint leaves, and that the follower does not run
+//! into.
 //!
-//! A point keeps inside without a jerk if it can always still stop: in each axis the distance that a stop takes, by a part of
-//! the vehicle's acceleration and jerk, is no longer than what is left to the wall. A step that would break this is
-//! replaced, in that axis, by the nearest one that does not ([`Fence::limit_jerk`]). The part is such that all three axes can brake at
-//! once: 1/√3 of the jerk for each, 1/√2 of the acceleration across; the stop is planned with a little less, which pays for
-//! steps of finite length.
+//! A point keeps inside without a jerk if it can always still stop: in each axis the distance that
+//! a stop takes, by a part of the vehicle's acceleration and jerk, is no longer than what is left
+//! to the wall. A step that would break this is replaced, in that axis, by the nearest one that
+//! does not ([`Fence::limit_jerk`]). The part is such that all three axes can brake at once: 1/√3
+//! of the jerk for each, 1/√2 of the acceleration across; the stop is planned with a little less,
+//! which pays for steps of finite length.
 //!
 //! ENU metres, seconds. Constant work.
 
@@ -72,7 +74,8 @@ impl Fence {
         velocity
     }
 
-    /// The jerk nearest to the one that is wanted, of no more than `most_mps3`, after whose step the motion can still stop.
+    /// The jerk nearest to the one that is wanted, of no more than `most_mps3`, after whose step
+    /// the motion can still stop.
     pub(super) fn limit_jerk(
         &self,
         motion: &Motion,
@@ -103,19 +106,28 @@ impl Fence {
                     continue;
                 }
                 (brakes[axis], changed) = (true, true);
-                // Away from the wall that it comes to, up to the acceleration that braking may take.
+                // Away from the wall that it comes to, up to the acceleration that braking may
+                // take.
                 let (ahead, pace, push) = next(jerk[axis]);
                 let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
                 let part = JERK_SHARES[0] * most_mps3;
                 let accel_most = limits.max_accel_mps2[axis / 2] * ACCEL_SHARES[axis / 2][0];
-                hardest[axis] = away * fmaxf(fminf(part, (accel_most - away * accel) / dt_s), -part);
+                hardest[axis] =
+                    away * fmaxf(fminf(part, (accel_most - away * accel) / dt_s), -part);
                 let wanted = fmaxf(fminf(jerk[axis], part), -part);
                 jerk[axis] = nearest_safe(wanted, hardest[axis], is_safe);
             }
             if !changed {
                 break;
             }
-            distribute_remaining_jerk(&mut jerk, brakes, &motion.acceleration, limits, most_mps3, dt_s);
+            distribute_remaining_jerk(
+                &mut jerk,
+                brakes,
+                &motion.acceleration,
+                limits,
+                most_mps3,
+                dt_s,
+            );
         }
         let across = (motion.acceleration + jerk * dt_s).xy().norm_squared();
         if brakes[0] && brakes[1] && across > limits.max_accel_mps2[0] * limits.max_accel_mps2[0] {
@@ -175,7 +187,8 @@ fn nearest_safe(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     good
 }
 
-/// The axes that do not have to brake share the jerk and horizontal acceleration that the braking axes leave.
+/// The axes that do not have to brake share the jerk and horizontal acceleration that the braking
+/// axes leave.
 fn distribute_remaining_jerk(
     jerk: &mut Point,
     brakes: [bool; 3],
@@ -206,8 +219,8 @@ fn distribute_remaining_jerk(
     *jerk = braking + others;
 }
 
-/// Stopping distance towards a wall, metres, from this speed and acceleration: the acceleration falls to −a at the greatest jerk,
-/// stays there, and returns to 0 as the speed does.
+/// Stopping distance towards a wall, metres, from this speed and acceleration: the acceleration
+/// falls to −a at the greatest jerk, stays there, and returns to 0 as the speed does.
 fn stopping_distance_m(speed: f32, accel: f32, brake: BrakingLimits) -> f32 {
     let BrakingLimits { accel_mps2: most, jerk_mps3: jerk } = brake;
     let accel = fmaxf(accel, -most);

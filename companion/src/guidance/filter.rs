@@ -1,12 +1,14 @@
 //! The safety filter: the last word on every motion, whatever was planned, commanded or reported.
 //!
-//! In each step it compares what the vehicle can no longer take back with where each neighbour can be
-//! ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It continues once the next metre of its way
-//! is free. The vehicle that yields also waits until 3 s of the way of the other one are free, or that one stands.
-//! In a descent it flies back up its own column. The filter knows no gates, no progress and no advice: it only asks the
-//! gates which vehicle goes first where both have stopped.
+//! In each step it compares what the vehicle can no longer take back with where each neighbour can
+//! be ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It continues once
+//! the next metre of its way is free. The vehicle that yields also waits until 3 s of the way of
+//! the other one are free, or that one stands. In a descent it flies back up its own column. The
+//! filter knows no gates, no progress and no advice: it only asks the gates which vehicle goes
+//! first where both have stopped.
 //!
-//! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than four of those is a stop.
+//! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than four of those
+//! is a stop.
 
 mod conflict;
 mod look;
@@ -72,7 +74,8 @@ pub(crate) struct SafetyFilter {
     column_blocked_for_good_since: Option<Instant>,
     /// Since when a landing has been waiting for the column; short gaps do not end the wait.
     landing_held_since: Option<Instant>,
-    /// Since when it has kept the vehicle from continuing, and when it last did; short gaps do not count.
+    /// Since when it has kept the vehicle from continuing, and when it last did; short gaps do not
+    /// count.
     hindered_since: Option<Instant>,
     hindered_at: Instant,
     /// Whether it was to yield then.
@@ -108,7 +111,8 @@ impl SafetyFilter {
     /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
     /// first; zero once the filter has not for `free`.
     pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
-        let since = self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
+        let since =
+            self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
         since.map_or(Duration::default(), |at| now - at)
     }
 

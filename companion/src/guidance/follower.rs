@@ -1,14 +1,17 @@
-//! The last stage of the smoother: a point that follows the curve and never exceeds the vehicle's acceleration and jerk.
+//! The last stage of the smoother: a point that follows the curve and never exceeds the vehicle's
+//! acceleration and jerk.
 //!
-//! The curve is within the limits but for rare moments: corners that come close together, a clock that changes its speed in
-//! a corner. There the follower falls behind it by centimetres and comes up again. It integrates a jerk that is constant
-//! within a step, so the jerk of the *positions* is bounded too. Its acceleration moves towards a wanted one, inside a convex
-//! set of accelerations (a disc across, an interval upwards), by no more than the jerk allows: it cannot leave that set.
+//! The curve is within the limits but for rare moments: corners that come close together, a clock
+//! that changes its speed in a corner. There the follower falls behind it by centimetres and comes
+//! up again. It integrates a jerk that is constant within a step, so the jerk of the *positions* is
+//! bounded too. Its acceleration moves towards a wanted one, inside a convex set of accelerations
+//! (a disc across, an interval upwards), by no more than the jerk allows: it cannot leave that set.
 //!
-//! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically damped loop. Its rate
-//! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`LOOP_RATE_SHARE`]): the
-//! limits do not make it swing. Where what it deviates from the curve would lead out of the geofence, it brakes
-//! before, by the same limits ([`super::fence`]).
+//! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically
+//! damped loop. Its rate is such that a velocity is taken on from the greatest acceleration without
+//! more jerk than allowed ([`LOOP_RATE_SHARE`]): the limits do not make it swing. Where what it
+//! deviates from the curve would lead out of the geofence, it brakes before, by the same limits
+//! ([`super::fence`]).
 //!
 //! ENU metres, seconds. Constant work.
 
@@ -34,14 +37,18 @@ impl Motion {
     ) {
         let (velocity, before) = (self.velocity, self.acceleration);
         // Place that the follower reaches if it takes on the curve's acceleration.
-        let place = self.position + velocity * dt_s + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);
+        let place = self.position
+            + velocity * dt_s
+            + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);
         let speed = velocity + (before + to.acceleration) * (0.5 * dt_s);
         let rate = LOOP_RATE_SHARE * jerk_mps3 / fmaxf(limits.accel_mps2, limits.accel_z_mps2);
         let back = to.velocity + (to.position - place) * (0.5 * rate);
-        let wanted = to.acceleration + (clamp_length(back, limits.max_speed_mps()) - speed) * (2.0 * rate);
+        let wanted =
+            to.acceleration + (clamp_length(back, limits.max_speed_mps()) - speed) * (2.0 * rate);
         let change = limits.clamp_accel(&wanted) - before;
         let jerk = clamp_length(change / dt_s, jerk_mps3);
-        let jerk = fence.map_or(jerk, |fence| fence.limit_jerk(self, jerk, limits, jerk_mps3, dt_s));
+        let jerk =
+            fence.map_or(jerk, |fence| fence.limit_jerk(self, jerk, limits, jerk_mps3, dt_s));
         self.acceleration = before + jerk * dt_s;
         self.velocity = velocity + (before + jerk * (0.5 * dt_s)) * dt_s;
         self.position += (velocity + (before * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;

@@ -1,10 +1,11 @@
 //! A vehicle that stands says that it will continue standing, so that others may pass it closely.
 //!
-//! Of a vehicle that was heard to stand half a second ago others must assume that it has begun to fly since. Two that stopped
-//! for one another would therefore never continue. So a vehicle that was stopped reports no way ahead of its setpoint, and does
-//! not move before the others have heard of a way again: [`HOLD_REPORT_LIFETIME`] after it last reported none, and the time that its messages
-//! take. The vehicle that yields reports so at once, the other one only when it has stood for a while ([`FIRST_STANDSTILL`]), so that
-//! it goes first.
+//! Of a vehicle that was heard to stand half a second ago others must assume that it has begun to
+//! fly since. Two that stopped for one another would therefore never continue. So a vehicle that
+//! was stopped reports no way ahead of its setpoint, and does not move before the others have heard
+//! of a way again: [`HOLD_REPORT_LIFETIME`] after it last reported none, and the time that its
+//! messages take. The vehicle that yields reports so at once, the other one only when it has stood
+//! for a while ([`FIRST_STANDSTILL`]), so that it goes first.
 //!
 //! ENU metres.
 

@@ -1,4 +1,5 @@
-//! What others know of a vehicle's way: it lands where they look for it, though gates may have led it further.
+//! What others know of a vehicle's way: it lands where they look for it, though gates may have led
+//! it further.
 
 use crate::time::Instant;
 

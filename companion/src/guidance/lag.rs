@@ -6,8 +6,8 @@ use crate::time::{Duration, Instant};
 use planner_core::Length;
 
 impl Guidance {
-    /// Share of its speed at which the setpoint goes on: none where it is as far ahead of the vehicle as it may be.
-    /// `moves` for a vehicle that is to fly on.
+    /// Share of its speed at which the setpoint goes on: none where it is as far ahead of the
+    /// vehicle as it may be. `moves` for a vehicle that is to fly on.
     pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
         let place = self.smoother.position();
         let lead_m = self.lead_m(telemetry);
@@ -25,8 +25,8 @@ impl Guidance {
         }
     }
 
-    /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on either: something holds the
-    /// vehicle, or carries it away.
+    /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on
+    /// either: something holds the vehicle, or carries it away.
     pub(crate) fn unfollowed_for(&self, now: Instant) -> Duration {
         now - self.followed_at
     }

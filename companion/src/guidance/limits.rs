@@ -48,7 +48,9 @@ pub struct MotionLimits {
 impl MotionLimits {
     /// The mission's limits, lowered to what the autopilot flies.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
+        let least = |of: &[Limit]| {
+            of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)))
+        };
         let jerk_mps3 = fminf(MAX_JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
         // Acceleration that the smoother's longest average smooths to that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * MAX_SMOOTHING_S;
@@ -75,7 +77,8 @@ impl MotionLimits {
     /// Greatest acceleration along a direction (a unit vector, or nearly none), m/s².
     pub(crate) fn accel_along(&self, direction: &Point) -> f32 {
         let (across, up) = (libm::hypotf(direction.x, direction.y), libm::fabsf(direction.z));
-        let least = fminf(self.accel_mps2 / fmaxf(across, 1e-3), self.accel_z_mps2 / fmaxf(up, 1e-3));
+        let least =
+            fminf(self.accel_mps2 / fmaxf(across, 1e-3), self.accel_z_mps2 / fmaxf(up, 1e-3));
         fminf(least, fmaxf(self.accel_mps2, self.accel_z_mps2))
     }
 
@@ -168,7 +171,10 @@ mod tests {
             assert_eq!((limits.speed_mps, limits.climb_mps, limits.descend_mps), (2.0, 1.0, 1.0));
             // ArduCopter ran 1.03 m wide of vertical corners with 1.5.
             let accel_z_mps2 = if kind == AutopilotKind::Px4 { 1.5 } else { 1.0 };
-            assert_eq!((limits.accel_mps2, limits.accel_z_mps2, limits.jerk_mps3), (1.5, accel_z_mps2, 4.0));
+            assert_eq!(
+                (limits.accel_mps2, limits.accel_z_mps2, limits.jerk_mps3),
+                (1.5, accel_z_mps2, 4.0)
+            );
         }
     }
 

@@ -18,7 +18,9 @@ impl Motion {
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        [self.position, self.velocity, self.acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()))
+        [self.position, self.velocity, self.acceleration]
+            .iter()
+            .all(|v| v.iter().all(|c| c.is_finite()))
     }
 }
 
@@ -27,8 +29,8 @@ pub(super) fn clamp_length(vector: Point, most: f32) -> Point {
     vector * (most / fmaxf(vector.length(), fmaxf(most, 1e-6)))
 }
 
-/// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a board carries the code
-/// that would print them: 25 kB.
+/// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a
+/// board carries the code that would print them: 25 kB.
 pub(super) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }

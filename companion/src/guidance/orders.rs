@@ -1,4 +1,5 @@
-//! What guidance is ordered: to begin the path, to continue, to turn back, to settle where it stands.
+//! What guidance is ordered: to begin the path, to continue, to turn back, to settle where it
+//! stands.
 
 use super::known_way::KnownWay;
 use super::nearest::nearest_arc_length_m;
@@ -66,7 +67,8 @@ impl Guidance {
         self.tracker.along_m.max(self.setpoint_m + braking_m)
     }
 
-    /// Leads a landing straight down from where the setpoint stands, as far as the autopilot is led.
+    /// Leads a landing straight down from where the setpoint stands, as far as the autopilot is
+    /// led.
     pub(crate) fn begin_guided_landing(&mut self, now: Instant) {
         self.begin_braking();
         (self.guides_landing, self.progress_at) = (true, now);
@@ -82,8 +84,8 @@ impl Guidance {
         self.guides_landing = false;
     }
 
-    /// Continues after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
-    /// its descent, or by the nearest point of the path.
+    /// Continues after an interruption, from where the setpoint is, or the vehicle where no place
+    /// was sent: up its climb, down its descent, or by the nearest point of the path.
     pub fn resume_flight<const W: usize, const G: usize>(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -98,18 +100,23 @@ impl Guidance {
             return;
         }
         let (path, place) = (&plan.path, self.smoother.position());
-        let below = path
-            .point_at(path.length_m())
-            .is_some_and(|end| end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M);
-        if self.raw_point_at_rest && self.phase != Phase::Climb && !(self.phase == Phase::Descent && below) {
+        let below = path.point_at(path.length_m()).is_some_and(|end| {
+            end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M
+        });
+        if self.raw_point_at_rest
+            && self.phase != Phase::Climb
+            && !(self.phase == Phase::Descent && below)
+        {
             self.phase = Phase::Path;
-            self.tracker.along_m = nearest_arc_length_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
+            self.tracker.along_m =
+                nearest_arc_length_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
         }
         self.start_following(now);
     }
 
-    /// Replaces the path by the way back to its first point. The clearance of each leg goes with it. The raw point may still
-    /// move on: the new path begins where it can have braked, and it begins on it backwards.
+    /// Replaces the path by the way back to its first point. The clearance of each leg goes with
+    /// it. The raw point may still move on: the new path begins where it can have braked, and it
+    /// begins on it backwards.
     pub fn reverse_path<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
@@ -126,7 +133,8 @@ impl Guidance {
             let _ = back.push(waypoint.position, clearance_m);
             clearance_m = waypoint.clearance_m;
         }
-        let tracker = Tracker { along_m: from_m - self.tracker.along_m, speed_mps: -self.tracker.speed_mps };
+        let tracker =
+            Tracker { along_m: from_m - self.tracker.along_m, speed_mps: -self.tracker.speed_mps };
         let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
         self.begin_path(now);
@@ -151,7 +159,8 @@ impl Guidance {
         }
     }
 
-    /// Forgets the leg that was flown: the raw point is where the setpoint stands, and the next leg begins there.
+    /// Forgets the leg that was flown: the raw point is where the setpoint stands, and the next leg
+    /// begins there.
     pub(super) fn forget_leg(&mut self) {
         self.raw_point_at_rest = true;
         self.leg = None;

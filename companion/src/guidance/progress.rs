@@ -13,8 +13,8 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// Place along the plan's path up to which an unheard vehicle flies, metres, and the seconds by which gates delay it
-    /// ([`Neighbours::unheard_reach`]).
+    /// Place along the plan's path up to which an unheard vehicle flies, metres, and the seconds by
+    /// which gates delay it ([`Neighbours::unheard_reach`]).
     pub(crate) fn gates_open_up_to_soon_m<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -41,8 +41,8 @@ impl Guidance {
         gate_m.min(plan.path.length_m())
     }
 
-    /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the path's length in the
-    /// descent. It never falls on one path.
+    /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the
+    /// path's length in the descent. It never falls on one path.
     pub fn progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -68,18 +68,28 @@ impl Guidance {
         match self.phase {
             Phase::Climb => -clamp_to(start_z - z, 0.0, plan.climb_m),
             Phase::Path | Phase::Descent
-                if self.has_reached_end(path) && (state == State::Land || self.phase == Phase::Descent) =>
+                if self.has_reached_end(path)
+                    && (state == State::Land || self.phase == Phase::Descent) =>
             {
                 length_m + clamp_to(end_z - z, 0.0, plan.descent_m)
             }
             _ if self.on_path => {
                 let behind = self.track.lead_max_m * 2.0;
-                let seen =
-                    path.project(&scene.telemetry.position, self.tracker.along_m - behind * 0.5, behind);
-                // Off its reference by less than counts as arrived, it has come as far as gates ask of one that waits.
+                let seen = path.project(
+                    &scene.telemetry.position,
+                    self.tracker.along_m - behind * 0.5,
+                    behind,
+                );
+                // Off its reference by less than counts as arrived, it has come as far as gates ask
+                // of one that waits.
                 let at = path.point_at(self.tracker.along_m);
-                let arrived = at.is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_M);
-                let least = if arrived { self.tracker.along_m - REPORTED_SHORT_M } else { f32::NEG_INFINITY };
+                let arrived =
+                    at.is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_M);
+                let least = if arrived {
+                    self.tracker.along_m - REPORTED_SHORT_M
+                } else {
+                    f32::NEG_INFINITY
+                };
                 seen.max(least).min(self.tracker.along_m)
             }
             _ => -plan.climb_m,
@@ -87,12 +97,20 @@ impl Guidance {
     }
 
     /// Whether the shared plan's path was flown to its end.
-    pub fn is_at_goal<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> bool {
-        !self.returning && !self.ends_aside && scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
+    pub fn is_at_goal<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
+        !self.returning
+            && !self.ends_aside
+            && scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
     }
 
     /// Whether the reference has come to the end of the path.
-    pub fn is_at_end<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> bool {
+    pub fn is_at_end<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
         scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
     }
 
@@ -103,7 +121,8 @@ impl Guidance {
     /// Height of the ground below the vehicle, as far as the plan says, metres.
     pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
-        let end_m = plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
+        let end_m =
+            plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
         match self.on_path {
             true if self.has_reached_end(&plan.path) => end_m,
             true => pad_m.min(end_m).min(self.lowest_ground_m),
@@ -111,13 +130,17 @@ impl Guidance {
         }
     }
 
-    pub fn is_climb_done<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> bool {
+    pub fn is_climb_done<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
         let top = self.leg.as_ref().and_then(|leg| leg.waypoints().last());
         self.phase == Phase::Climb
             && self.is_leg_done()
             && top.is_some_and(|top| {
                 let apart = self.smoother.position() - scene.telemetry.position;
-                // Both setpoint and vehicle at the top: a low climb must not count as done on the pad.
+                // Both setpoint and vehicle at the top: a low climb must not count as done on the
+                // pad.
                 (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
                     && self.is_standing()
                     && apart.length() < 2.0 * ARRIVED_M
@@ -137,10 +160,12 @@ impl Guidance {
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
         let Some(low) = leg.waypoints().last() else { return false };
-        // The ground may be higher than the plan says, or the estimate too high. PX4 reports contact only while the
-        // setpoint sinks, so a setpoint that stands at the planned ground would wait for it forever.
+        // The ground may be higher than the plan says, or the estimate too high. PX4 reports
+        // contact only while the setpoint sinks, so a setpoint that stands at the planned ground
+        // would wait for it forever.
         let low_m = self.smoother.position().z - low.position.z;
-        let ended = low_m < DESCENDED_M && self.is_setpoint_still() && now - self.progress_at >= LAND_AFTER;
+        let ended =
+            low_m < DESCENDED_M && self.is_setpoint_still() && now - self.progress_at >= LAND_AFTER;
         self.phase == Phase::Descent
             && !self.climbing_back
             && self.is_leg_done()
@@ -167,8 +192,8 @@ impl Guidance {
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 
-    /// Whether the vehicle is within `window_m` of its place along the path, and the straight way to the nearest point of
-    /// the path stays inside the leg's clearance.
+    /// Whether the vehicle is within `window_m` of its place along the path, and the straight way
+    /// to the nearest point of the path stays inside the leg's clearance.
     pub fn is_near_path<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -180,13 +205,16 @@ impl Guidance {
         if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
             // Over its pad, on the way up.
             let away = position - first.position;
-            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().length() < ARRIVED_M {
+            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().length() < ARRIVED_M
+            {
                 return true;
             }
         }
         if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
             let away = position - last.position;
-            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z) && away.xy().length() < ARRIVED_M {
+            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z)
+                && away.xy().length() < ARRIVED_M
+            {
                 return true;
             }
         }
@@ -195,8 +223,8 @@ impl Guidance {
         }
         let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
         let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
-        // The hull is free where it is, and within the leg's clearance of the nearest point: the straight way between is if it
-        // leaves that ball nowhere else.
+        // The hull is free where it is, and within the leg's clearance of the nearest point: the
+        // straight way between is if it leaves that ball nowhere else.
         let free_m2 = leg.clearance_m * leg.clearance_m - self.track.radius_m * self.track.radius_m;
         (nearest - position).norm_squared() <= free_m2
     }

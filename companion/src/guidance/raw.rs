@@ -38,7 +38,8 @@ impl Guidance {
         if self.phase == Phase::Climb && state != State::Climb && self.is_leg_done() {
             (self.phase, self.leg) = (Phase::Join, None);
         }
-        if self.phase == Phase::Path && state == State::Follow && self.is_free_to_land_at_end(scene) {
+        if self.phase == Phase::Path && state == State::Follow && self.is_free_to_land_at_end(scene)
+        {
             (self.phase, self.leg) = (Phase::Descent, None);
             self.progress_at = now;
         }
@@ -47,16 +48,24 @@ impl Guidance {
             Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
             Phase::Join => path.point_at(self.tracker.along_m),
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
-                let down_m =
-                    if self.climbing_back { 0.0 } else { self.guided_descent_m(scene, plan.descent_m) };
+                let down_m = if self.climbing_back {
+                    0.0
+                } else {
+                    self.guided_descent_m(scene, plan.descent_m)
+                };
                 let led_m = self.ground_m(plan) + self.guided_descent_end_m(scene);
-                let to_m = if self.guides_landing { libm::fminf(led_m, raw.z) } else { end.z - down_m };
+                let to_m =
+                    if self.guides_landing { libm::fminf(led_m, raw.z) } else { end.z - down_m };
                 Point::new(raw.x, raw.y, to_m)
             }),
             Phase::Path if self.is_algorithm2() => {
-                return self.next_to_waypoint(path, &scene.telemetry.position, advice).unwrap_or(raw);
+                return self
+                    .next_to_waypoint(path, &scene.telemetry.position, advice)
+                    .unwrap_or(raw);
             }
-            Phase::Path => return self.next_on_path(path, advice, neighbours, now, blocked).unwrap_or(raw),
+            Phase::Path => {
+                return self.next_on_path(path, advice, neighbours, now, blocked).unwrap_or(raw);
+            }
         };
         let Some(target) = target else { return raw };
         if self.leg.is_none() {
@@ -69,7 +78,8 @@ impl Guidance {
         let Some(leg) = &self.leg else { return raw };
         let advice = Advice { speed_scale: self.descent_scale(plan, leg), ..Advice::FREE };
         let before_m = self.leg_tracker.along_m;
-        let reference = track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
+        let reference =
+            track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
         self.lead_m = LEG_LEAD_M;
         if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
             self.progress_at = now;
@@ -83,11 +93,14 @@ impl Guidance {
         reference.map_or(raw, |reference| reference.position)
     }
 
-    /// The next raw point of a stop: it brakes where it flies, as fast flights need more way than the curve holds.
+    /// The next raw point of a stop: it brakes where it flies, as fast flights need more way than
+    /// the curve holds.
     pub(super) fn next_braked_raw_point<const W: usize>(&mut self, path: &Path<W>) -> Point {
         let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
         let reference = match (self.phase, &self.leg) {
-            (Phase::Path, None) => track::advance(&self.track, path, &mut self.tracker, &stop, TICK_S),
+            (Phase::Path, None) => {
+                track::advance(&self.track, path, &mut self.tracker, &stop, TICK_S)
+            }
             (Phase::Path | Phase::Climb | Phase::Join | Phase::Descent, Some(leg)) => {
                 track::advance(&self.leg_track, leg, &mut self.leg_tracker, &stop, TICK_S)
             }
@@ -161,7 +174,8 @@ impl Guidance {
                     _ => Point::zeros(),
                 };
                 // The leg keeps the part of its speed that leads to the new waypoint.
-                let kept = self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
+                let kept =
+                    self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
                 let speed_mps = self.leg_tracker.speed_mps * kept;
                 (self.leg, self.leg_tracker) = (Some(leg), Tracker { along_m: 0.0, speed_mps });
             }
@@ -206,12 +220,15 @@ impl Guidance {
     }
 
     /// Height over the ground at which a guided descent ends, metres.
-    fn guided_descent_end_m<const W: usize, const G: usize>(&self, scene: &GuidanceInputs<'_, W, G>) -> f32 {
+    fn guided_descent_end_m<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> f32 {
         if scene.telemetry.kind == Some(AutopilotKind::Px4) { 0.0 } else { self.low_height_m }
     }
 
-    /// Whether guidance leads the landing in this step. It begins once the setpoint stands, and ends near the ground, or where
-    /// it makes no progress.
+    /// Whether guidance leads the landing in this step. It begins once the setpoint stands, and
+    /// ends near the ground, or where it makes no progress.
     pub(super) fn update_guided_landing<const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -234,17 +251,23 @@ impl Guidance {
         self.guides_landing && self.phase == Phase::Descent && self.filter.column_clear()
     }
 
-    /// The share of the speed at which this leg is flown: below the margin kept to obstacles the ground may be, and is
-    /// touched slowly.
-    fn descent_scale<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>, leg: &Path<2>) -> f32 {
+    /// The share of the speed at which this leg is flown: below the margin kept to obstacles the
+    /// ground may be, and is touched slowly.
+    fn descent_scale<const W: usize, const G: usize>(
+        &self,
+        plan: &VehiclePlan<W, G>,
+        leg: &Path<2>,
+    ) -> f32 {
         let (true, Some(top)) =
             (self.phase == Phase::Descent && !self.climbing_back, leg.waypoints().first())
         else {
             return 1.0;
         };
-        let over_m = top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_height_m);
+        let over_m =
+            top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_height_m);
         let most_mps = fpu::sqrtf(
-            TOUCHDOWN_MPS * TOUCHDOWN_MPS + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
+            TOUCHDOWN_MPS * TOUCHDOWN_MPS
+                + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
         );
         // The scale is a share of the leg's speed, which the slower of the two limits.
         most_mps / libm::fminf(self.leg_track.cruise_mps, self.leg_track.descend_mps)

@@ -1,22 +1,26 @@
 //! The setpoint smoother: every setpoint with a position or a velocity is made here.
 //!
-//! Guidance moves a *raw* point within limits of speed and acceleration, one step each [`TICK_S`]. The raw point changes
-//! its velocity at once in a corner and its acceleration at once where it begins to brake. The smoother makes a setpoint of it
-//! that the vehicle can fly:
+//! Guidance moves a *raw* point within limits of speed and acceleration, one step each [`TICK_S`].
+//! The raw point changes its velocity at once in a corner and its acceleration at once where it
+//! begins to brake. The smoother makes a setpoint of it that the vehicle can fly:
 //!
-//! - Two moving averages over T = `average_ticks` · [`TICK_S`] each, then a uniform cubic B-spline through the averages. Position,
-//!   velocity and acceleration are derivatives of one curve. The curve stays in the convex hull of the raw points: a
-//!   straight leg stays exact, a stop is not overshot, a corner is rounded by at most Δv·T/6, and points inside the
-//!   geofence (a box) give setpoints inside it.
-//! - Its jerk is the second difference of the raw velocity over T, divided by T²: Δv / T² for a sudden change of
-//!   velocity, at most 2·a / T where braking turns into speeding up. T follows from that, with some room: 0.85 s for 1.5 m/s² and 4 m/s³.
-//! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle that lags, to pause,
-//!   or to stop for the safety filter. A slower clock changes nothing of the curve's shape. The speed of the clock obeys
-//!   its own limits of acceleration and jerk, so a late step, a stop and a resume are all smooth.
-//! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of acceleration and jerk exactly, beside
-//!   the geofence too ([`super::fence`]).
+//! - Two moving averages over T = `average_ticks` · [`TICK_S`] each, then a uniform cubic B-spline
+//!   through the averages. Position, velocity and acceleration are derivatives of one curve. The
+//!   curve stays in the convex hull of the raw points: a straight leg stays exact, a stop is not
+//!   overshot, a corner is rounded by at most Δv·T/6, and points inside the geofence (a box) give
+//!   setpoints inside it.
+//! - Its jerk is the second difference of the raw velocity over T, divided by T²: Δv / T² for a
+//!   sudden change of velocity, at most 2·a / T where braking turns into speeding up. T follows
+//!   from that, with some room: 0.85 s for 1.5 m/s² and 4 m/s³.
+//! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle
+//!   that lags, to pause, or to stop for the safety filter. A slower clock changes nothing of the
+//!   curve's shape. The speed of the clock obeys its own limits of acceleration and jerk, so a late
+//!   step, a stop and a resume are all smooth.
+//! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of
+//!   acceleration and jerk exactly, beside the geofence too ([`super::fence`]).
 //!
-//! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most [`MAX_TICKS`] ticks a step.
+//! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most
+//! [`MAX_TICKS`] ticks a step.
 
 use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
@@ -95,7 +99,8 @@ pub struct SetpointStats {
     pub jerk_mps3: f32,
     /// Greatest jerk in a stop by the safety filter, m/s³.
     pub urgent_jerk_mps3: f32,
-    /// Setpoints that were not finite, outside the geofence or too far: the last one was held instead.
+    /// Setpoints that were not finite, outside the geofence or too far: the last one was held
+    /// instead.
     pub hold_count: u32,
 }
 
@@ -229,7 +234,8 @@ impl SetpointSmoother {
         self.velocity().norm_squared() < STANDSTILL_MPS * STANDSTILL_MPS
     }
 
-    /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
+    /// Distance that a stop takes from now on, metres: what is flown until the braking has built
+    /// up, and the braking.
     pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
@@ -240,14 +246,21 @@ impl SetpointSmoother {
         let jerk = CLOCK_JERK_SHARE * self.limits.jerk(urgent);
         let ahead = fmaxf(self.acceleration().dot(&velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
-        let end_s = 0.5 * accel / (END_JERK_SHARE * self.limits.jerk(urgent)) + 0.5 / STOP_DECAY_PER_S;
-        speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
+        let end_s =
+            0.5 * accel / (END_JERK_SHARE * self.limits.jerk(urgent)) + 0.5 / STOP_DECAY_PER_S;
+        speed * speed / (2.0 * accel)
+            + speed * build_up_s
+            + fminf(speed, accel * end_s) * end_s
+            + 0.02
     }
 
-    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it continues as it was: the autopilot has
-    /// done so too.
+    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it continues as
+    /// it was: the autopilot has done so too.
     pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
-        if !self.has_setpoint && self.last_sent == Some(self.position()) && unsent_s < MAX_SETPOINT_GAP_S {
+        if !self.has_setpoint
+            && self.last_sent == Some(self.position())
+            && unsent_s < MAX_SETPOINT_GAP_S
+        {
             (self.has_setpoint, self.resumes) = (true, true);
             self.forget_curve();
         } else {
@@ -255,7 +268,8 @@ impl SetpointSmoother {
         }
     }
 
-    /// At rest at a place, no further from what was sent last than a vehicle is followed: an estimate that jumps is no motion.
+    /// At rest at a place, no further from what was sent last than a vehicle is followed: an
+    /// estimate that jumps is no motion.
     pub(crate) fn begin_at(&mut self, place: Point, unsent_s: f32) {
         let place = if place.iter().all(|c| c.is_finite()) {
             self.nearest_inside_fence(place)
@@ -272,11 +286,12 @@ impl SetpointSmoother {
 
     /// Goes with a vehicle that another flies, `unsent_s` after a place was sent last.
     pub(crate) fn follow_vehicle(&mut self, place: Point, unsent_s: f32) {
-        let (here, was_live, followed) = (self.position(), self.has_setpoint, self.followed_velocity);
+        let (here, was_live, followed) =
+            (self.position(), self.has_setpoint, self.followed_velocity);
         self.begin_at(place, unsent_s);
         if was_live && unsent_s > 0.0 {
-            self.followed_velocity =
-                followed + ((self.position() - here) / unsent_s - followed) * FOLLOWED_VELOCITY_GAIN;
+            self.followed_velocity = followed
+                + ((self.position() - here) / unsent_s - followed) * FOLLOWED_VELOCITY_GAIN;
         }
     }
 
@@ -290,11 +305,14 @@ impl SetpointSmoother {
         self.last_sent = Some(self.position());
     }
 
-    /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back. A velocity that is not
-    /// that of its places is not believed, and from what it has it can stop inside the fence.
+    /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes
+    /// back. A velocity that is not that of its places is not believed, and from what it has it can
+    /// stop inside the fence.
     pub(crate) fn hold_with_velocity(&mut self, velocity: &Point) {
-        let most_mps =
-            fminf(self.limits.max_speed_mps(), MAX_SPEED_OVER_FOLLOWED * self.followed_velocity.length());
+        let most_mps = fminf(
+            self.limits.max_speed_mps(),
+            MAX_SPEED_OVER_FOLLOWED * self.followed_velocity.length(),
+        );
         let velocity = clamp_length(*velocity, most_mps);
         if velocity.iter().all(|c| c.is_finite()) {
             self.motion.velocity = velocity;
@@ -304,7 +322,8 @@ impl SetpointSmoother {
         }
     }
 
-    /// Forgets the curve ahead; from a standstill, or nearly: the follower comes to rest by its own limits.
+    /// Forgets the curve ahead; from a standstill, or nearly: the follower comes to rest by its own
+    /// limits.
     pub(crate) fn forget_curve(&mut self) {
         self.steps = [Point::zeros(); HISTORY_LEN];
         self.average_steps = [Point::zeros(); 3];
@@ -323,17 +342,19 @@ impl SetpointSmoother {
         (self.nearest_inside_fence(*place) - place).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M
     }
 
-    /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push_raw_point`] takes them, then [`Self::make_setpoint`] makes the
-    /// setpoint.
+    /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push_raw_point`] takes them,
+    /// then [`Self::make_setpoint`] makes the setpoint.
     pub(crate) fn begin_step(&mut self, pace: ClockPace, dt_s: f32) -> u8 {
         if !(self.has_setpoint && dt_s > 0.0) {
             self.dt_s = 0.0;
             return 0;
         }
         let resumes = core::mem::take(&mut self.resumes);
-        self.dt_s = fminf(dt_s, if resumes { MAX_SETPOINT_GAP_S } else { f32::from(MAX_TICKS) * TICK_S });
+        self.dt_s =
+            fminf(dt_s, if resumes { MAX_SETPOINT_GAP_S } else { f32::from(MAX_TICKS) * TICK_S });
         // A hard stop that has begun ends as one.
-        let brakes = self.clock_acceleration < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
+        let brakes =
+            self.clock_acceleration < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
         self.stopping = pace.urgent || (self.stopping && brakes);
         let pace = ClockPace { urgent: self.stopping, ..pace };
         let clock_before = self.clock_speed;
@@ -341,18 +362,21 @@ impl SetpointSmoother {
         self.tick_fraction += 0.5 * (clock_before + self.clock_speed) * self.dt_s / TICK_S;
         let due = (self.tick_fraction as u8).min(MAX_TICKS);
         // After a gap the curve is one point.
-        self.tick_fraction = if resumes { 0.0 } else { fmaxf(self.tick_fraction - f32::from(due), 0.0) };
+        self.tick_fraction =
+            if resumes { 0.0 } else { fmaxf(self.tick_fraction - f32::from(due), 0.0) };
         due
     }
 
-    /// Takes the next raw point. One that is not finite, too far, or outside the fence is not followed.
+    /// Takes the next raw point. One that is not finite, too far, or outside the fence is not
+    /// followed.
     pub(crate) fn push_raw_point(&mut self, next: Point) {
         let step = self.nearest_inside_fence(next) - self.raw;
         let furthest = self.limits.max_speed_mps() * TICK_S + STEP_SLACK_M;
         // NaN is not near.
         let near = step.norm_squared() <= furthest * furthest;
-        self.raw_points_valid &=
-            near && (self.nearest_inside_fence(next) - next).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M;
+        self.raw_points_valid &= near
+            && (self.nearest_inside_fence(next) - next).norm_squared()
+                <= FENCE_SLACK_M * FENCE_SLACK_M;
         self.push_raw_step(if near { step } else { Point::zeros() });
     }
 
@@ -365,7 +389,8 @@ impl SetpointSmoother {
         }
         let (place, slope, bend) = self.curve_motion();
         let velocity = slope * self.clock_speed;
-        let acceleration = bend * (self.clock_speed * self.clock_speed) + slope * self.clock_acceleration;
+        let acceleration =
+            bend * (self.clock_speed * self.clock_speed) + slope * self.clock_acceleration;
         let to = Motion { position: place, velocity, acceleration };
         self.stats.setpoint_count = self.stats.setpoint_count.saturating_add(1);
         if !(sound && to.is_finite()) {
@@ -382,15 +407,19 @@ impl SetpointSmoother {
         self.hold_inside();
         let step_m = (self.motion.position - before.position).length();
         let jerk_mps3 = (self.motion.acceleration - before.acceleration).length() / dt_s;
-        let worst = if self.stopping { &mut self.stats.urgent_jerk_mps3 } else { &mut self.stats.jerk_mps3 };
+        let worst = if self.stopping {
+            &mut self.stats.urgent_jerk_mps3
+        } else {
+            &mut self.stats.jerk_mps3
+        };
         *worst = fmaxf(*worst, jerk_mps3);
         self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / dt_s);
         self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, self.motion.acceleration.length());
         sound
     }
 
-    /// The follower stops before the fence. If rounding of uneven steps still leads out of it, the fence comes before
-    /// smoothness.
+    /// The follower stops before the fence. If rounding of uneven steps still leads out of it, the
+    /// fence comes before smoothness.
     fn hold_inside(&mut self) {
         let place = self.nearest_inside_fence(self.motion.position);
         for axis in 0..3 {
@@ -401,9 +430,9 @@ impl SetpointSmoother {
         self.motion.position = place;
     }
 
-    /// Speed of the clock after `dt_s`: as near to the pace as acceleration and jerk allow. With s the curve's speed, f its
-    /// acceleration along it and σ the clock, the setpoint's speed is s·σ, its acceleration f·σ² + s·σ̇, and the clock's
-    /// part of its jerk 3·f·σ·σ̇ + s·σ̈.
+    /// Speed of the clock after `dt_s`: as near to the pace as acceleration and jerk allow. With s
+    /// the curve's speed, f its acceleration along it and σ the clock, the setpoint's speed is s·σ,
+    /// its acceleration f·σ² + s·σ̇, and the clock's part of its jerk 3·f·σ·σ̇ + s·σ̈.
     fn run_clock(&mut self, pace: ClockPace, dt_s: f32) {
         let limits = &self.limits;
         let (_, slope, bend) = self.curve_motion();
@@ -414,7 +443,8 @@ impl SetpointSmoother {
             / (TICK_S * TICK_S * TICK_S);
         let clock = self.clock_speed;
         let accel = limits.accel_along(&(slope / fmaxf(true_speed, 1e-3)));
-        // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
+        // Wanted change of the speed: towards the pace, and such that it ends there without a step
+        // of the acceleration.
         let lack = (pace.speed_share.clamp(0.0, 1.0) - clock) * speed;
         let size = fmaxf(fabsf(lack) - fabsf(self.clock_acceleration) * speed * dt_s, 0.0);
         let end_share = if lack > 0.0 { RISE_JERK_SHARE } else { END_JERK_SHARE };
@@ -426,8 +456,8 @@ impl SetpointSmoother {
         // change meanwhile.
         let [least, most] = [fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)];
         let wanted = clamp_to(wanted, least, most) / speed;
-        // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than the jerk allows; where the
-        // curve alone takes all of it, the rate that adds the least.
+        // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than
+        // the jerk allows; where the curve alone takes all of it, the rate that adds the least.
         let ahead = bend + third * (clock * dt_s);
         let next = (clock + self.clock_acceleration * dt_s).clamp(0.0, 1.0);
         let change = ahead * (next * next) - self.curve_acceleration;
@@ -446,7 +476,8 @@ impl SetpointSmoother {
     /// Adds a raw step to the averages.
     fn push_raw_step(&mut self, step: Point) {
         self.raw += step;
-        self.newest_step = if self.newest_step == 0 { HISTORY_LEN - 1 } else { self.newest_step - 1 };
+        self.newest_step =
+            if self.newest_step == 0 { HISTORY_LEN - 1 } else { self.newest_step - 1 };
         self.steps[self.newest_step] = step;
         // Both averages at once: a triangle of 2n − 1 weights.
         let n = self.average_ticks;
@@ -474,7 +505,8 @@ impl SetpointSmoother {
         let (x, y) = (self.tick_fraction, 1.0 - self.tick_fraction);
         let second = self.average - e2 - e1;
         let place = second
-            + (e1 * (1.0 + 3.0 * x + 3.0 * x * x - 2.0 * x * x * x) + e2 * (x * x * x) - e0 * (y * y * y))
+            + (e1 * (1.0 + 3.0 * x + 3.0 * x * x - 2.0 * x * x * x) + e2 * (x * x * x)
+                - e0 * (y * y * y))
                 / 6.0;
         let slope = (e0 * (y * y) + e1 * (1.0 + 2.0 * x - 2.0 * x * x) + e2 * (x * x)) * 0.5;
         let bend = (e1 - e0) * y + (e2 - e1) * x;
@@ -485,7 +517,8 @@ impl SetpointSmoother {
 /// Ticks of each average: long enough for the autopilot's jerk.
 fn ticks_per_average(limits: &MotionLimits) -> usize {
     let n =
-        libm::ceilf(2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
+        libm::ceilf(2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3)
+            as usize;
     n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)
 }
 

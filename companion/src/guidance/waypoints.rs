@@ -1,9 +1,11 @@
-//! P3D Algorithm 2, lines 10, 11 and 18 to 25, as printed: the waypoint a vehicle flies to, and the end of its path.
+//! P3D Algorithm 2, lines 10, 11 and 18 to 25, as printed: the waypoint a vehicle flies to, and the
+//! end of its path.
 //!
 //! The vehicle flies straight to its current waypoint at the speed that lines 12 to 17 leave
-//! ([`planner_core::deconflict`]). The next one is loaded when the vehicle is nearer than `Wp_radius`; within that of the
-//! last the path is completed: speed 0, then it lands where it is. Nothing of our tracker is in it: no speed that follows
-//! from a corner's clearance, no reference that waits, no guided descent. The paper does not state `Wp_radius`.
+//! ([`planner_core::deconflict`]). The next one is loaded when the vehicle is nearer than
+//! `Wp_radius`; within that of the last the path is completed: speed 0, then it lands where it is.
+//! Nothing of our tracker is in it: no speed that follows from a corner's clearance, no reference
+//! that waits, no guided descent. The paper does not state `Wp_radius`.
 
 use planner_core::flight::Path;
 use planner_core::{Length, Point};
@@ -56,8 +58,9 @@ mod tests {
             path.push(Point::new(x, y, 1.0), 1.0).unwrap();
         }
         let mut waypoints = Algorithm2Waypoints::default();
-        let mut at =
-            |x: f32, y: f32| waypoints.next_waypoint(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y));
+        let mut at = |x: f32, y: f32| {
+            waypoints.next_waypoint(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y))
+        };
         assert_eq!(at(-1.0, 0.0), Some((0.0, 0.0)));
         assert_eq!(at(-0.41, 0.0), Some((0.0, 0.0)), "outside Wp_radius");
         assert_eq!(at(-0.39, 0.0), Some((5.0, 0.0)));
@@ -66,6 +69,9 @@ mod tests {
         assert_eq!(at(5.0, 4.7), None);
         assert_eq!(at(0.0, 0.0), None, "completed for good");
         assert!(waypoints.is_completed());
-        assert_eq!(Algorithm2Waypoints::default().next_waypoint(&Path::<4>::new(), &Point::zeros()), None);
+        assert_eq!(
+            Algorithm2Waypoints::default().next_waypoint(&Path::<4>::new(), &Point::zeros()),
+            None
+        );
     }
 }

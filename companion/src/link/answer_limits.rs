@@ -1,9 +1,10 @@
 //! Which senders may command, and how often each of them is answered.
 //!
-//! Three kinds of senders: a ground station that the mission file names, the own vehicle's autopilot side, and everybody
-//! else. Only a ground station commands, sets parameters and moves files. Others are answered too, but each kind of sender
-//! has its own rate for each kind of answer on each link. So a flood of one request starves neither another kind of answer
-//! nor the answers to a ground station. What a rate holds back is not answered: clients ask again.
+//! Three kinds of senders: a ground station that the mission file names, the own vehicle's
+//! autopilot side, and everybody else. Only a ground station commands, sets parameters and moves
+//! files. Others are answered too, but each kind of sender has its own rate for each kind of answer
+//! on each link. So a flood of one request starves neither another kind of answer nor the answers
+//! to a ground station. What a rate holds back is not answered: clients ask again.
 //!
 //! A system id is not a proof. What a forged one can do is in `SECURITY.md`.
 
@@ -64,10 +65,10 @@ const fn rate(every_ms: u64, burst: u64) -> TokenBucketConfig {
     TokenBucketConfig { every_ms, burst }
 }
 
-/// Rate limits for each sender, in the order of [`SenderKind`], and each kind in the order of [`AnswerKind`].
-/// Others can request by radio at most 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the
-/// radio rate limit leaves in the air. A list of all parameters is one burst. PX4 sends TIMESYNC at
-/// 10 Hz, and needs no answer to fly.
+/// Rate limits for each sender, in the order of [`SenderKind`], and each kind in the order of
+/// [`AnswerKind`]. Others can request by radio at most 22 + 30 + 19 + 20 + 6 bytes a second, of the
+/// 250 that the radio rate limit leaves in the air. A list of all parameters is one burst. PX4
+/// sends TIMESYNC at 10 Hz, and needs no answer to fly.
 const RATES: [[TokenBucketConfig; KIND_COUNT]; SENDER_COUNT] = [
     [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
     [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],
@@ -82,7 +83,13 @@ pub(crate) struct AnswerTokenBuckets {
 
 impl AnswerTokenBuckets {
     /// Takes a token for an answer. Returns false if the bucket is empty.
-    pub fn take_token(&mut self, now: Instant, link: Link, sender: SenderKind, kind: AnswerKind) -> bool {
+    pub fn take_token(
+        &mut self,
+        now: Instant,
+        link: Link,
+        sender: SenderKind,
+        kind: AnswerKind,
+    ) -> bool {
         let TokenBucketConfig { every_ms, burst } = RATES[sender as usize][kind as usize];
         let full_at = &mut self.full_at[link as usize][sender as usize][kind as usize];
         let next = (*full_at).max(now) + Duration::from_millis(every_ms);
@@ -103,7 +110,9 @@ mod tests {
         let at = |ms| Instant::ZERO + Duration::from_millis(ms);
         let mut rates = AnswerTokenBuckets::default();
         let count = |rates: &mut AnswerTokenBuckets, ms, sender| {
-            (0..100).filter(|_| rates.take_token(at(ms), Link::Swarm, sender, AnswerKind::Ack)).count()
+            (0..100)
+                .filter(|_| rates.take_token(at(ms), Link::Swarm, sender, AnswerKind::Ack))
+                .count()
         };
         assert_eq!(count(&mut rates, 0, SenderKind::Other), 2);
         assert_eq!(count(&mut rates, 999, SenderKind::Other), 0);

@@ -1,10 +1,11 @@
-//! Commands to the companion: COMMAND_LONG and COMMAND_INT, read by field, since the crate refuses a whole message whose
-//! command it does not know and UNSUPPORTED must still be answered.
+//! Commands to the companion: COMMAND_LONG and COMMAND_INT, read by field, since the crate refuses
+//! a whole message whose command it does not know and UNSUPPORTED must still be answered.
 //!
-//! Obeyed on either link, from a ground station that the mission names (`answer_limits`), when addressed to our system or to all (0),
-//! and to our component or to all (0). From others a command that acts is DENIED. Answered only
-//! when addressed to our system: a broadcast to the swarm acts on each and is answered by none. A command to all
-//! components that we do not know belongs to another component and stays unanswered.
+//! Obeyed on either link, from a ground station that the mission names (`answer_limits`), when
+//! addressed to our system or to all (0), and to our component or to all (0). From others a command
+//! that acts is DENIED. Answered only when addressed to our system: a broadcast to the swarm acts
+//! on each and is answered by none. A command to all components that we do not know belongs to
+//! another component and stays unanswered.
 
 use crate::link::frame::Frame;
 use crate::mission::{Guard, GuardInputs, MAX_POSITION_AGE, State, has_row_for};
@@ -54,8 +55,9 @@ pub struct Command {
     pub param1: f32,
     /// Second parameter.
     pub param2: f32,
-    /// COMMAND_INT in a frame of altitudes above mean sea level: latitude and longitude, 1e-7 degrees, and altitude, metres.
-    /// None in any other frame: where a relative altitude counts from is not known to every vehicle alike.
+    /// COMMAND_INT in a frame of altitudes above mean sea level: latitude and longitude, 1e-7
+    /// degrees, and altitude, metres. None in any other frame: where a relative altitude counts
+    /// from is not known to every vehicle alike.
     pub place: Option<(i32, i32, f32)>,
     /// Sender: system and component.
     pub from: (u8, u8),
@@ -66,7 +68,8 @@ pub struct Command {
 }
 
 impl Command {
-    /// Whether it is one of those that change something, and so counts only from a ground station of the mission.
+    /// Whether it is one of those that change something, and so counts only from a ground station
+    /// of the mission.
     pub(crate) fn needs_authority(&self) -> bool {
         let restarts = self.command == RESTART && (self.to_component || self.param2 == 1.0);
         restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
@@ -131,8 +134,8 @@ struct AnsweredCommand {
     at: Instant,
 }
 
-/// Remembers the last few command frames, so that a repeated one acts once and is answered alike. The same sequence number
-/// with other parameters is another command.
+/// Remembers the last few command frames, so that a repeated one acts once and is answered alike.
+/// The same sequence number with other parameters is another command.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommandHistory {
     seen: [Option<AnsweredCommand>; 4],
@@ -156,8 +159,10 @@ impl CommandHistory {
     pub fn remember(&mut self, frame: &Frame, result: Option<u8>, at: Instant) {
         let mut payload = [0; COMPARED_LEN];
         payload.copy_from_slice(&frame.padded()[..COMPARED_LEN]);
-        let (from, sequence, message) = ((frame.system, frame.component), frame.sequence, frame.message_id);
-        self.seen[self.next] = Some(AnsweredCommand { from, sequence, message, payload, result, at });
+        let (from, sequence, message) =
+            ((frame.system, frame.component), frame.sequence, frame.message_id);
+        self.seen[self.next] =
+            Some(AnsweredCommand { from, sequence, message, payload, result, at });
         self.next = (self.next + 1) % self.seen.len();
     }
 }
@@ -167,7 +172,8 @@ impl CommandHistory {
 pub struct PendingCommands {
     /// MISSION_START, until the mission ends.
     pub start: bool,
-    /// DO_PAUSE_CONTINUE 0, until it is resumed or the vehicle lands: on the pad it holds the take-off back.
+    /// DO_PAUSE_CONTINUE 0, until it is resumed or the vehicle lands: on the pad it holds the
+    /// take-off back.
     pub pause: bool,
     /// DO_PAUSE_CONTINUE 1, until a row uses it or the state changes.
     pub resume: bool,
@@ -186,7 +192,8 @@ impl PendingCommands {
             *self = Self::default();
         }
         let lands = matches!(to, Land | Stopping);
-        let resumed = matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != Paused;
+        let resumed =
+            matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != Paused;
         let returns = matches!(guard, Guard::ReturnCommanded | Guard::ReturnOverField);
         if lands || resumed || returns {
             self.pause = false;
@@ -240,7 +247,8 @@ pub fn apply_command(
             ],
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => {
-            // Before the climb, and while something else interrupts the mission, the pause waits for its row.
+            // Before the climb, and while something else interrupts the mission, the pause waits
+            // for its row.
             let waits = matches!(
                 state,
                 Planning
@@ -269,12 +277,14 @@ pub fn apply_command(
                 pending.pause = false;
                 return Some(ACCEPTED);
             }
-            let guard = if state == PilotReturned { Guard::ResumedOnPath } else { Guard::ResumeCommanded };
+            let guard =
+                if state == PilotReturned { Guard::ResumedOnPath } else { Guard::ResumeCommanded };
             (&mut pending.resume, guard, &[Climb, Follow, Blocked, Replanning, Dividing])
         }
         PAUSE_CONTINUE => return Some(DENIED),
         LAND if matches!(state, Failsafe | Aborted) => {
-            // With motors off there is nothing to do. Otherwise the row acts, or a pilot or failsafe flies the vehicle.
+            // With motors off there is nothing to do. Otherwise the row acts, or a pilot or
+            // failsafe flies the vehicle.
             let acts = inputs.armed && inputs.offboard;
             pending.land = acts;
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });

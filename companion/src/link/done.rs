@@ -1,4 +1,5 @@
-//! Which waypoints of an area a companion knows to be photographed: the payload of TUNNEL under a third private payload type.
+//! Which waypoints of an area a companion knows to be photographed: the payload of TUNNEL under a
+//! third private payload type.
 //!
 //! Little-endian, at most 128 bytes; more than 19 ranges take several messages, in turn:
 //!
@@ -48,13 +49,15 @@ pub struct DoneReport {
     pub round: u8,
     /// Whether the sender flies.
     pub flies: bool,
-    /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of that.
+    /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of
+    /// that.
     pub is_left_out_by_plan: bool,
     /// Waypoints that are photographed, as ranges of their numbers.
     pub ranges: Vec<WaypointRange, MAX_RANGES>,
 }
 
-/// A range as it is sent and kept: what three bytes cannot hold is left out, and photographed again.
+/// A range as it is sent and kept: what three bytes cannot hold is left out, and photographed
+/// again.
 pub(crate) fn encode_range(range: &WaypointRange) -> [u8; RANGE_LEN] {
     let [a, b, c, over] = range.first.to_le_bytes();
     let [d, e, f, many] = range.end.saturating_sub(range.first).to_le_bytes();
@@ -91,7 +94,8 @@ impl DoneReport {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no such report, or not a sound one.
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no such report,
+    /// or not a sound one.
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);

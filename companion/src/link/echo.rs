@@ -1,7 +1,8 @@
 //! How long the radio takes: a vehicle's intent echoes the sequence number of another one's.
 //!
-//! A vehicle that gets its own number back knows the round trip: since it sent that intent, without the time that the other one held it.
-//! Half of that is what a message takes, if both ways are alike. Clocks need not agree.
+//! A vehicle that gets its own number back knows the round trip: since it sent that intent, without
+//! the time that the other one held it. Half of that is what a message takes, if both ways are
+//! alike. Clocks need not agree.
 
 use crate::time::{Duration, Instant};
 
@@ -33,13 +34,15 @@ impl IntentEcho {
     /// The echo of a frame that was heard `held` ago; `None` if that is too long.
     pub(crate) fn new(rank: u16, sequence: u8, held: Duration) -> Option<Self> {
         let rank = u8::try_from(rank).ok().filter(|rank| *rank < u8::MAX)?;
-        let held =
-            u8::try_from(held.as_micros() / HELD_TICK.as_micros()).ok().filter(|held| *held < u8::MAX)?;
+        let held = u8::try_from(held.as_micros() / HELD_TICK.as_micros())
+            .ok()
+            .filter(|held| *held < u8::MAX)?;
         Some(Self { rank, sequence, held })
     }
 }
 
-/// An own intent: its number, when it was sent, and the place along the path to which its points led, metres.
+/// An own intent: its number, when it was sent, and the place along the path to which its points
+/// led, metres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentIntent {
     sequence: u8,
@@ -80,8 +83,8 @@ impl SentIntents {
 
     /// Time that a message takes one way, seconds, by an echo of an own intent.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
-        let round_s =
-            (now - self.find(echo)?.at).as_secs_f32() - f32::from(echo.held) * HELD_TICK.as_secs_f32();
+        let round_s = (now - self.find(echo)?.at).as_secs_f32()
+            - f32::from(echo.held) * HELD_TICK.as_secs_f32();
         Some((0.5 * round_s).clamp(0.0, MAX_DELAY_S))
     }
 }
@@ -154,7 +157,8 @@ mod tests {
         let at = |i: u8| Instant::from_millis(1000 + u64::from(i) * 200);
         (0..8).for_each(|i| sent.note_sent(i, f32::from(i), at(i)));
         let echo = |sequence| IntentEcho { rank: 0, sequence, held: 0 };
-        let mut arrived = |sequence| sent.arrived(&echo(sequence)).map(|sent| (sent.at, sent.ends_m));
+        let mut arrived =
+            |sequence| sent.arrived(&echo(sequence)).map(|sent| (sent.at, sent.ends_m));
         assert_eq!(arrived(3), Some((at(3), 3.0)));
         assert_eq!(arrived(2), None, "overtaken");
         assert_eq!(arrived(99), None, "never sent");

@@ -1,17 +1,20 @@
 //! MAVLink framing: bytes in, checked frames out, and messages back into bytes.
 //!
-//! Source: MAVLink guide, "Packet Serialization" and "Message Signing". The `mavlink` crate gives the message types and
-//! their CRC seeds; framing is ours, because its reader drops unknown ids and then searches their payload for a start
-//! byte: one false 0xFD there holds back every frame behind it.
+//! Source: MAVLink guide, "Packet Serialization" and "Message Signing". The `mavlink` crate gives
+//! the message types and their CRC seeds; framing is ours, because its reader drops unknown ids and
+//! then searches their payload for a start byte: one false 0xFD there holds back every frame behind
+//! it.
 //!
-//! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible and whose id the
-//! dialect knows. Of candidates that overlap, the first whose checksum is right is the frame; a candidate with a wrong
-//! checksum costs its start byte only, and the search continues behind that byte. So no garbage, whatever it is, hides a
-//! whole frame behind it. What no checksum covers is searched too: a frame of unknown id and a signature, which is not
-//! checked here. Their bytes are not counted as noise.
+//! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible
+//! and whose id the dialect knows. Of candidates that overlap, the first whose checksum is right is
+//! the frame; a candidate with a wrong checksum costs its start byte only, and the search continues
+//! behind that byte. So no garbage, whatever it is, hides a whole frame behind it. What no checksum
+//! covers is searched too: a frame of unknown id and a signature, which is not checked here. Their
+//! bytes are not counted as noise.
 //!
-//! A candidate that is not complete holds back what follows it, for [`PARTIAL_LIFETIME`] after its own first byte and
-//! an eighth of that at most. Each byte costs O(1), and O(267) where starts are false.
+//! A candidate that is not complete holds back what follows it, for [`PARTIAL_LIFETIME`] after its
+//! own first byte and an eighth of that at most. Each byte costs O(1), and O(267) where starts are
+//! false.
 
 use crc::{CRC_16_MCRF4XX, Crc, Table};
 use heapless::Vec;
@@ -31,8 +34,8 @@ const V2_START: u8 = 0xFD;
 const COMPONENT_INFORMATION: u32 = 395;
 const FLAG_SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
-/// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one step count as received
-/// with the last of them.
+/// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one
+/// step count as received with the last of them.
 const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.as_micros() / 8;
 /// Most arrival steps within [`PARTIAL_LIFETIME`], and one.
 const MAX_ARRIVALS: usize = 10;
@@ -67,11 +70,12 @@ impl Frame {
         &self.payload
     }
 
-    /// Writes it as a V2 frame with the sender and sequence number it came with, to pass it on; the bytes written, or 0 where
-    /// `out` is too small. A signature is left out.
+    /// Writes it as a V2 frame with the sender and sequence number it came with, to pass it on; the
+    /// bytes written, or 0 where `out` is too small. A signature is left out.
     pub fn encode(&self, out: &mut [u8]) -> usize {
         let Some(extra) = extra_crc(self.message_id) else { return 0 };
-        let header = Header { system: self.system, component: self.component, sequence: self.sequence };
+        let header =
+            Header { system: self.system, component: self.component, sequence: self.sequence };
         encode_raw(header, self.message_id, extra, self.payload(), out)
     }
 
@@ -89,7 +93,8 @@ impl Frame {
 pub struct Counters {
     /// Frames given out.
     pub frames: u32,
-    /// Candidates of a known id whose CRC was wrong; a false start byte in noise may count here too.
+    /// Candidates of a known id whose CRC was wrong; a false start byte in noise may count here
+    /// too.
     pub bad_crc: u32,
     /// Candidates of unknown id; a false start byte in noise may count here too.
     pub unknown: u32,
@@ -111,7 +116,8 @@ struct Arrival {
 pub struct Framer {
     buf: [u8; MAX_FRAME_LEN],
     len: usize,
-    /// When the bytes of the buffer were received, oldest first; the last one covers the whole buffer.
+    /// When the bytes of the buffer were received, oldest first; the last one covers the whole
+    /// buffer.
     arrivals: Vec<Arrival, MAX_ARRIVALS>,
     /// Number of the next bytes that belong to a frame of unknown id or to a signature.
     uncounted: usize,
@@ -162,8 +168,9 @@ impl Framer {
         self.arrivals.first().map(|oldest| oldest.at + PARTIAL_LIFETIME)
     }
 
-    /// The next frame. Takes bytes off the front of `input` (all received at `now`) until a frame is whole or `input`
-    /// is empty; call until `None`. With an empty `input` it lets a partial frame expire.
+    /// The next frame. Takes bytes off the front of `input` (all received at `now`) until a frame
+    /// is whole or `input` is empty; call until `None`. With an empty `input` it lets a partial
+    /// frame expire.
     pub fn next(&mut self, now: Instant, input: &mut &[u8]) -> Option<Frame> {
         loop {
             let needed = match self.parse_front() {
@@ -221,7 +228,9 @@ impl Framer {
                 (6, 6 + usize::from(*len), 0, id)
             }
             [V2_START, _] => return ParseStatus::NeedsBytes(3),
-            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => return ParseStatus::FalseStart,
+            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => {
+                return ParseStatus::FalseStart;
+            }
             [V2_START, len, incompat, ..] => {
                 let signature = if incompat & FLAG_SIGNED != 0 { SIGNATURE_LEN } else { 0 };
                 let id = b.get(7..10).map(|id| u32::from_le_bytes([id[0], id[1], id[2], 0]));
@@ -309,8 +318,9 @@ fn is_start(byte: u8) -> bool {
     byte == V1_START || byte == V2_START
 }
 
-/// The X.25 checksum of MAVLink over a frame without its start byte, closed by the seed of its message. By table, 16 bytes at
-/// a time (8 kB): checking is most of what a crowded radio costs, and the `mavlink` crate goes byte by byte.
+/// The X.25 checksum of MAVLink over a frame without its start byte, closed by the seed of its
+/// message. By table, 16 bytes at a time (8 kB): checking is most of what a crowded radio costs,
+/// and the `mavlink` crate goes byte by byte.
 fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
     const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
     let mut digest = CRC.digest();
@@ -319,8 +329,8 @@ fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
     digest.finalize()
 }
 
-/// The CRC seed of a message id, or `None` where the dialect does not know the id. The crate answers 0 for those, which
-/// is also the true seed of COMPONENT_INFORMATION.
+/// The CRC seed of a message id, or `None` where the dialect does not know the id. The crate
+/// answers 0 for those, which is also the true seed of COMPONENT_INFORMATION.
 pub fn extra_crc(message_id: u32) -> Option<u8> {
     let extra = MavMessage::extra_crc(message_id);
     (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
@@ -337,15 +347,16 @@ pub struct Header {
     pub sequence: u8,
 }
 
-/// Writes one message as a V2 frame, trailing zeros cut; the bytes written, or 0 where `out` is too small
-/// ([`MAX_FRAME_LEN`] is always enough).
+/// Writes one message as a V2 frame, trailing zeros cut; the bytes written, or 0 where `out` is too
+/// small ([`MAX_FRAME_LEN`] is always enough).
 pub fn encode<M: MessageData>(header: Header, message: &M, out: &mut [u8]) -> usize {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
     encode_raw(header, M::ID, M::EXTRA_CRC, &payload[..len], out)
 }
 
-/// As [`encode`], for a message of the whole dialect. Pulls in every message's encoder: not for the board.
+/// As [`encode`], for a message of the whole dialect. Pulls in every message's encoder: not for the
+/// board.
 pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> usize {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
@@ -353,9 +364,15 @@ pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> u
     encode_raw(header, id, MavMessage::extra_crc(id), &payload[..len], out)
 }
 
-/// As [`encode`], for a payload laid out by the caller: what the crate's enums cannot hold (TUNNEL with a private
-/// payload type). `payload` is at most 255 bytes; its trailing zeros are cut.
-pub fn encode_raw(header: Header, message_id: u32, extra_crc: u8, payload: &[u8], out: &mut [u8]) -> usize {
+/// As [`encode`], for a payload laid out by the caller: what the crate's enums cannot hold (TUNNEL
+/// with a private payload type). `payload` is at most 255 bytes; its trailing zeros are cut.
+pub fn encode_raw(
+    header: Header,
+    message_id: u32,
+    extra_crc: u8,
+    payload: &[u8],
+    out: &mut [u8],
+) -> usize {
     let used = payload.iter().rposition(|&b| b != 0).map_or(1, |last| last + 1).min(payload.len());
     let total = 12 + used;
     if used > 255 || out.len() < total {
@@ -363,8 +380,9 @@ pub fn encode_raw(header: Header, message_id: u32, extra_crc: u8, payload: &[u8]
     }
     let id = message_id.to_le_bytes();
     let Header { system, component, sequence } = header;
-    out[..10]
-        .copy_from_slice(&[V2_START, used as u8, 0, 0, sequence, system, component, id[0], id[1], id[2]]);
+    out[..10].copy_from_slice(&[
+        V2_START, used as u8, 0, 0, sequence, system, component, id[0], id[1], id[2],
+    ]);
     out[10..10 + used].copy_from_slice(&payload[..used]);
     let crc = calculate_crc(&out[1..10 + used], extra_crc);
     out[10 + used..total].copy_from_slice(&crc.to_le_bytes());

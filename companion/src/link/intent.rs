@@ -1,4 +1,5 @@
-//! What a companion reports to the swarm of its intent: the payload of TUNNEL under a private payload type.
+//! What a companion reports to the swarm of its intent: the payload of TUNNEL under a private
+//! payload type.
 //!
 //! Little-endian, at most 128 bytes (`README.md` prints the same layout):
 //!
@@ -75,12 +76,13 @@ pub struct Intent {
     pub heard_bits: u32,
     /// Height of the ground below it, as far as it knows, metres.
     pub ground_m: f32,
-    /// Whether it may come down from its place: it climbs, descends or lands, or a pilot or failsafe flies it.
+    /// Whether it may come down from its place: it climbs, descends or lands, or a pilot or
+    /// failsafe flies it.
     pub may_come_down: bool,
     /// Echo of another vehicle's intent, for that vehicle's measure of the delay.
     pub echo: Option<IntentEcho>,
-    /// Points that it flies along next: as far as it will go for now, then as far as it flies on unheard; none while somebody
-    /// else flies it.
+    /// Points that it flies along next: as far as it will go for now, then as far as it flies on
+    /// unheard; none while somebody else flies it.
     pub points: Vec<Point, MAX_POINTS>,
     /// Number of the last of those points beyond where it will stop for now.
     pub first_unheard_point: u8,
@@ -121,12 +123,17 @@ impl Intent {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not an intent, or not a sound one.
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not an intent, or
+    /// not a sound one.
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
         let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
-        if payload_type != PAYLOAD_TYPE || len < HEADER_LEN || body[0] != VERSION || body[1] != sender {
+        if payload_type != PAYLOAD_TYPE
+            || len < HEADER_LEN
+            || body[0] != VERSION
+            || body[1] != sender
+        {
             return None;
         }
         let (count, beyond) = (usize::from(body[3] & 15), body[3] >> 4);
@@ -151,7 +158,11 @@ impl Intent {
             ground_m: float(24)?,
             may_come_down: body[28] & 1 != 0,
             unheard_delay_s: body[28] >> 1,
-            echo: body[29].checked_sub(1).map(|rank| IntentEcho { rank, sequence: body[30], held: body[31] }),
+            echo: body[29].checked_sub(1).map(|rank| IntentEcho {
+                rank,
+                sequence: body[30],
+                held: body[31],
+            }),
             points,
             first_unheard_point: beyond,
         })

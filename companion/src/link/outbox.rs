@@ -1,5 +1,5 @@
-//! What waits to be sent on one link. Setpoints, heartbeats, positions and intents never wait here: they are made
-//! fresh when the link is polled. A full queue refuses the newest and counts it.
+//! What waits to be sent on one link. Setpoints, heartbeats, positions and intents never wait here:
+//! they are made fresh when the link is polled. A full queue refuses the newest and counts it.
 
 use core::fmt::Write as _;
 
@@ -63,7 +63,8 @@ pub enum Outgoing {
     },
     /// COMPONENT_ARM_DISARM.
     Arm(bool),
-    /// DO_SET_CAM_TRIGG_DIST: pictures so far apart, metres, 0 for none; and whether one is taken at once.
+    /// DO_SET_CAM_TRIGG_DIST: pictures so far apart, metres, 0 for none; and whether one is taken
+    /// at once.
     TriggerEvery {
         /// Distance from one picture to the next.
         step_m: f32,
@@ -108,8 +109,8 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Puts a message at the end; a full queue drops and counts it. What is asked for again by itself (streams, modes,
-    /// arming) is asked for again; a dropped text or ack is lost.
+    /// Puts a message at the end; a full queue drops and counts it. What is asked for again by
+    /// itself (streams, modes, arming) is asked for again; a dropped text or ack is lost.
     pub fn push(&mut self, message: Outgoing) {
         if self.queue.push_back(message).is_err() {
             self.dropped = self.dropped.wrapping_add(1);
@@ -150,14 +151,20 @@ impl Outbox {
             Outgoing::Interval(id, us) => {
                 command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, f32::from(id), us, 0.0)
             }
-            Outgoing::Request(id) => command(MavCmd::MAV_CMD_REQUEST_MESSAGE, f32::from(id), 0.0, 0.0),
+            Outgoing::Request(id) => {
+                command(MavCmd::MAV_CMD_REQUEST_MESSAGE, f32::from(id), 0.0, 0.0)
+            }
             Outgoing::Mode(main, sub) => command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub),
-            Outgoing::TakeOff(height_m) => {
-                COMMAND_LONG_DATA { param7: height_m, ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0) }
-            }
-            Outgoing::TriggerEvery { step_m, at_once } => {
-                command(MavCmd::MAV_CMD_DO_SET_CAM_TRIGG_DIST, step_m, 0.0, f32::from(u8::from(at_once)))
-            }
+            Outgoing::TakeOff(height_m) => COMMAND_LONG_DATA {
+                param7: height_m,
+                ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0)
+            },
+            Outgoing::TriggerEvery { step_m, at_once } => command(
+                MavCmd::MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+                step_m,
+                0.0,
+                f32::from(u8::from(at_once)),
+            ),
             Outgoing::Picture => COMMAND_LONG_DATA {
                 param5: 1.0,
                 ..command(MavCmd::MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0)
@@ -212,7 +219,13 @@ impl Outbox {
                 payload[..8].copy_from_slice(&tc1.to_le_bytes());
                 payload[8..16].copy_from_slice(&ts1.to_le_bytes());
                 (payload[16], payload[17]) = to;
-                return frame::encode_raw(header, TIMESYNC_DATA::ID, TIMESYNC_DATA::EXTRA_CRC, &payload, out);
+                return frame::encode_raw(
+                    header,
+                    TIMESYNC_DATA::ID,
+                    TIMESYNC_DATA::EXTRA_CRC,
+                    &payload,
+                    out,
+                );
             }
             Outgoing::Arm(arm) => {
                 command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)
@@ -232,11 +245,19 @@ impl Outbox {
             }
             Outgoing::Text { warning, text } => {
                 let severity = text_severity(warning);
-                return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.into() }, out);
+                return frame::encode(
+                    header,
+                    &STATUSTEXT_DATA { severity, text: text.into() },
+                    out,
+                );
             }
             Outgoing::Count { warning, text, numbers } => {
                 let (severity, text) = (text_severity(warning), format_text(text, numbers));
-                return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.as_str().into() }, out);
+                return frame::encode(
+                    header,
+                    &STATUSTEXT_DATA { severity, text: text.as_str().into() },
+                    out,
+                );
             }
         };
         frame::encode(header, &long, out)

@@ -1,9 +1,11 @@
-//! How many bytes go to the swarm's radio, which all vehicles share: the state that keeps them apart always goes out, what is asked
-//! for beside it only as far as [`ARMED_BYTES_PER_S`] or [`DISARMED_BYTES_PER_S`] let it.
+//! How many bytes go to the swarm's radio, which all vehicles share: the state that keeps them
+//! apart always goes out, what is asked for beside it only as far as [`ARMED_BYTES_PER_S`] or
+//! [`DISARMED_BYTES_PER_S`] let it.
 //!
-//! State is made at a fixed rate ([`state_bytes_per_s`]). All else (acks, texts, parameters, files, and what a REQUEST_MESSAGE asks for)
-//! spends from an account that fills with time. So in any span of t seconds the radio gets at most t times both, and [`MAX_SAVED_BYTES`]
-//! and a frame more, whatever is asked.
+//! State is made at a fixed rate ([`state_bytes_per_s`]). All else (acks, texts, parameters, files,
+//! and what a REQUEST_MESSAGE asks for) spends from an account that fills with time. So in any span
+//! of t seconds the radio gets at most t times both, and [`MAX_SAVED_BYTES`] and a frame more,
+//! whatever is asked.
 
 use crate::link::frame::MAX_FRAME_LEN;
 use crate::time::Instant;
@@ -44,17 +46,20 @@ impl Default for RateLimit {
 }
 
 impl RateLimit {
-    /// Whether another frame may go out by now. It may be longer than what is left; then it is owed.
+    /// Whether another frame may go out by now. It may be longer than what is left; then it is
+    /// owed.
     pub fn may_send(&mut self, now: Instant, armed: bool) -> bool {
         let rate = i64::from(if armed { ARMED_BYTES_PER_S } else { DISARMED_BYTES_PER_S });
         // An hour fills it in any case.
         let passed_us = (now - self.at).as_micros().min(3_600_000_000) as i64;
         self.at = now;
-        self.tokens = (self.tokens + passed_us * rate).min(i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE);
+        self.tokens =
+            (self.tokens + passed_us * rate).min(i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE);
         self.tokens > 0
     }
 
-    /// Whether half of what may be saved up is left, as of the last question whether a frame may go out.
+    /// Whether half of what may be saved up is left, as of the last question whether a frame may go
+    /// out.
     pub(crate) fn is_half_full(&self) -> bool {
         self.tokens > i64::from(MAX_SAVED_BYTES / 2) * MICROBYTES_PER_BYTE
     }

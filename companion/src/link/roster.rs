@@ -1,4 +1,5 @@
-//! What a companion of a coverage mission reports of all vehicles: the payload of TUNNEL under a second private payload type.
+//! What a companion of a coverage mission reports of all vehicles: the payload of TUNNEL under a
+//! second private payload type.
 //!
 //! Little-endian, at most 128 bytes; more than 22 vehicles take two messages:
 //!
@@ -112,19 +113,25 @@ impl RosterReport {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no roster, or not a sound one.
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no roster, or not
+    /// a sound one.
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
         let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
-        if payload_type != PAYLOAD_TYPE || len < HEADER_LEN || body[0] != VERSION || body[1] != sender {
+        if payload_type != PAYLOAD_TYPE
+            || len < HEADER_LEN
+            || body[0] != VERSION
+            || body[1] != sender
+        {
             return None;
         }
         let count = usize::from(body[4]);
         if count == 0 || count > MAX_ENTRIES || len != HEADER_LEN + ENTRY_LEN * count {
             return None;
         }
-        let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
+        let word =
+            |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
         let entry = |b: &[u8]| {
             let set = |at: u8| b[0] >> at & 1 != 0;
             RosterReportEntry {

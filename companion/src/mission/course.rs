@@ -11,7 +11,9 @@ use crate::link::commands::{self, Command, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
 use crate::mission::task::{PathProgress, Tasks};
 use crate::mission::waits::{BarredStart, Waits};
-use crate::mission::{Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
+use crate::mission::{
+    Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow,
+};
 use crate::time::{Duration, Instant};
 
 /// Greatest distance between the start of a path and the vehicle, metres.
@@ -38,7 +40,8 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     plan: Option<VehiclePlan<W, G>>,
     /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
     left_with_all_pictures: Option<bool>,
-    /// Pictures of its path up to where it last came back from a detour: those taken before that were noted when it left.
+    /// Pictures of its path up to where it last came back from a detour: those taken before that
+    /// were noted when it left.
     pictures_before_rejoin: u32,
     /// Place where the plan ends, the height in which the plan leads there, and the descent,
     /// metres.
@@ -149,7 +152,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.failure
     }
 
-    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
+    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in
+    /// the air.
     pub(crate) fn departure_due(&self, now: Instant) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
         (now - self.started_at).as_secs_f32() >= depart_s
@@ -221,7 +225,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// A plan is requested: there is none, and no failure.
     pub(crate) fn forget_plan(&mut self) {
-        (self.plan, self.failure, self.division, self.left_with_all_pictures) = (None, None, 0, None);
+        (self.plan, self.failure, self.division, self.left_with_all_pictures) =
+            (None, None, 0, None);
         (self.division_plan_ready, self.division_requested) = (false, None);
         self.waits.barred_start = BarredStart::default();
         self.tasks.reset();
@@ -267,8 +272,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.division_plan_ready = false;
     }
 
-    /// Whether the shell is to be asked for this division now; true at most once within `again` until it answers: an answer
-    /// does not say which request it is for.
+    /// Whether the shell is to be asked for this division now; true at most once within `again`
+    /// until it answers: an answer does not say which request it is for.
     pub(crate) fn should_request_division(
         &mut self,
         fingerprint: u32,
@@ -292,8 +297,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.division
     }
 
-    /// Takes the plan after so many divisions; it is to begin at `place`. Returns whether it does. In the air it is flown
-    /// from the next row of the table on.
+    /// Takes the plan after so many divisions; it is to begin at `place`. Returns whether it does.
+    /// In the air it is flown from the next row of the table on.
     pub(crate) fn accept_division(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -359,12 +364,14 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.failure = Some(failure);
     }
 
-    /// Whether all pictures of its part were taken, `along_m` metres along its path or before it left that. A stretch is not all.
+    /// Whether all pictures of its part were taken, `along_m` metres along its path or before it
+    /// left that. A stretch is not all.
     pub(crate) fn has_all_pictures(&self, along_m: f32) -> bool {
         self.left_with_all_pictures.unwrap_or_else(|| {
             match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
                 Some((Task::Photograph(photographs), path)) => {
-                    !photographs.goes_on && photographs.taken_count(path, along_m) == photographs.count(path)
+                    !photographs.goes_on
+                        && photographs.taken_count(path, along_m) == photographs.count(path)
                 }
                 Some(_) => true,
                 None => false,
@@ -381,8 +388,14 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies along another path, beside the shared plan, `along_m` metres along that, above the same ground.
-    pub(crate) fn switch_to_detour(&mut self, way: &VehiclePlan<W, G>, along_m: f32, ground_m: Option<f32>) {
+    /// Flies along another path, beside the shared plan, `along_m` metres along that, above the
+    /// same ground.
+    pub(crate) fn switch_to_detour(
+        &mut self,
+        way: &VehiclePlan<W, G>,
+        along_m: f32,
+        ground_m: Option<f32>,
+    ) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
             plan.path = way.path.clone();
@@ -395,9 +408,15 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies along its own path again, as it was planned, from `back_m` metres along it; it left that at `left_m`. Returns the
-    /// number of pictures between, which do not count as taken: they show another place.
-    pub(crate) fn resume_own_path(&mut self, plan: &VehiclePlan<W, G>, left_m: f32, back_m: f32) -> u32 {
+    /// Flies along its own path again, as it was planned, from `back_m` metres along it; it left
+    /// that at `left_m`. Returns the number of pictures between, which do not count as taken: they
+    /// show another place.
+    pub(crate) fn resume_own_path(
+        &mut self,
+        plan: &VehiclePlan<W, G>,
+        left_m: f32,
+        back_m: f32,
+    ) -> u32 {
         self.begin_plan(plan);
         let Task::Photograph(photographs) = &plan.task else { return 0 };
         let taken = |along_m: f32| photographs.taken_count(&plan.path, along_m);
@@ -406,8 +425,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.pictures_before_rejoin.saturating_sub(taken(left_m))
     }
 
-    /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan: neighbours keep clear of it as of a
-    /// stranger.
+    /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan:
+    /// neighbours keep clear of it as of a stranger.
     pub(crate) fn reverse_path(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {

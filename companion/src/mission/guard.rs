@@ -48,7 +48,8 @@ pub enum Guard {
     ChargeLow,
     /// Outside the configured volume.
     Outside,
-    /// MISSION_START, and for the limit, in which it may first be reported, the estimate's bound is worse than the margin leaves.
+    /// MISSION_START, and for the limit, in which it may first be reported, the estimate's bound is
+    /// worse than the margin leaves.
     StartVague,
     /// The estimate's bound has been worse than the margin leaves at a crawl for the limit.
     EstimateVague,
@@ -60,7 +61,8 @@ pub enum Guard {
     Elapsed,
     /// The mode is the one that follows setpoints: Offboard (PX4) or Guided (ArduCopter).
     Offboard,
-    /// The mode is neither the one before nor the one we asked for, and the autopilot reports no failsafe.
+    /// The mode is neither the one before nor the one we asked for, and the autopilot reports no
+    /// failsafe.
     ModeTaken,
     /// The mode is not ours, and the autopilot reports `MAV_STATE_CRITICAL`.
     FailsafeActs,
@@ -96,7 +98,8 @@ pub enum Guard {
     PathDone,
     /// No progress along the path for the limit.
     Stalled,
-    /// For the limit the vehicle has not come to its setpoint: something holds it, or carries it away.
+    /// For the limit the vehicle has not come to its setpoint: something holds it, or carries it
+    /// away.
     Unfollowed,
     /// DO_PAUSE_CONTINUE 0.
     PauseCommanded,
@@ -122,9 +125,11 @@ pub enum Guard {
     ReturnInClimb,
     /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the path home is planned.
     ReturnOverField,
-    /// In a coverage mission the path has been blocked for the limit, and the path home can be planned.
+    /// In a coverage mission the path has been blocked for the limit, and the path home can be
+    /// planned.
     BlockedOverField,
-    /// As [`Guard::BlockedOverField`], and the vehicle may fly around what blocks it and back to its path.
+    /// As [`Guard::BlockedOverField`], and the vehicle may fly around what blocks it and back to
+    /// its path.
     AroundOverField,
     /// The vehicle stands where its detour comes back to its path.
     AroundFlown,
@@ -132,9 +137,11 @@ pub enum Guard {
     OwnPlanReady,
     /// The vehicle stands where its detour comes back to its path, and no own plan will come.
     OwnPlanLost,
-    /// As [`Guard::BlockedOverField`], but the safety filter has made the vehicle yield for the limit.
+    /// As [`Guard::BlockedOverField`], but the safety filter has made the vehicle yield for the
+    /// limit.
     YieldedOverField,
-    /// As [`Guard::BlockedOverField`], but the safety filter has hindered the vehicle for the limit.
+    /// As [`Guard::BlockedOverField`], but the safety filter has hindered the vehicle for the
+    /// limit.
     HinderedOverField,
     /// As [`Guard::Stalled`] where the path home can be planned.
     StalledOverField,
@@ -148,20 +155,25 @@ pub enum Guard {
     LandingBlocked,
     /// No vehicle was in the column for the limit.
     LandingClear,
-    /// The column was occupied for the limit (5 s by a vehicle that rests), and the path leads to the pad.
+    /// The column was occupied for the limit (5 s by a vehicle that rests), and the path leads to
+    /// the pad.
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
-    /// Over an area, on the pad: another vehicle has been above it, or something on the path, for the limit, and others fly on.
+    /// Over an area, on the pad: another vehicle has been above it, or something on the path, for
+    /// the limit, and others fly on.
     StartBarred,
-    /// The safety filter has made this vehicle yield for the limit, and it does not seek its path home.
+    /// The safety filter has made this vehicle yield for the limit, and it does not seek its path
+    /// home.
     Yielded,
-    /// The safety filter has kept this vehicle from continuing for the limit, and it does not seek its path home.
+    /// The safety filter has kept this vehicle from continuing for the limit, and it does not seek
+    /// its path home.
     Hindered,
-    /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be sought.
+    /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be
+    /// sought.
     NoRoomHere,
-    /// The way back to its pad, or the end of a path over an area, has been barred for the limit by a vehicle that rests, or the descent
-    /// of one that flies back by any.
+    /// The way back to its pad, or the end of a path over an area, has been barred for the limit by
+    /// a vehicle that rests, or the descent of one that flies back by any.
     PadTaken,
     /// No place aside to land at exists, or the answer has not come within the limit.
     NoPlaceAside,
@@ -169,7 +181,8 @@ pub enum Guard {
     AsideReached,
     /// Battery charge below half of the configured limit.
     BatteryCritical,
-    /// Battery charge below the configured limit, no neighbour below, and no place aside to land at sought or flown to.
+    /// Battery charge below the configured limit, no neighbour below, and no place aside to land at
+    /// sought or flown to.
     BatteryLow,
     /// Outside the configured volume, and no neighbour below.
     OutsideGeofence,
@@ -183,7 +196,8 @@ pub enum Guard {
     NeighbourHeard,
     /// On the ground after a flight or in the mode that lands, and at rest.
     OnGround,
-    /// A vehicle that left the plan, or an obstacle, blocks the path, or this vehicle left the plan itself.
+    /// A vehicle that left the plan, or an obstacle, blocks the path, or this vehicle left the plan
+    /// itself.
     PathBlocked,
     /// No keep-out zone blocks the path any more.
     PathClear,
@@ -195,9 +209,11 @@ pub enum Guard {
     DetourFailed,
     /// Several searches found no detour, and no neighbour is below.
     NoWayAround,
-    /// Several searches found no detour, a neighbour lies below, and the path leads back to the pad.
+    /// Several searches found no detour, a neighbour lies below, and the path leads back to the
+    /// pad.
     NoWayOn,
-    /// For the limit the vehicle waited below one that lands without looking, and its path led nowhere better.
+    /// For the limit the vehicle waited below one that lands without looking, and its path led
+    /// nowhere better.
     Underneath,
     /// Standing still.
     Standing,
@@ -258,15 +274,25 @@ impl Guard {
             Self::Disarmed => !i.armed,
             Self::DisarmedAtGoal => !i.armed && i.at_goal,
             Self::StaysArmed => i.armed && i.in_state >= limit,
-            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE,
+            Self::StaysDisarmed => {
+                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE
+            }
             Self::StaysDisarmedPaused => {
-                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start && i.pause
+                !i.armed
+                    && i.in_state >= limit
+                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
+                    && i.start
+                    && i.pause
             }
             Self::ArmedUnseen => i.armed_unseen,
-            Self::ArmingHeld => i.arming_unrequested && i.column_blocked_for.min(i.in_state) >= limit,
+            Self::ArmingHeld => {
+                i.arming_unrequested && i.column_blocked_for.min(i.in_state) >= limit
+            }
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
-            Self::Unattended => i.airborne && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE,
+            Self::Unattended => {
+                i.airborne && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE
+            }
             Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
@@ -291,7 +317,9 @@ impl Guard {
             Self::StalledOverField => i.stalled_for >= limit && i.may_turn_home(),
             Self::StandsToReturn => i.stands_to_return,
             Self::WayHomeReady => i.detour_ready && i.homeward,
-            Self::NoWayHome => i.seeking_home_for.is_some_and(|sought| sought >= limit) && i.can_turn_back,
+            Self::NoWayHome => {
+                i.seeking_home_for.is_some_and(|sought| sought >= limit) && i.can_turn_back
+            }
             Self::LandingBlocked => i.column_blocked_for > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,

@@ -17,7 +17,8 @@ pub struct GuardInputs {
     pub stalled_for: Duration,
     /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on.
     pub unfollowed_for: Duration,
-    /// Time since its path was first blocked, short of where it has come no further; clear in between or not.
+    /// Time since its path was first blocked, short of where it has come no further; clear in
+    /// between or not.
     pub blocked_for: Duration,
     /// Time in the state without any neighbour heard; zero when all have landed.
     pub neighbour_age: Duration,
@@ -47,7 +48,8 @@ pub struct GuardInputs {
     pub roadmap_bad: bool,
     /// The plan has a goal.
     pub has_goal: bool,
-    /// In a coverage mission: all vehicles heard have this one's plan, and had time to report otherwise.
+    /// In a coverage mission: all vehicles heard have this one's plan, and had time to report
+    /// otherwise.
     pub plans_as_others: bool,
     /// Near the pad below the start point, in height too.
     pub at_start: bool,
@@ -129,7 +131,8 @@ pub struct GuardInputs {
     pub at_goal: bool,
     /// The way back to the path is free.
     pub near_path: bool,
-    /// Time for which another vehicle has been in the column to the ground, or before take-off in the column to its top.
+    /// Time for which another vehicle has been in the column to the ground, or before take-off in
+    /// the column to its top.
     pub column_blocked_for: Duration,
     /// Time for which a vehicle that stands for good, or is lost, has been in that column.
     pub column_blocked_for_good_for: Duration,
@@ -141,8 +144,8 @@ pub struct GuardInputs {
     pub column_clear_for: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
-    /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way, and at the end of a
-    /// path over an area the descent, by one that stands for good.
+    /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the
+    /// way, and at the end of a path over an area the descent, by one that stands for good.
     pub pad_blocked_for: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,
@@ -191,6 +194,7 @@ impl GuardInputs {
 
     /// Whether the column has not been free for `limit`, or a vehicle stands in it for good.
     pub(super) fn is_landing_blocked_for(&self, limit: Duration) -> bool {
-        self.column_blocked_for >= limit || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
+        self.column_blocked_for >= limit
+            || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
     }
 }

@@ -1,9 +1,12 @@
-//! Which waypoints of an area are photographed: over flights, restarts and vehicles, so that a new start flies the rest.
+//! Which waypoints of an area are photographed: over flights, restarts and vehicles, so that a new
+//! start flies the rest.
 //!
-//! A set of numbers that only grows: lost, repeated and reordered reports do no harm. Before it starts a vehicle takes in what all
-//! others on the ground know, so that all plan the rest of the same set; where others fly already it takes the set of theirs.
-//! A start waits while another plan is heard. In flight it notes what it photographs, and what it hears of others, for the start after. An area that is whole is begun again: that is
-//! another round, and what is known of a round before does not count.
+//! A set of numbers that only grows: lost, repeated and reordered reports do no harm. Before it
+//! starts a vehicle takes in what all others on the ground know, so that all plan the rest of the
+//! same set; where others fly already it takes the set of theirs. A start waits while another plan
+//! is heard. In flight it notes what it photographs, and what it hears of others, for the start
+//! after. An area that is whole is begun again: that is another round, and what is known of a round
+//! before does not count.
 
 use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
@@ -63,9 +66,14 @@ impl PhotographedWaypoints {
     }
 
     /// The record for the flash, if it is worth one: at once where no further waypoint is to come.
-    pub(crate) fn record_to_store(&mut self, mission_crc: u32, at_once: bool) -> Option<store::Photographed> {
+    pub(crate) fn record_to_store(
+        &mut self,
+        mission_crc: u32,
+        at_once: bool,
+    ) -> Option<store::Photographed> {
         let count = self.known.count();
-        let least = if at_once { self.stored_count + 1 } else { self.stored_count + STORE_EVERY_WAYPOINTS };
+        let least =
+            if at_once { self.stored_count + 1 } else { self.stored_count + STORE_EVERY_WAYPOINTS };
         // Fewer than before: another round.
         if (self.stored_count..least).contains(&count) {
             return None;
@@ -75,7 +83,10 @@ impl PhotographedWaypoints {
         // Both fit: `HEADER_LEN` and `MAX_DONE_RANGES` ranges are no more than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
-        self.known.ranges().iter().for_each(|range| _ = kept.extend_from_slice(&encode_range(range)));
+        self.known
+            .ranges()
+            .iter()
+            .for_each(|range| _ = kept.extend_from_slice(&encode_range(range)));
         Some(kept)
     }
 
@@ -105,8 +116,8 @@ impl PhotographedWaypoints {
         self.known.count()
     }
 
-    /// The vehicle leaves its pad. Where the area was whole the plan is for all of it again: another round, unless one that left
-    /// before has said so.
+    /// The vehicle leaves its pad. Where the area was whole the plan is for all of it again:
+    /// another round, unless one that left before has said so.
     pub(crate) fn leave_pad(&mut self, photographs: &PicturePlan) {
         self.has_flown = true;
         let whole = photographs.area() > 0 && self.left_out_by_plan.count() >= photographs.area();
@@ -132,8 +143,8 @@ impl PhotographedWaypoints {
         photographs.shown_waypoints(path, pictures).for_each(|range| _ = self.known.insert(range));
     }
 
-    /// Handles a report of photographed waypoints from another vehicle. `waits`: this one stands on the ground, and is
-    /// to plan as others do.
+    /// Handles a report of photographed waypoints from another vehicle. `waits`: this one stands on
+    /// the ground, and is to plan as others do.
     pub(crate) fn handle_report(&mut self, report: &DoneReport, waits: bool, now: Instant) {
         if report.is_left_out_by_plan {
             if waits {
@@ -176,7 +187,8 @@ impl PhotographedWaypoints {
     /// The report to other vehicles, one part after the other; in flight, in turn, the waypoints
     /// that the plan leaves out, if one report holds them.
     pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
-        let plan = flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
+        let plan =
+            flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
         self.reports_plan = plan;
         if plan {
             let ranges = self.left_out_by_plan.ranges().iter().copied().collect();

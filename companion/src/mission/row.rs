@@ -31,7 +31,8 @@ pub enum Action {
     FollowPath,
     /// Brake the reference along the path.
     BrakeOnPath,
-    /// Continue in the interrupted state: from the nearest point of the path, from here in a climb or a descent.
+    /// Continue in the interrupted state: from the nearest point of the path, from here in a climb
+    /// or a descent.
     Rejoin,
     /// Fly the path flown so far back to the start.
     TurnBack,
@@ -55,7 +56,8 @@ pub enum Action {
     FlyDetour,
     /// Fly the part of the area that the division gives.
     FlyDivision,
-    /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so in four seconds.
+    /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so
+    /// in four seconds.
     RequestDisarming,
     /// Forget MISSION_START, and ask to disarm, again every second.
     CancelStart,

@@ -20,7 +20,8 @@ pub enum State {
     Engaging,
     /// Arming was asked for.
     Arming,
-    /// NAV_TAKEOFF was asked for, of an autopilot that lifts off by command only; the others pass at once.
+    /// NAV_TAKEOFF was asked for, of an autopilot that lifts off by command only; the others pass
+    /// at once.
     TakeOff,
     /// Straight up to the start of the path.
     Climb,
@@ -54,11 +55,14 @@ pub enum State {
     PadReplanning,
     /// Brakes along the path, then lands.
     Stopping,
-    /// Offboard or Guided again after the pilot: holds the point where the mode came back until DO_PAUSE_CONTINUE 1.
+    /// Offboard or Guided again after the pilot: holds the point where the mode came back until
+    /// DO_PAUSE_CONTINUE 1.
     PilotReturned,
-    /// The start was cancelled or paused after arming was requested: holds on the pad until the motors are surely off.
+    /// The start was cancelled or paused after arming was requested: holds on the pad until the
+    /// motors are surely off.
     CancelStart,
-    /// A landing was stopped since another vehicle is below, or may be: holds until the column is free.
+    /// A landing was stopped since another vehicle is below, or may be: holds until the column is
+    /// free.
     LandingHeld,
     /// Holds on its path, in a coverage mission, until what a lost vehicle left is divided.
     Dividing,
@@ -98,8 +102,8 @@ impl State {
         Self::Dividing,
     ];
 
-    /// Whether setpoints go out: from before Offboard until the motors are off, never in a failsafe,
-    /// nor while an autopilot takes off by a command.
+    /// Whether setpoints go out: from before Offboard until the motors are off, never in a
+    /// failsafe, nor while an autopilot takes off by a command.
     pub fn streams_setpoints(self) -> bool {
         use State::*;
         matches!(
@@ -126,7 +130,8 @@ impl State {
         )
     }
 
-    /// Whether a vehicle in this state flies on over an area as long as its lease allows, or is about to take off.
+    /// Whether a vehicle in this state flies on over an area as long as its lease allows, or is
+    /// about to take off.
     pub(crate) fn flies_on_lease(self) -> bool {
         use State::*;
         self.holds_place() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
@@ -171,7 +176,8 @@ impl InterruptedStates {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
 
-    /// Remembers what a change of state interrupts; `lands` if what it seeks is a place for a landing that was under way.
+    /// Remembers what a change of state interrupts; `lands` if what it seeks is a place for a
+    /// landing that was under way.
     pub(crate) fn record_interruption(&mut self, from: State, to: State, lands: bool) {
         use State::*;
         // A request to the shell, and a disarming, begin again.
@@ -193,7 +199,9 @@ impl InterruptedStates {
         use State::*;
         let kept = match to {
             Paused if matches!(from, PilotReturned | PositionLost) => return Some("Still paused"),
-            Paused | PilotControl | AutopilotSilent | PositionLost if !Self::is_loss(from) => self.target(to),
+            Paused | PilotControl | AutopilotSilent | PositionLost if !Self::is_loss(from) => {
+                self.target(to)
+            }
             _ => return None,
         };
         Some(match kept {

@@ -1,4 +1,5 @@
-//! The rows of the mission's transition table; [`crate::mission`] says what states, guards and actions are.
+//! The rows of the mission's transition table; [`crate::mission`] says what states, guards and
+//! actions are.
 
 use super::guard::Guard;
 use super::row::{AT_ONCE, Action, TransitionRow, state_mask};
@@ -72,13 +73,14 @@ pub(crate) const fn return_row(
 /// Twice the time by which the armed bit lags behind the ack of arming.
 const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
-/// Time for which the column above the pad may be occupied between the last look at the gates and arming. Arming is not
-/// requested meanwhile.
+/// Time for which the column above the pad may be occupied between the last look at the gates and
+/// arming. Arming is not requested meanwhile.
 const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
-/// A vehicle that does not come to its setpoint for this long is held by something, or carried away.
+/// A vehicle that does not come to its setpoint for this long is held by something, or carried
+/// away.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
-/// A vehicle over an area that cannot start for this long leaves its part to those that fly: a lost vehicle that may come down above
-/// its pad takes less to be down.
+/// A vehicle over an area that cannot start for this long leaves its part to those that fly: a lost
+/// vehicle that may come down above its pad takes less to be down.
 const START_BARRED_MOST: Duration = secs(180);
 
 use Action as A;
@@ -86,11 +88,13 @@ use Guard as G;
 use State::*;
 
 /// States on the ground before arming.
-pub(crate) const WAITING_ON_GROUND: &[State] = &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
+pub(crate) const WAITING_ON_GROUND: &[State] =
+    &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
 /// States on the pad after the start command, before arming is requested.
 pub(crate) const STARTED_ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging];
 /// States on the pad after the start command.
-pub(crate) const ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
+pub(crate) const ON_PAD: &[State] =
+    &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
 /// States in the air, or about to be, under our setpoints.
 pub(crate) const FLYING: &[State] = &[
     TakeOff,
@@ -143,7 +147,8 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Land, Disarm],     G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: landing stopped"),
     warning_row(ON_PAD,              G::FailsafeActs,    AT_ONCE,    Aborted,     A::ForgetStart,       "Failsafe before take-off: start cancelled"),
     warning_row(ON_PAD,              G::ModeTaken,       AT_ONCE,    Aborted,     A::ForgetStart,       "Mode changed by pilot: start cancelled"),
-    // Started again in the air: what flies the vehicle continues doing so; without setpoints that is the autopilot alone.
+    // Started again in the air: what flies the vehicle continues doing so; without setpoints that
+    // is the autopilot alone.
     warning_row(WAITING_ON_GROUND,   G::FoundFlying,     AT_ONCE,    Failsafe,    A::ForgetStart,       "Found in flight: no mission"),
     // Links and position.
     warning_row(WAITING_ON_GROUND,   G::NoHeartbeat,     secs(3),    WaitAutopilot, A::ForgetStart,     "Autopilot silent: start cancelled"),

@@ -1,7 +1,8 @@
-//! What a task asks for beside its path: where the vehicle looks, and what the autopilot is commanded on the way.
+//! What a task asks for beside its path: where the vehicle looks, and what the autopilot is
+//! commanded on the way.
 //!
-//! The path is flown the same whatever the task is. A kind of task has a file here, an arm in each function below, and a
-//! variant of [`planner_core::flight::Task`].
+//! The path is flown the same whatever the task is. A kind of task has a file here, an arm in each
+//! function below, and a variant of [`planner_core::flight::Task`].
 
 mod along;
 mod camera;

@@ -1,4 +1,5 @@
-//! The table against its copy in the README, and against itself: every state reachable, left again, and texts that fit.
+//! The table against its copy in the README, and against itself: every state reachable, left again,
+//! and texts that fit.
 
 extern crate std;
 use std::fmt::Write;
@@ -16,8 +17,9 @@ use State::*;
 
 /// The table as Markdown.
 fn printed() -> String {
-    let mut out =
-        String::from("| from | guard | for | to | action | STATUSTEXT |\n|---|---|---|---|---|---|\n");
+    let mut out = String::from(
+        "| from | guard | for | to | action | STATUSTEXT |\n|---|---|---|---|---|---|\n",
+    );
     for row in TABLE {
         let from: Vec<String> = row.from.iter().map(|s| std::format!("{s:?}")).collect();
         let limit = match row.min_duration.as_micros() {
@@ -28,9 +30,16 @@ fn printed() -> String {
             TargetState::State(to) => std::format!("{to:?}"),
             TargetState::Interrupted => "the interrupted state".into(),
         };
-        let action = if row.action == A::None { String::new() } else { std::format!("{:?}", row.action) };
-        writeln!(out, "| {} | {:?} | {limit} | {to} | {action} | {} |", from.join(", "), row.guard, row.text)
-            .unwrap();
+        let action =
+            if row.action == A::None { String::new() } else { std::format!("{:?}", row.action) };
+        writeln!(
+            out,
+            "| {} | {:?} | {limit} | {to} | {action} | {} |",
+            from.join(", "),
+            row.guard,
+            row.text
+        )
+        .unwrap();
     }
     out
 }
@@ -59,10 +68,15 @@ const INTERRUPTIONS: &[(&str, Shows)] = &[
 
 /// Inputs of a state in which nothing happens.
 pub(crate) fn quiet(state: State) -> GuardInputs {
-    let on_ground =
-        WAITING_ON_GROUND.contains(&state) || ON_PAD.contains(&state) || matches!(state, Done | Aborted);
-    let mut i =
-        GuardInputs { armed: !on_ground, airborne: !on_ground, at_start: true, ..GuardInputs::default() };
+    let on_ground = WAITING_ON_GROUND.contains(&state)
+        || ON_PAD.contains(&state)
+        || matches!(state, Done | Aborted);
+    let mut i = GuardInputs {
+        armed: !on_ground,
+        airborne: !on_ground,
+        at_start: true,
+        ..GuardInputs::default()
+    };
     (i.has_goal, i.has_flown, i.own_mode) = (true, !on_ground, !on_ground);
     match state {
         WaitAutopilot => i.heartbeat_age = MAX_HEARTBEAT_AGE,
@@ -99,12 +113,15 @@ fn page() -> String {
         for (_, interrupt) in INTERRUPTIONS {
             let mut inputs = quiet(*state);
             interrupt(&mut inputs);
-            let back =
-                |to| TABLE.iter().any(|row| row.from.contains(&to) && row.to == TargetState::Interrupted);
+            let back = |to| {
+                TABLE.iter().any(|row| row.from.contains(&to) && row.to == TargetState::Interrupted)
+            };
             match first_applicable_row(*state, &inputs).map(|row| row.to) {
                 None => out += " |",
                 Some(TargetState::Interrupted) => out += " the interrupted state |",
-                Some(TargetState::State(to)) if back(to) || to == PilotControl || to == AutopilotSilent => {
+                Some(TargetState::State(to))
+                    if back(to) || to == PilotControl || to == AutopilotSilent =>
+                {
                     write!(out, " {to:?} (back) |").unwrap();
                 }
                 Some(TargetState::State(to)) => write!(out, " {to:?} |").unwrap(),
@@ -131,8 +148,9 @@ fn the_page_prints_this_table() {
 #[test]
 fn every_state_is_reached_and_every_wait_ends() {
     for state in State::ALL {
-        let reached =
-            TABLE.iter().any(|row| row.to == TargetState::State(*state) && !row.from.contains(state));
+        let reached = TABLE
+            .iter()
+            .any(|row| row.to == TargetState::State(*state) && !row.from.contains(state));
         assert!(reached || *state == WaitAutopilot, "{state:?} is never reached");
         let timed = |row: &&TransitionRow| row.from.contains(state) && row.min_duration > AT_ONCE;
         // On the ground, disarmed, waiting for a person, an autopilot or a neighbour may last.
@@ -163,7 +181,9 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::PlanFailed => i.plan_failed = true,
         G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
         G::StartCommanded => (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false),
-        G::StartWithoutGoal => (i.start, i.plans_as_others, i.at_start, i.armed) = (true, true, true, false),
+        G::StartWithoutGoal => {
+            (i.start, i.plans_as_others, i.at_start, i.armed) = (true, true, true, false)
+        }
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
         G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
         G::StartVague => {
@@ -174,7 +194,8 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::OriginMoved => i.origin_moved = true,
         G::GatesOpen => i.gates_open = true,
         G::StartBatteryLow => {
-            (i.start, i.has_goal, i.at_start, i.armed, i.battery_low) = (true, true, true, false, true);
+            (i.start, i.has_goal, i.at_start, i.armed, i.battery_low) =
+                (true, true, true, false, true);
         }
         G::StartOutside => {
             (i.start, i.has_goal, i.at_start, i.armed, i.outside) = (true, true, true, false, true);
@@ -185,7 +206,9 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
         G::StaysArmed => i.in_state = long,
         G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
-        G::StaysDisarmedPaused => (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true),
+        G::StaysDisarmedPaused => {
+            (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true)
+        }
         G::ArmedUnseen => i.armed_unseen = true,
         G::ArmingHeld => {
             (i.arming_unrequested, i.column_blocked_for, i.in_state) = (true, long, long);
@@ -273,12 +296,15 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             let mut inputs = inputs_for(row.guard);
             // Where a position or an autopilot heard already moves on, they are not known yet.
             match (from, row.guard) {
-                (PositionLost, G::BackOnPath | G::BackOffPath) | (AutopilotSilent, G::AutopilotHeard) => {}
+                (PositionLost, G::BackOnPath | G::BackOffPath)
+                | (AutopilotSilent, G::AutopilotHeard) => {}
                 (WaitPosition, G::PositionKnown) | (WaitAutopilot, G::AutopilotHeard) => {}
                 (PositionLost | WaitPosition, _) => inputs.position_age = MAX_POSITION_AGE,
                 (AutopilotSilent, _) => inputs.heartbeat_age = MAX_HEARTBEAT_AGE,
                 (Arming, _) => inputs.armed = false,
-                (Scheduled | PadReplanning | Streaming | Engaging, guard) => inputs.armed = guard == G::Armed,
+                (Scheduled | PadReplanning | Streaming | Engaging, guard) => {
+                    inputs.armed = guard == G::Armed
+                }
                 (Blocked, guard) => inputs.blocked = guard != G::PathClear,
                 _ => {}
             }

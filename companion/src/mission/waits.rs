@@ -1,5 +1,5 @@
-//! Waits that somebody is to know of: for a vehicle that never starts, which is named so that the operator sees why the swarm waits,
-//! and of this one, which something keeps on its pad.
+//! Waits that somebody is to know of: for a vehicle that never starts, which is named so that the
+//! operator sees why the swarm waits, and of this one, which something keeps on its pad.
 //!
 //! Constant work.
 
@@ -29,7 +29,8 @@ pub(crate) struct WaitReport {
 }
 
 impl WaitReport {
-    /// After each step: it waits for the vehicle `id` that has not started, or for none (0). Returns whether that is to be named.
+    /// After each step: it waits for the vehicle `id` that has not started, or for none (0).
+    /// Returns whether that is to be named.
     pub(crate) fn update(&mut self, id: u8, now: Instant) -> bool {
         if id != self.id || id == 0 {
             *self = Self { id, since: now };
@@ -42,7 +43,8 @@ impl WaitReport {
     }
 }
 
-/// Since when something has barred the start of this vehicle, and when it last did; short gaps do not count.
+/// Since when something has barred the start of this vehicle, and when it last did; short gaps do
+/// not count.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BarredStart {
     since: Option<Instant>,

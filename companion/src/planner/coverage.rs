@@ -168,11 +168,15 @@ pub struct Request<'a, 'm> {
 
 impl<'m> Request<'_, 'm> {
     /// The surface that lanes follow above the ground; none where it is level.
-    fn terrain_following(&self, vehicles: &[Vehicle]) -> Result<Option<TerrainFollowing<'m>>, Error> {
+    fn terrain_following(
+        &self,
+        vehicles: &[Vehicle],
+    ) -> Result<Option<TerrainFollowing<'m>>, Error> {
         let Some(ground) = &self.view.header().ground else { return Ok(None) };
         let crc = self.mission.header().roadmap_crc;
         let field = self.field.filter(|field| field.crc() == crc).ok_or(Error::NoField)?;
-        let steepest = vehicles.iter().map(|v| libm::fminf(v.climb_mps, v.descend_mps) / v.cruise_mps);
+        let steepest =
+            vehicles.iter().map(|v| libm::fminf(v.climb_mps, v.descend_mps) / v.cruise_mps);
         let slope = steepest.fold(f32::INFINITY, libm::fminf);
         let (height_m, tolerance_m) = (ground.height_m, ground.tolerance_m);
         Ok(Some(TerrainFollowing { field, height_m, tolerance_m, slope }))
@@ -196,8 +200,8 @@ fn read_area<'a, const X: usize>(
     Area::new(vertices, rings).map_err(CoverageError::Area)
 }
 
-/// Plans one vehicle's way home over the area, or aside, that keeps clear of all `obstacles`, above the field and out
-/// of no-fly zones, which may have `C` corners.
+/// Plans one vehicle's way home over the area, or aside, that keeps clear of all `obstacles`, above
+/// the field and out of no-fly zones, which may have `C` corners.
 ///
 /// # Errors
 /// Reason why there is none.
@@ -224,8 +228,8 @@ pub fn plan_detour<
         .map_err(|_| PlanFailure::Unreachable)
 }
 
-/// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been lost, division by
-/// division: the lots of all vehicles by the rank of their ids.
+/// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been
+/// lost, division by division: the lots of all vehicles by the rank of their ids.
 ///
 /// # Errors
 /// Reason why there is no plan.
@@ -263,7 +267,9 @@ pub fn plan_flights<
     for (i, own) in mission.vehicles().enumerate() {
         let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
         let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, airborne: false };
-        vehicles.push(packing_vehicle(mission, &own, view, i)).map_err(|_| CoverageError::Vehicles)?;
+        vehicles
+            .push(packing_vehicle(mission, &own, view, i))
+            .map_err(|_| CoverageError::Vehicles)?;
         pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
         if area.is_in_no_fly_zone(&own.start.xy()) {
             return Err(CoverageError::InsideNoFly(i as u8).into());
@@ -271,7 +277,8 @@ pub fn plan_flights<
     }
     let (tracks, transit) = (&ws.tracks, &transit);
     let (left, done) = ws.losses.start_plan(tracks, transit, done)?;
-    let whole = Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
+    let whole =
+        Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
     let work = Work { tracks: left, ..whole };
     match header.parts {
         PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
@@ -300,7 +307,13 @@ pub fn plan_flights<
         held_layers: 0,
         following: request.terrain_following(&vehicles)?,
     };
-    flights::plan_flights(&work, &ws.routes, &FlightInputs { photographed: done, ..swarm }, schedule, out)?;
+    flights::plan_flights(
+        &work,
+        &ws.routes,
+        &FlightInputs { photographed: done, ..swarm },
+        schedule,
+        out,
+    )?;
     for lots in losses {
         let mut fates: Vec<VehicleStatus, K> = Vec::new();
         for pad in &pads {

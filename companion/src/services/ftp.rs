@@ -1,15 +1,18 @@
-//! MAVLink FTP server: `roadmap.bin` or `field.bin`, and `mission.bin` are listed, read, written, removed and summed.
+//! MAVLink FTP server: `roadmap.bin` or `field.bin`, and `mission.bin` are listed, read, written,
+//! removed and summed.
 //!
-//! Source: MAVLink guide, "File Transfer Protocol"; PX4, pymavlink's `mavftp` and MAVSDK for what clients rely on: an answer has
-//! the request's sequence number plus one, its session and its offset; the client names the session (`mavftp` writes to it before
-//! it heard that it is open); CRC-32 begins at 0 and is not inverted; a burst ends
-//! with its last packet marked.
+//! Source: MAVLink guide, "File Transfer Protocol"; PX4, pymavlink's `mavftp` and MAVSDK for what
+//! clients rely on: an answer has the request's sequence number plus one, its session and its
+//! offset; the client names the session (`mavftp` writes to it before it heard that it is open);
+//! CRC-32 begins at 0 and is not inverted; a burst ends with its last packet marked.
 //!
-//! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
-//! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for a while
-//! and only answered again (`ftp/memory.rs`); a session that nothing was written to is not opened again for its client. What cannot be
-//! taken now is not answered: clients ask again. One session at a time; one request at a time, the others wait in a short queue.
-//! An answer that needs the flash is given when the flash is done.
+//! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing,
+//! writing the same bytes to the same place) are simply done again. Those that would (opening,
+//! closing, removing, resetting) are remembered for a while and only answered again
+//! (`ftp/memory.rs`); a session that nothing was written to is not opened again for its client.
+//! What cannot be taken now is not answered: clients ask again. One session at a time; one request
+//! at a time, the others wait in a short queue. An answer that needs the flash is given when the
+//! flash is done.
 
 mod memory;
 mod packet;
@@ -22,8 +25,8 @@ use self::memory::DuplicateDetection;
 pub(crate) use self::packet::FTP_TEXTS;
 pub use self::packet::MAX_DATA;
 use self::packet::{
-    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NAK, NakError, Request, Text, chunk_len, format_decimal,
-    is_open, op, upload_text,
+    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NAK, NakError, Request, Text, chunk_len,
+    format_decimal, is_open, op, upload_text,
 };
 use self::stream::{FtpBurst, next_request};
 use crate::link::frame::Frame;
@@ -104,7 +107,8 @@ impl Default for Ftp {
 }
 
 impl Ftp {
-    /// Queues a request. One that is queued already, or finds the queue full, is dropped: the client repeats it.
+    /// Queues a request. One that is queued already, or finds the queue full, is dropped: the
+    /// client repeats it.
     pub fn queue_request(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
         let request = Request::read(link, frame);
@@ -175,14 +179,16 @@ impl Ftp {
         }
     }
 
-    /// Continues the current operation: requests the flash again, or checks the progress of an upload.
+    /// Continues the current operation: requests the flash again, or checks the progress of an
+    /// upload.
     fn continue_operation(&mut self, store: &mut Store) {
         match &mut self.operation {
             FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Sum(_, true) => {}
             FtpOperation::Read(request, asked) => {
                 let due = next_request(request, self.burst.as_ref());
                 let file = self.session.map(|session| session.file);
-                let within = |file: &File| store.file_size(*file).is_some_and(|size| due.offset < size);
+                let within =
+                    |file: &File| store.file_size(*file).is_some_and(|size| due.offset < size);
                 if let Some(file) = file.filter(within) {
                     *asked = store.request_read(file, due.offset, chunk_len(&due));
                 } else {
@@ -209,7 +215,8 @@ impl Ftp {
                         self.operation = FtpOperation::Nothing;
                         // The erasing for this session may have taken longer than a client may be
                         // silent.
-                        self.session = self.session.map(|session| Session { used_at: self.now, ..session });
+                        self.session =
+                            self.session.map(|session| Session { used_at: self.now, ..session });
                         self.finish(&request, Ok(()));
                     }
                 }
@@ -248,7 +255,10 @@ impl Ftp {
         if is_open(request) {
             self.duplicates.forget_closed(request.client);
         }
-        if matches!(request.opcode, op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ) {
+        if matches!(
+            request.opcode,
+            op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ
+        ) {
             self.burst = None;
         }
         match request.opcode {
@@ -268,17 +278,17 @@ impl Ftp {
                 }
             },
             op::RESET => {
-                if self
-                    .session
-                    .is_some_and(|session| session.client == request.client || self.is_idle(&session))
-                {
+                if self.session.is_some_and(|session| {
+                    session.client == request.client || self.is_idle(&session)
+                }) {
                     self.drop_session(store);
                 }
                 self.finish(request, Ok(()));
             }
             op::LIST => self.handle_list(request, store),
             op::OPEN_READ => {
-                match request.requested_file().and_then(|file| Some((file, store.file_size(file)?))) {
+                match request.requested_file().and_then(|file| Some((file, store.file_size(file)?)))
+                {
                     None => self.nak(request, NakError::NotFound),
                     Some((file, size)) => {
                         if self.open_session(request, file, false, store) {
@@ -298,14 +308,16 @@ impl Ftp {
             },
             op::CREATE | op::OPEN_WRITE => self.handle_open(request, store, erasing),
             op::WRITE => self.handle_write(request, store),
-            op::REMOVE => match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
-                Some(file) => {
-                    store.remove_file(file);
-                    self.text = Some(FILE_REMOVED);
-                    self.finish(request, Ok(()));
+            op::REMOVE => {
+                match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
+                    Some(file) => {
+                        store.remove_file(file);
+                        self.text = Some(FILE_REMOVED);
+                        self.finish(request, Ok(()));
+                    }
+                    None => self.nak(request, NakError::NotFound),
                 }
-                None => self.nak(request, NakError::NotFound),
-            },
+            }
             op::CRC32 => self.operation = FtpOperation::Sum(*request, false),
             op::TRUNCATE | op::RENAME
                 if request.requested_file().is_none_or(|file| store.file_size(file).is_none()) =>
@@ -342,7 +354,9 @@ impl Ftp {
     }
 
     fn handle_open(&mut self, request: &Request, store: &mut Store, erasing: ErasePermission) {
-        let Some(file) = request.requested_file() else { return self.nak(request, NakError::Protected) };
+        let Some(file) = request.requested_file() else {
+            return self.nak(request, NakError::Protected);
+        };
         let same = |session: &&mut Session| {
             (session.client, session.id, session.file) == (request.client, request.session, file)
                 && session.fresh
@@ -414,7 +428,13 @@ impl Ftp {
     }
 
     /// Opens a session. Sends a NAK if no session is free.
-    fn open_session(&mut self, request: &Request, file: File, writes: bool, store: &mut Store) -> bool {
+    fn open_session(
+        &mut self,
+        request: &Request,
+        file: File,
+        writes: bool,
+        store: &mut Store,
+    ) -> bool {
         let held = |session: &Session| session.client != request.client && !self.is_idle(session);
         if self.session.as_ref().is_some_and(held) {
             self.nak(request, NakError::Sessions);

@@ -1,8 +1,9 @@
-//! The tunables of one vehicle, as MAVLink parameters: names, ranges, defaults, and how they are kept in flash.
+//! The tunables of one vehicle, as MAVLink parameters: names, ranges, defaults, and how they are
+//! kept in flash.
 //!
-//! All travel as REAL32, since ground tools decode parameters by the autopilot's firmware. What the whole swarm must agree on is
-//! in the mission file instead. A changed value counts as soon as the vehicle stands
-//! disarmed and idle, but for the system id: that counts from the next start.
+//! All travel as REAL32, since ground tools decode parameters by the autopilot's firmware. What the
+//! whole swarm must agree on is in the mission file instead. A changed value counts as soon as the
+//! vehicle stands disarmed and idle, but for the system id: that counts from the next start.
 
 use crate::config::{Config, REACHES_ALL_M};
 
@@ -142,8 +143,8 @@ impl Parameters {
         bytes
     }
 
-    /// Takes one kept entry: an older or newer firmware's names and ranges may be others, so what does not fit is left at its
-    /// default.
+    /// Takes one kept entry: an older or newer firmware's names and ranges may be others, so what
+    /// does not fit is left at its default.
     pub fn restore(&mut self, entry: &[u8; ENTRY_LEN]) {
         let name = entry[..NAME_LEN].split(|b| *b == 0).next().unwrap_or_default();
         let value = f32::from_le_bytes([entry[16], entry[17], entry[18], entry[19]]);
@@ -169,7 +170,10 @@ mod tests {
             for bad in [f32::NAN, f32::INFINITY, parameter.min - 0.1, parameter.max * 1.1 + 0.1] {
                 assert_eq!(values.set(index, bad), Err(ParameterError::Range));
             }
-            assert_eq!(parameter.whole, values.set(index, parameter.min + 0.5) == Err(ParameterError::Range));
+            assert_eq!(
+                parameter.whole,
+                values.set(index, parameter.min + 0.5) == Err(ParameterError::Range)
+            );
         }
         assert_eq!(values.set(PARAMETER_COUNT, 1.0), Err(ParameterError::Unknown));
     }

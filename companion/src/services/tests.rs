@@ -80,7 +80,10 @@ fn parameters_are_listed_read_set_and_kept() {
         assert_eq!(listed.len(), TABLE.len());
         for (i, (told, parameter)) in listed.iter().zip(TABLE).enumerate() {
             assert_eq!((told.param_index, told.param_count), (i as u16, TABLE.len() as u16));
-            assert_eq!((told.param_id.to_str(), told.param_value), (Ok(parameter.name), parameter.default));
+            assert_eq!(
+                (told.param_id.to_str(), told.param_value),
+                (Ok(parameter.name), parameter.default)
+            );
         }
         let read = |index: i16, name: &str| PARAM_REQUEST_READ_DATA {
             param_index: index,
@@ -88,8 +91,14 @@ fn parameters_are_listed_read_set_and_kept() {
             target_component: crate::COMPANION_COMPONENT,
             param_id: name.into(),
         };
-        assert_eq!(values(&ground.ask(link, &read(2, "")))[0].param_id.to_str(), Ok("FLK_CLIMB_MAX"));
-        assert_eq!(values(&ground.ask(link, &read(-1, "FLK_SYS_ID")))[0].param_index, TABLE.len() as u16 - 1);
+        assert_eq!(
+            values(&ground.ask(link, &read(2, "")))[0].param_id.to_str(),
+            Ok("FLK_CLIMB_MAX")
+        );
+        assert_eq!(
+            values(&ground.ask(link, &read(-1, "FLK_SYS_ID")))[0].param_index,
+            TABLE.len() as u16 - 1
+        );
         for unknown in [read(TABLE.len() as i16, ""), read(-1, "FLK_NONE"), read(i16::MIN, "")] {
             let heard = ground.ask(link, &unknown);
             assert_eq!(errors(&heard)[0].error, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST);
@@ -107,15 +116,21 @@ fn parameters_are_listed_read_set_and_kept() {
         assert_eq!(values(&heard)[0].param_value, 2.5, "what stands");
         assert_eq!(errors(&heard)[0].error, MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE);
         assert_eq!((errors(&heard)[0].target_system, errors(&heard)[0].target_component), GROUND);
-        let integer =
-            PARAM_SET_DATA { param_type: MavParamType::MAV_PARAM_TYPE_INT32, ..set("FLK_ACCEL", 1.0) };
+        let integer = PARAM_SET_DATA {
+            param_type: MavParamType::MAV_PARAM_TYPE_INT32,
+            ..set("FLK_ACCEL", 1.0)
+        };
         assert_eq!(
             errors(&ground.ask(link, &integer))[0].error,
             MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH
         );
         let other = PARAM_SET_DATA { target_system: SYSTEM + 1, ..set("FLK_ACCEL", 1.0) };
         assert!(ground.ask(link, &other).iter().all(|f| f.message_id != PARAM_VALUE_DATA::ID));
-        assert_eq!(started(&mut ground.flash).parameters().get(0), Some(("FLK_ACCEL", 2.5)), "kept");
+        assert_eq!(
+            started(&mut ground.flash).parameters().get(0),
+            Some(("FLK_ACCEL", 2.5)),
+            "kept"
+        );
     }
 }
 
@@ -129,8 +144,9 @@ fn a_restart_is_asked_of_the_shell_unless_armed() {
         target_component,
         ..COMMAND_LONG_DATA::default()
     };
-    let result =
-        |frames: &[Frame]| frames.iter().find_map(Frame::decode::<COMMAND_ACK_DATA>).map(|ack| ack.result);
+    let result = |frames: &[Frame]| {
+        frames.iter().find_map(Frame::decode::<COMMAND_ACK_DATA>).map(|ack| ack.result)
+    };
     let restarts = |ground: &mut Ground| {
         core::iter::from_fn(|| ground.bench.companion.poll_event())
             .filter(|event| *event == Event::RestartRequested)
@@ -161,7 +177,10 @@ fn a_flying_companion_asks_for_no_erasure() {
     ground.bench = Bench::following(config());
     // A flash as it comes: everything would have to be erased.
     let mut flash = Flash::new(1);
-    ground.bench.companion.attach_store(Store::mount(crate::testing::fake_flash::LAYOUT, &mut flash));
+    ground
+        .bench
+        .companion
+        .attach_store(Store::mount(crate::testing::fake_flash::LAYOUT, &mut flash));
     for _ in 0..100 {
         ground.bench.run(0.1);
         assert!(ground.bench.companion.poll_flash().is_none());
@@ -176,8 +195,17 @@ fn time_and_version_are_told_on_either_link() {
         let answer = heard.iter().find_map(Frame::decode::<TIMESYNC_DATA>).expect("answered");
         assert_eq!((answer.tc1, answer.ts1), (ground.bench.now.as_micros() as i64 * 1000, 42));
         let frame = heard.iter().find(|f| f.message_id == TIMESYNC_DATA::ID).unwrap();
-        assert_eq!((frame.padded()[16], frame.padded()[17]), GROUND, "an autopilot does not forward its own");
-        assert!(ground.ask(link, &TIMESYNC_DATA { tc1: 5, ts1: 42 }).iter().all(|f| f.message_id != 111));
+        assert_eq!(
+            (frame.padded()[16], frame.padded()[17]),
+            GROUND,
+            "an autopilot does not forward its own"
+        );
+        assert!(
+            ground
+                .ask(link, &TIMESYNC_DATA { tc1: 5, ts1: 42 })
+                .iter()
+                .all(|f| f.message_id != 111)
+        );
         let request = COMMAND_LONG_DATA {
             command: MavCmd::MAV_CMD_REQUEST_MESSAGE,
             param1: AUTOPILOT_VERSION_DATA::ID as f32,
@@ -207,7 +235,10 @@ fn a_flood_of_each_question_is_answered_at_its_rate() {
                 let length = match k % 3 {
                     0 => frame::encode(header, &TIMESYNC_DATA { tc1: 0, ts1: 9 }, &mut out),
                     1 => {
-                        let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: 191 };
+                        let list = PARAM_REQUEST_LIST_DATA {
+                            target_system: SYSTEM,
+                            target_component: 191,
+                        };
                         frame::encode(header, &list, &mut out)
                     }
                     _ => {
@@ -228,9 +259,11 @@ fn a_flood_of_each_question_is_answered_at_its_rate() {
                     break;
                 }
                 let frame = framer.next(bench.now, &mut &out[..length]).expect("a frame");
-                for (count, id) in
-                    counts.iter_mut().zip([TIMESYNC_DATA::ID, PARAM_VALUE_DATA::ID, COMMAND_ACK_DATA::ID])
-                {
+                for (count, id) in counts.iter_mut().zip([
+                    TIMESYNC_DATA::ID,
+                    PARAM_VALUE_DATA::ID,
+                    COMMAND_ACK_DATA::ID,
+                ]) {
                     *count += u32::from(frame.message_id == id);
                 }
             }
@@ -271,8 +304,9 @@ fn a_parameter_counts_at_once_on_the_ground_and_after_the_flight_in_the_air() {
     let begun = ground.bench.setpoints.len();
     ground.bench.run(4.0);
     let pairs = ground.bench.setpoints[begun..].windows(2);
-    let fastest =
-        pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32()).fold(0.0, f32::max);
+    let fastest = pairs
+        .map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32())
+        .fold(0.0, f32::max);
     assert!((0.4..0.55).contains(&fastest), "not while it flies: {fastest}");
     assert_eq!(speeds(&ground).0, 0.5);
     ground.bench.until(State::Done, 90.0);

@@ -1,11 +1,13 @@
-//! The mission file: which vehicles fly, from where to which goals, how fast and how far apart; uploaded beside the roadmap.
+//! The mission file: which vehicles fly, from where to which goals, how fast and how far apart;
+//! uploaded beside the roadmap.
 //!
-//! Little-endian, versioned, closed by a CRC-32; byte by byte in `companion/README.md`. Lengths are metres, speeds m/s, points
-//! east, north, up in the mission frame. Its CRC is what companions compare on the radio: it covers the roadmap's, so vehicles
-//! that agree on it plan the same. What one vehicle alone decides (own speed limit, tolerances) is a parameter, not here.
+//! Little-endian, versioned, closed by a CRC-32; byte by byte in `companion/README.md`. Lengths are
+//! metres, speeds m/s, points east, north, up in the mission frame. Its CRC is what companions
+//! compare on the radio: it covers the roadmap's, so vehicles that agree on it plan the same. What
+//! one vehicle alone decides (own speed limit, tolerances) is a parameter, not here.
 //!
-//! [`MissionView::parse`] checks everything once, in O(vehicles + goals); afterwards no accessor can meet a number that is
-//! not sound, whatever the bytes were.
+//! [`MissionView::parse`] checks everything once, in O(vehicles + goals); afterwards no accessor
+//! can meet a number that is not sound, whatever the bytes were.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -61,7 +63,8 @@ pub struct MissionHeader {
     pub origin: Geodetic,
     /// Speed along paths, m/s.
     pub cruise_mps: f32,
-    /// Separation and speeds that are planned with; the schedule reckons with less than the cruise speed.
+    /// Separation and speeds that are planned with; the schedule reckons with less than the cruise
+    /// speed.
     pub schedule: ScheduleConfig,
     /// Smallest distance between two vehicles' centres, metres.
     pub safety_distance_m: f32,
@@ -161,7 +164,8 @@ pub fn write_mission(
     out: &mut [u8],
 ) -> Result<usize, MissionError> {
     let goals = block.goals();
-    let (Ok(vehicle_count), Ok(goal_count)) = (u16::try_from(vehicles.len()), u16::try_from(goals.len()))
+    let (Ok(vehicle_count), Ok(goal_count)) =
+        (u16::try_from(vehicles.len()), u16::try_from(goals.len()))
     else {
         return Err(FileError::Length.into());
     };
@@ -195,15 +199,25 @@ pub fn write_mission(
         to.copy_from_slice(&number.to_le_bytes());
     }
     let s = &header.schedule;
-    let numbers =
-        [header.cruise_mps, s.vertical_mps, header.safety_distance_m, s.separation_m, s.parked_separation_m];
+    let numbers = [
+        header.cruise_mps,
+        s.vertical_mps,
+        header.safety_distance_m,
+        s.separation_m,
+        s.parked_separation_m,
+    ];
     let (low, high) = header.geofence.unwrap_or_default();
     put_numbers(
         &mut out[..HEADER_LEN],
         56,
-        numbers.into_iter().chain(low.iter().copied()).chain(high.iter().copied()).chain([s.cruise_mps]),
+        numbers
+            .into_iter()
+            .chain(low.iter().copied())
+            .chain(high.iter().copied())
+            .chain([s.cruise_mps]),
     );
-    let (to_vehicles, rest) = out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
+    let (to_vehicles, rest) =
+        out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
     let (to_goals, to_block) = rest.split_at_mut(goals.len() * GOAL_LEN);
     for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
         to.copy_from_slice(&vehicle.to_bytes());
@@ -260,7 +274,8 @@ impl<'a> MissionView<'a> {
         if CRC32.checksum(covered) != crc {
             return Err(FileError::Crc.into());
         }
-        let f64_at = |at: usize| f64::from_bits(u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32);
+        let f64_at =
+            |at: usize| f64::from_bits(u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32);
         let header = MissionHeader {
             roadmap_crc: u32_at(16),
             mode: match head[20] {
@@ -313,8 +328,9 @@ impl<'a> MissionView<'a> {
 
     fn check_lists(&self) -> Result<(), MissionError> {
         let labelled = self.header.mode == Mode::Labelled;
-        let inside =
-            |place: &Point| self.header.geofence.as_ref().is_none_or(|fence| box_contains(fence, place));
+        let inside = |place: &Point| {
+            self.header.geofence.as_ref().is_none_or(|fence| box_contains(fence, place))
+        };
         let mut seen = [false; 256];
         for (i, vehicle) in self.vehicles().enumerate() {
             let id = vehicle.task.id;
@@ -391,7 +407,8 @@ impl<'a> MissionView<'a> {
     /// Whether it was made for this roadmap.
     fn matches_roadmap(&self, roadmap: &RoadmapView<'_>) -> bool {
         let terminals = (usize::from(roadmap.header().starts), usize::from(roadmap.header().goals));
-        self.header.roadmap_crc == roadmap.crc() && terminals == (self.vehicles.len(), self.goals.len())
+        self.header.roadmap_crc == roadmap.crc()
+            && terminals == (self.vehicles.len(), self.goals.len())
     }
 
     /// The request to the whole swarm's planner, over lists that the caller keeps, for vehicles
@@ -425,7 +442,10 @@ impl<'a> MissionView<'a> {
     ///
     /// # Errors
     /// The vehicle is not in the mission, or the mission has more vehicles than `V`.
-    pub fn companion_config<const V: usize>(&self, system_id: u8) -> Result<Config<V>, MissionError> {
+    pub fn companion_config<const V: usize>(
+        &self,
+        system_id: u8,
+    ) -> Result<Config<V>, MissionError> {
         let index = self.index_of(system_id).ok_or(MissionError::NotInRoster(system_id))?;
         let own = MissionVehicle::from_bytes(&self.vehicles[index]);
         if self.vehicles.len() > V {

@@ -1,17 +1,20 @@
-//! What a companion keeps in flash: two slots for roadmaps or fields, and a journal with the mission file, the parameters
-//! and what of an area is photographed.
+//! What a companion keeps in flash: two slots for roadmaps or fields, and a journal with the
+//! mission file, the parameters and what of an area is photographed.
 //!
-//! Flash is I/O: the store asks ([`Store::poll_request`]) for one sector to be erased, one block to be programmed or some bytes to be
-//! read, and is given the result ([`Store::handle_outcome`]). So a slow erasure never stops the setpoints, and the same code keeps
-//! its files in a board's flash, an emulated one, or a desk's memory.
+//! Flash is I/O: the store asks ([`Store::poll_request`]) for one sector to be erased, one block to
+//! be programmed or some bytes to be read, and is given the result ([`Store::handle_outcome`]). So
+//! a slow erasure never stops the setpoints, and the same code keeps its files in a board's flash,
+//! an emulated one, or a desk's memory.
 //!
-//! A file is whole or not there: it is written into an area that was erased before, read back, and sealed last ([`area`]). A cut
-//! at any byte leaves what was sealed before. The areas not in use are erased ahead of time, as soon as the vehicle is known
-//! to be disarmed, so that an upload finds one ready. A small crate for such journals (`sequential-storage`) was checked: its
-//! operations are futures over a flash driver that they own, which cannot be asked for one step at a time.
+//! A file is whole or not there: it is written into an area that was erased before, read back, and
+//! sealed last ([`area`]). A cut at any byte leaves what was sealed before. The areas not in use
+//! are erased ahead of time, as soon as the vehicle is known to be disarmed, so that an upload
+//! finds one ready. A small crate for such journals (`sequential-storage`) was checked: its
+//! operations are futures over a flash driver that they own, which cannot be asked for one step at
+//! a time.
 //!
-//! A roadmap is used in place, so the slot a companion started from is not written until the next start; the newest roadmap and
-//! mission take effect then.
+//! A roadmap is used in place, so the slot a companion started from is not written until the next
+//! start; the newest roadmap and mission take effect then.
 
 pub mod area;
 pub mod flash;
@@ -68,8 +71,8 @@ pub struct Store {
 }
 
 impl Store {
-    /// Looks through the flash: which roadmap is the newest whole one, which mission and parameters were last kept. Reads a
-    /// roadmap slot whole, so it takes milliseconds.
+    /// Looks through the flash: which roadmap is the newest whole one, which mission and parameters
+    /// were last kept. Reads a roadmap slot whole, so it takes milliseconds.
     pub fn mount(layout: FlashLayout, flash: &mut impl ReadFlash) -> Self {
         let slots = [0, 1].map(|i| area::read_condition(&layout, FlashArea::Slot(i), flash));
         let mut store = Self {
@@ -104,8 +107,9 @@ impl Store {
         Some(at..at + self.slots[slot].seal()?.len)
     }
 
-    /// The roadmap of this start cannot be used after all, whole as it is: [`Self::roadmap`] is the one before it, if that is still
-    /// there; whether it is. To be called before anything else is done with the flash.
+    /// The roadmap of this start cannot be used after all, whole as it is: [`Self::roadmap`] is the
+    /// one before it, if that is still there; whether it is. To be called before anything else is
+    /// done with the flash.
     pub fn refuse_roadmap(&mut self) -> bool {
         if let Some(slot) = self.in_use {
             self.slots[slot] = AreaCondition::Dirty;
@@ -176,9 +180,12 @@ impl Store {
         }
     }
 
-    /// Asks for bytes of a file; false where others are under way. At most [`MAX_READ`] are given, fewer at its end.
+    /// Asks for bytes of a file; false where others are under way. At most [`MAX_READ`] are given,
+    /// fewer at its end.
     pub fn request_read(&mut self, file: File, offset: u32, len: usize) -> bool {
-        let Some(extent) = self.file_range(file).filter(|extent| offset < extent.end - extent.start) else {
+        let Some(extent) =
+            self.file_range(file).filter(|extent| offset < extent.end - extent.start)
+        else {
             return false;
         };
         let at = extent.start + offset;
@@ -186,7 +193,8 @@ impl Store {
         self.start_read(FlashJob::Read { at, len })
     }
 
-    /// Asks for the running CRC of a whole file from a state; false where something else is under way.
+    /// Asks for the running CRC of a whole file from a state; false where something else is under
+    /// way.
     pub fn request_crc(&mut self, file: File, state: u32) -> bool {
         let Some(extent) = self.file_range(file) else { return false };
         self.start_read(FlashJob::Sum { at: extent.start, end: extent.end, sum: state })

@@ -1,20 +1,25 @@
-//! Living with vehicles that left the plan: which count as out, what blocks the path, and flying around it.
+//! Living with vehicles that left the plan: which count as out, what blocks the path, and flying
+//! around it.
 //!
-//! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it counts as dead) opens every
-//! gate that waits for it, and is an obstacle where it rests. A vehicle whose path that blocks, or which was out itself and
-//! may fly again, stops and waits until all others are out or stand and wait themselves. Then the one with the lowest
-//! system id asks its shell for a detour around everybody and flies it to its goal. All the while it reports the progress at which it
-//! left the plan: a vehicle that waits for it continues waiting, so it flies alone. On the ground it is out, and the next may go.
+//! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it
+//! counts as dead) opens every gate that waits for it, and is an obstacle where it rests. A vehicle
+//! whose path that blocks, or which was out itself and may fly again, stops and waits until all
+//! others are out or stand and wait themselves. Then the one with the lowest system id asks its
+//! shell for a detour around everybody and flies it to its goal. All the while it reports the
+//! progress at which it left the plan: a vehicle that waits for it continues waiting, so it flies
+//! alone. On the ground it is out, and the next may go.
 //!
-//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the vehicle reports that its path is
-//! blocked and no longer that it waits, for [`TURN_CLAIM`], longer than a word takes to be heard. It begins only if all others
-//! wait then; a vehicle that hears a lower system id claim waits again.
+//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the
+//! vehicle reports that its path is blocked and no longer that it waits, for [`TURN_CLAIM`], longer
+//! than a word takes to be heard. It begins only if all others wait then; a vehicle that hears a
+//! lower system id claim waits again.
 //!
-//! A vehicle that is out is checked along the whole path before its gates open, and from then on twice a second: [`MAX_STRETCHES_PER_STEP`] of the path a
-//! step, so a look among many takes several steps.
+//! A vehicle that is out is checked along the whole path before its gates open, and from then on
+//! twice a second: [`MAX_STRETCHES_PER_STEP`] of the path a step, so a look among many takes
+//! several steps.
 //!
-//! Over a field there is no roadmap and no turn: a stopped vehicle flies around the obstacle and back to its path
-//! ([`beside`]), or home ([`homeward`]).
+//! Over a field there is no roadmap and no turn: a stopped vehicle flies around the obstacle and
+//! back to its path ([`beside`]), or home ([`homeward`]).
 //!
 //! ENU metres.
 
@@ -59,7 +64,8 @@ const DETOUR_RETRY_S: u64 = 10;
 /// If a vehicle waits this long while all others stand, it is in a dead end: the vehicle that it
 /// waits for found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(30);
-/// Searches without a detour after which a vehicle gives up, or one fewer within [`GIVE_UP_AFTER_S`].
+/// Searches without a detour after which a vehicle gives up, or one fewer within
+/// [`GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 4;
 /// Time after which one search fewer is enough, seconds.
 const GIVE_UP_AFTER_S: u64 = 60;
@@ -68,16 +74,18 @@ const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress after which a vehicle that was blocked is blocked again, not still, metres.
 const BLOCKED_AGAIN_M: f32 = 2.0;
 /// Time for which whatever kept the vehicle from continuing still does; once the vehicle counts as
-/// blocked it is [`BLOCKED_HINDERED_WITHIN`]: a neighbour that sways at the edge of the path must not make the block
-/// begin again and again.
+/// blocked it is [`BLOCKED_HINDERED_WITHIN`]: a neighbour that sways at the edge of the path must
+/// not make the block begin again and again.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time without a hindrance after which a blocked vehicle is free.
 const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
-/// Time under a pilot's control after which the pilot keeps the vehicle for good: others fly around it.
+/// Time under a pilot's control after which the pilot keeps the vehicle for good: others fly around
+/// it.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Time after which an abort is over whose end the autopilot does not report.
 const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
-/// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for others.
+/// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for
+/// others.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Distance from the end of a path aside within which a blocked vehicle stands aside, metres.
 const SWAY_ASIDE_M: f32 = 0.5;
@@ -108,9 +116,11 @@ pub(crate) struct Detours {
     detour_ready: bool,
     /// Number of detours that were not found since another vehicle last moved.
     failures: u8,
-    /// The last one was not found although all others lie or rest for good, or for a while from here, whichever moved.
+    /// The last one was not found although all others lie or rest for good, or for a while from
+    /// here, whichever moved.
     no_retry: bool,
-    /// Detours not found from here, whichever moved between; how far along the path that is, and since when.
+    /// Detours not found from here, whichever moved between; how far along the path that is, and
+    /// since when.
     failures_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
@@ -194,7 +204,8 @@ impl Detours {
         self.left_plan
     }
 
-    /// Place where the vehicle could come back to its path over a field, metres, beyond what blocks the path.
+    /// Place where the vehicle could come back to its path over a field, metres, beyond what blocks
+    /// the path.
     pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -227,7 +238,8 @@ impl Detours {
             && self.field_searches.may_seek(view.now)
     }
 
-    /// The vehicle's own plan has come, or will not: the vehicle is on its path again, or has to do without.
+    /// The vehicle's own plan has come, or will not: the vehicle is on its path again, or has to do
+    /// without.
     pub(crate) fn end_field_detour(&mut self, came: bool) {
         if came {
             let field_searches = self.field_searches;
@@ -290,7 +302,8 @@ impl Detours {
             }
             State::Follow => held && stands,
             State::Climb => {
-                view.guidance.filter.is_stopped() && view.telemetry.velocity.length() < MAX_HOVER_MPS
+                view.guidance.filter.is_stopped()
+                    && view.telemetry.velocity.length() < MAX_HOVER_MPS
             }
             // Blocked on its way down it stays there.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
@@ -304,18 +317,22 @@ impl Detours {
     pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> ReportedPlace {
         let t = telemetry;
         let vague = self.before_jump.is_some() || t.position_age(now) > MAX_POSITION_AGE;
-        let (position, at) = self.before_jump.unwrap_or((t.position, t.position_at.unwrap_or_default()));
+        let (position, at) =
+            self.before_jump.unwrap_or((t.position, t.position_at.unwrap_or_default()));
         ReportedPlace { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
 
-    /// Remembers, on entering a state, where it was before its position jumped: where that jumped to may be wrong.
+    /// Remembers, on entering a state, where it was before its position jumped: where that jumped
+    /// to may be wrong.
     pub(crate) fn save_place_before_jump<const V: usize, const W: usize, const G: usize>(
         &mut self,
         to: State,
         view: &DetourView<'_, V, W, G>,
     ) {
         match to {
-            State::PositionLost if self.before_jump.is_none() && view.telemetry.is_settling(view.now) => {
+            State::PositionLost
+                if self.before_jump.is_none() && view.telemetry.is_settling(view.now) =>
+            {
                 let path = view.mission.plan().map(|plan| &plan.path);
                 let on_path = path.and_then(|path| path.point_at(view.guidance.along_m()));
                 self.before_jump = Some((on_path.unwrap_or(view.telemetry.position), view.now));
@@ -331,8 +348,9 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> Option<Instant> {
         let now = view.now;
-        self.left_plan |=
-            view.config.roster.len() > 1 && self.is_out_of_plan(view) && view.mission.plan().is_some();
+        self.left_plan |= view.config.roster.len() > 1
+            && self.is_out_of_plan(view)
+            && view.mission.plan().is_some();
         let on_ground = matches!(view.mission.state(), State::Scheduled | State::PadReplanning);
         let stopped = matches!(view.mission.state(), State::Blocked | State::Replanning);
         if !on_ground && !stopped && view.mission.state() != State::Follow {
@@ -367,7 +385,8 @@ impl Detours {
         Some(ScanResult { clear_at: (!in_the_way).then_some(began) })
     }
 
-    /// Decides whether the vehicle is blocked, since when all have stood, and whether it claims its turn.
+    /// Decides whether the vehicle is blocked, since when all have stood, and whether it claims its
+    /// turn.
     fn update_blocked<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,
@@ -388,15 +407,20 @@ impl Detours {
             FlownPath::Detour(_) => false,
             FlownPath::Astray => true,
         };
-        let dead_end =
-            self.is_stopped_by_others(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END_AFTER);
-        let free =
-            if view.mission.state() == State::Blocked { BLOCKED_HINDERED_WITHIN } else { HINDERED_WITHIN };
+        let dead_end = self.is_stopped_by_others(view)
+            && self.quiet_since.is_some_and(|at| now - at > DEAD_END_AFTER);
+        let free = if view.mission.state() == State::Blocked {
+            BLOCKED_HINDERED_WITHIN
+        } else {
+            HINDERED_WITHIN
+        };
         let stopped = self.is_stopped(view, free);
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.obstructed);
         let along_m = view.guidance.along_m();
-        if self.blocked && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + BLOCKED_AGAIN_M) {
+        if self.blocked
+            && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + BLOCKED_AGAIN_M)
+        {
             self.blocked_here = Some((along_m, now));
         }
         if !view.neighbours.are_all_standing(now) {
@@ -405,20 +429,23 @@ impl Detours {
         } else if self.quiet_since.is_none() {
             self.quiet_since = Some(now);
         }
-        let claims =
-            self.may_claim_turn(view) && !view.neighbours.is_turn_claimed_before(view.config.system_id, now);
+        let claims = self.may_claim_turn(view)
+            && !view.neighbours.is_turn_claimed_before(view.config.system_id, now);
         self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
-    /// Whether another vehicle has stopped it for long: one that lets it go first, or over a field one off the plan.
+    /// Whether another vehicle has stopped it for long: one that lets it go first, or over a field
+    /// one off the plan.
     fn is_stopped<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
         free: Duration,
     ) -> bool {
         let (now, filter) = (view.now, &view.guidance.filter);
-        let for_good = view.config.division.is_some() && !view.neighbours.follows_plan(filter.last_blocker());
-        filter.blocked_for(now, free) > STUCK_AFTER || (for_good && filter.hindered_for(now) > STUCK_AFTER)
+        let for_good =
+            view.config.division.is_some() && !view.neighbours.follows_plan(filter.last_blocker());
+        filter.blocked_for(now, free) > STUCK_AFTER
+            || (for_good && filter.hindered_for(now) > STUCK_AFTER)
     }
 
     /// Whether an obstacle is on the path; `None` while the scan is not finished.
@@ -431,9 +458,11 @@ impl Detours {
         let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
-        // One that hovers sways: what blocked the path over a field blocks it until it is as far away as a detour keeps.
-        let waits =
-            view.config.division.is_some() && view.mission.state() == State::Blocked && self.obstructed;
+        // One that hovers sways: what blocked the path over a field blocks it until it is as far
+        // away as a detour keeps.
+        let waits = view.config.division.is_some()
+            && view.mission.state() == State::Blocked
+            && self.obstructed;
         let beside_m = if waits { DETOUR_MARGIN_M } else { BLOCKED_WITHIN_M };
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
@@ -446,14 +475,22 @@ impl Detours {
                 Some(obstacle) => tell(*obstacle),
                 None => neighbours.for_each_zone_of(source - new.len(), now, apart_m, tell),
             },
-            // Over a field it photographs what comes before, and flies around what blocks the way when it comes there.
+            // Over a field it photographs what comes before, and flies around what blocks the way
+            // when it comes there.
             |obstacle| {
                 let until_m = match view.config.division {
                     Some(_) => along_m.max(0.0) + LOOK_AHEAD_M,
                     None => f32::INFINITY,
                 };
                 let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);
-                detour::is_path_blocked(&plan.path, along_m..until_m, climb_m, descent_m, &here, obstacle)
+                detour::is_path_blocked(
+                    &plan.path,
+                    along_m..until_m,
+                    climb_m,
+                    descent_m,
+                    &here,
+                    obstacle,
+                )
             },
         )
     }

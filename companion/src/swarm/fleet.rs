@@ -1,11 +1,14 @@
-//! Which vehicles of a coverage mission still fly, and the division of what the others left: agreed on with nobody in charge.
+//! Which vehicles of a coverage mission still fly, and the division of what the others left: agreed
+//! on with nobody in charge.
 //!
-//! Each vehicle keeps an entry for every vehicle of the roster. Entries only grow and are merged by maximum, so lost, repeated
-//! and reordered messages do no harm. Where a vehicle is lost or leaves, each of the others states once how far it flies on: its
-//! promise. It holds there. From the entries all compute the same division, report its hash, and fly on once all that live
-//! have reported the same one and hold ([`Fleet::step`]). A vehicle photographs only while it has its lease: within
-//! [`LEASE`] a majority said that it hears it. Others take its part no sooner than [`SILENT_AFTER`] after each of them last heard
-//! it. Why no waypoint has two owners is in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
+//! Each vehicle keeps an entry for every vehicle of the roster. Entries only grow and are merged by
+//! maximum, so lost, repeated and reordered messages do no harm. Where a vehicle is lost or leaves,
+//! each of the others states once how far it flies on: its promise. It holds there. From the
+//! entries all compute the same division, report its hash, and fly on once all that live have
+//! reported the same one and hold ([`Fleet::step`]). A vehicle photographs only while it has its
+//! lease: within [`LEASE`] a majority said that it hears it. Others take its part no sooner than
+//! [`SILENT_AFTER`] after each of them last heard it. Why no waypoint has two owners is in
+//! `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
 
 use heapless::Vec;
 use planner_core::file::CRC32;
@@ -17,7 +20,8 @@ mod lots;
 
 pub use lots::{DivisionInput, DivisionInputs};
 
-/// Time for which a vehicle continues photographing after a majority last reported that they hear it.
+/// Time for which a vehicle continues photographing after a majority last reported that they hear
+/// it.
 pub const LEASE: Duration = Duration::from_secs(20);
 /// Greatest age of a report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
@@ -147,12 +151,20 @@ impl<const V: usize> Fleet<V> {
 
     /// Forgets the fleet's state and takes part again under this incarnation number.
     fn rejoin(&mut self, incarnation: u8) {
-        *self = Self { lease_at: self.lease_at, ..Self::new(self.own, self.members.len(), self.limits) };
+        *self = Self {
+            lease_at: self.lease_at,
+            ..Self::new(self.own, self.members.len(), self.limits)
+        };
         self.members[self.own].entry.incarnation = incarnation;
     }
 
     /// One step: the knowledge of all vehicles, the lease, and the division under way.
-    pub fn step(&mut self, now: Instant, own: &OwnReport, hearing: impl Fn(usize) -> MemberReception) {
+    pub fn step(
+        &mut self,
+        now: Instant,
+        own: &OwnReport,
+        hearing: impl Fn(usize) -> MemberReception,
+    ) {
         // The vehicle's path may be that of the division before yet.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[self.own].entry;
@@ -176,7 +188,9 @@ impl<const V: usize> Fleet<V> {
         }
         if self.has_lease(now) {
             let silent = self.limits.silent;
-            for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent) {
+            for member in
+                self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent)
+            {
                 member.entry.status = member.entry.status.max(MemberStatus::Lost);
             }
         }
@@ -193,8 +207,9 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether what some vehicle left is to be divided. What was promised binds until a division counts, even if the lost
-    /// vehicle turns out to have finished: it may count for others already.
+    /// Whether what some vehicle left is to be divided. What was promised binds until a division
+    /// counts, even if the lost vehicle turns out to have finished: it may count for others
+    /// already.
     pub fn is_dividing(&self) -> bool {
         let asks = |m: &FleetMember| match m.entry.status {
             MemberStatus::Alive => m.entry.commitment_dm.is_some(),
@@ -211,7 +226,8 @@ impl<const V: usize> Fleet<V> {
         member.in_roster && member.entry.status == MemberStatus::Alive
     }
 
-    /// Whether these are a majority of those that take part, or were lost: of half of them, the half with the lowest rank.
+    /// Whether these are a majority of those that take part, or were lost: of half of them, the
+    /// half with the lowest rank.
     fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
         let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
         let all = || self.members.iter().enumerate().filter(|(_, m)| counts(m));
@@ -256,14 +272,15 @@ impl<const V: usize> Fleet<V> {
         self.hash == 0 && !self.division_inputs.is_empty()
     }
 
-    /// The lots of every division that counts, and of the one under way where that is to be computed.
+    /// The lots of every division that counts, and of the one under way where that is to be
+    /// computed.
     pub fn losses(&self) -> impl Iterator<Item = &[DivisionInput]> {
         let under_way = self.needs_division().then_some(&self.division_inputs);
         self.divisions.iter().chain(under_way).map(|lots| &lots[..])
     }
 
-    /// Takes the CRC of the plan that was computed. The hash covers what it follows from as well: plans may be alike of which
-    /// one counts on a vehicle that the other has given up.
+    /// Takes the CRC of the plan that was computed. The hash covers what it follows from as well:
+    /// plans may be alike of which one counts on a vehicle that the other has given up.
     pub fn take_plan_crc(&mut self, plan_crc: u32) {
         if self.needs_division() {
             let mut digest = CRC32.digest();
@@ -283,8 +300,9 @@ impl<const V: usize> Fleet<V> {
             let member = &self.members[rank];
             member.hash == self.hash && member.entry.holds
         };
-        let is_down =
-            |m: &FleetMember| m.entry.status != MemberStatus::Lost || now - m.heard_at >= self.limits.down;
+        let is_down = |m: &FleetMember| {
+            m.entry.status != MemberStatus::Lost || now - m.heard_at >= self.limits.down
+        };
         self.hash != 0
             && self.members.iter().filter(|m| m.in_roster).all(is_down)
             && (0..self.members.len()).filter(|rank| self.is_alive(*rank)).all(agrees)
@@ -331,7 +349,10 @@ impl<const V: usize> Fleet<V> {
                 let behind = roster.divisions < self.divisions.len() as u8 && rank != sender;
                 // The vehicle may have finished its share of a division that the sender does not
                 // know; it reports that itself.
-                if !(behind && entry.status == MemberStatus::Left && self.members[rank].heard_itself) {
+                if !(behind
+                    && entry.status == MemberStatus::Left
+                    && self.members[rank].heard_itself)
+                {
                     self.merge_entry(rank, entry, same);
                 }
                 if same && entry.agrees && rank != sender && roster.hash != 0 {
@@ -341,7 +362,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Lets the division count that counts for the sender, if it was reported here: then the others counted on that.
+    /// Lets the division count that counts for the sender, if it was reported here: then the others
+    /// counted on that.
     fn adopt_division(&mut self, roster: &RosterReport) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
@@ -394,7 +416,8 @@ impl<const V: usize> Fleet<V> {
         // A vehicle that has left computes no more, so its knowledge of the division under way gets
         // old.
         let hash = if self.is_alive(self.own) { self.hash } else { 0 };
-        let entry = |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
+        let entry =
+            |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
         RosterReport {
             divisions: self.divisions.len() as u8,
             first: first as u8,
@@ -431,7 +454,8 @@ impl<const V: usize> Fleet<V> {
         now - self.lease_at <= self.limits.lease
     }
 
-    /// Time since a majority last said that it hears this vehicle; nothing where it takes no part any more, and needs no lease.
+    /// Time since a majority last said that it hears this vehicle; nothing where it takes no part
+    /// any more, and needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
         if self.is_alive(self.own) { now - self.lease_at } else { Duration::default() }
     }
@@ -469,7 +493,8 @@ impl<const V: usize> Fleet<V> {
         self.committed_hash
     }
 
-    /// Whether the others have counted it as lost, or have divided its part; one that has finished its part has none.
+    /// Whether the others have counted it as lost, or have divided its part; one that has finished
+    /// its part has none.
     pub fn is_excluded(&self) -> bool {
         self.excluded && self.members[self.own].entry.status != MemberStatus::Finished
     }
@@ -486,7 +511,8 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether another vehicle that lives has not been heard for `span`.
     pub fn is_any_missing(&self, now: Instant, span: Duration) -> bool {
-        let missed = |rank: &usize| self.is_alive(*rank) && now - self.members[*rank].heard_at >= span;
+        let missed =
+            |rank: &usize| self.is_alive(*rank) && now - self.members[*rank].heard_at >= span;
         (0..self.members.len()).any(|rank| missed(&rank))
     }
 }

@@ -1,8 +1,10 @@
-//! The neighbours as last heard on the swarm link, one slot for each system id, in the mission frame.
+//! The neighbours as last heard on the swarm link, one slot for each system id, in the mission
+//! frame.
 //!
 //! From the byte to the speed scale: GLOBAL_POSITION_INT → [`Neighbours::handle_position`] → ENU in
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
-//! [`Neighbours::states_at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
+//! [`Neighbours::states_at`] brings the ages up to date, and `planner_core::deconflict::advise`
+//! makes of them a speed scale.
 
 mod bounds;
 mod contact;
@@ -28,12 +30,15 @@ pub(crate) use self::met::{FilterNeighbour, ReachQuery};
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{IntentEcho, MessageDelay};
-use crate::link::intent::{BLOCKED, GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
+use crate::link::intent::{
+    BLOCKED, GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING,
+};
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
-/// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
-/// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
+/// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are
+/// known by their position only: whatever else they send changes nothing. A few are kept, in what
+/// the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
     contacts: Vec<NeighbourEntry, V>,
@@ -69,8 +74,8 @@ pub struct Neighbours<const V: usize> {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The vehicles of a roster sorted by id, without the own one; no other vehicle heard yet. None of them flies
-    /// faster along its path than `nominal_mps`, or than it lands.
+    /// The vehicles of a roster sorted by id, without the own one; no other vehicle heard yet. None
+    /// of them flies faster along its path than `nominal_mps`, or than it lands.
     pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
@@ -114,8 +119,8 @@ impl<const V: usize> Neighbours<V> {
         self.range_edge_m.is_finite()
     }
 
-    /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the radio may not reach: no
-    /// radio has failed.
+    /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the
+    /// radio may not reach: no radio has failed.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports(LANDED | OUT_OF_PLAN)
@@ -188,7 +193,10 @@ impl<const V: usize> Neighbours<V> {
     /// Rank in the roster of a vehicle whose intents are of our mission.
     fn roster_rank(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.roster_index(id)?;
-        self.contacts[at].intent_at.is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME).then_some(at)
+        self.contacts[at]
+            .intent_at
+            .is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME)
+            .then_some(at)
     }
 
     fn roster_index(&self, id: u8) -> Option<usize> {
@@ -228,8 +236,9 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that decodes and is of our mission:
-    /// what anybody can send must not make the next true one look late. Positions carry their time instead.
+    /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that
+    /// decodes and is of our mission: what anybody can send must not make the next true one look
+    /// late. Positions carry their time instead.
     pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             let contact = &mut self.contacts[at];
@@ -241,7 +250,8 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// A neighbour's position. It is the roster's only if this vehicle's intents are of our mission; else it is a stranger's.
+    /// A neighbour's position. It is the roster's only if this vehicle's intents are of our
+    /// mission; else it is a stranger's.
     pub fn handle_position(
         &mut self,
         now: Instant,
@@ -274,8 +284,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// A neighbour's intent. It counts only from a vehicle of the roster and with our mission's CRC, its progress only if the plan
-    /// is ours too. `rank` is our own.
+    /// A neighbour's intent. It counts only from a vehicle of the roster and with our mission's
+    /// CRC, its progress only if the plan is ours too. `rank` is our own.
     pub fn handle_intent(
         &mut self,
         now: Instant,
@@ -284,7 +294,8 @@ impl<const V: usize> Neighbours<V> {
         mission_crc: u32,
         plan_crc: Option<u32>,
     ) {
-        let Some(at) = self.roster_index(intent.system_id).filter(|_| intent.mission_crc == mission_crc)
+        let Some(at) =
+            self.roster_index(intent.system_id).filter(|_| intent.mission_crc == mission_crc)
         else {
             return;
         };
@@ -320,15 +331,17 @@ impl<const V: usize> Neighbours<V> {
         contact.extent_m = fpu::sqrtf(contact.points_for_now().iter().fold(0.0, most));
         contact.update_place_on_points();
         (contact.may_come_down, contact.ground_m) = (intent.may_come_down, intent.ground_m);
-        contact.gates_open_up_to_m = if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };
+        contact.gates_open_up_to_m =
+            if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };
         contact.unheard_delay_s = intent.unheard_delay_s;
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m =
             shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position or progress was ever heard, or which is lost, with its age at `now`. A vehicle that is out opens
-    /// no gate before it was checked whether it blocks the path ([`Self::mark_path_clear`]).
+    /// Every neighbour whose position or progress was ever heard, or which is lost, with its age at
+    /// `now`. A vehicle that is out opens no gate before it was checked whether it blocks the path
+    /// ([`Self::mark_path_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
@@ -361,11 +374,14 @@ impl<const V: usize> Neighbours<V> {
         let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
         contact.is_some_and(|c| {
             let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
-            passed || c.out_since.is_some_and(|since| since <= self.clear_at) || c.is_dead(self.clear_at)
+            passed
+                || c.out_since.is_some_and(|since| since <= self.clear_at)
+                || c.is_dead(self.clear_at)
         })
     }
 
-    /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
+    /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for
+    /// so long that they lie.
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster]
             .iter()
@@ -375,18 +391,20 @@ impl<const V: usize> Neighbours<V> {
     /// Whether a vehicle of the roster counts as dead, but not yet as one that lies.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
         let roster = &self.contacts[..self.roster];
-        roster
-            .iter()
-            .any(|c| !c.reports(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down))
+        roster.iter().any(|c| {
+            !c.reports(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down)
+        })
     }
 
     /// Whether a vehicle of the roster has landed, or is out of the plan.
     pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
-        self.roster_index(id)
-            .is_some_and(|at| self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now))
+        self.roster_index(id).is_some_and(|at| {
+            self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now)
+        })
     }
 
-    /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.
+    /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having
+    /// flown.
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
         let waits = |c: &NeighbourEntry| {
             c.heard_at.is_none() || (c.reports(GROUNDED) && !c.reports(LANDED | OUT_OF_PLAN))
@@ -402,13 +420,16 @@ impl<const V: usize> Neighbours<V> {
 
     /// Greatest message delay of all vehicles that are heard, seconds.
     pub(crate) fn max_message_delay_s(&self) -> f32 {
-        self.contacts[..self.roster].iter().fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
+        self.contacts[..self.roster]
+            .iter()
+            .fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
     }
 
     /// Whether no vehicle of the roster is heard: then this vehicle's own radio is assumed faulty.
     #[inline(never)]
     pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
-        self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
+        self.roster > 0
+            && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
     /// The echo of one neighbour's last intent, of each in turn.
@@ -419,11 +440,13 @@ impl<const V: usize> Neighbours<V> {
 
     /// Vehicles heard lately, one bit for each rank.
     pub fn heard_bits(&self, now: Instant) -> u32 {
-        let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
+        let heard =
+            self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
         heard.fold(0, |bits, c| bits | 1 << c.rank)
     }
 
-    /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand and wait.
+    /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand
+    /// and wait.
     pub fn are_all_waiting(&self, now: Instant) -> bool {
         self.contacts[..self.roster].iter().all(|c| c.is_waiting(now))
     }
@@ -469,20 +492,23 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether a neighbour of the roster was heard within `span`, and one reported that it hears us.
+    /// Whether a neighbour of the roster was heard within `span`, and one reported that it hears
+    /// us.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
         let roster = &self.contacts[..self.roster];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
     }
 
-    /// Whether every other vehicle of the roster reported that it has landed or is out; true where there is none.
+    /// Whether every other vehicle of the roster reported that it has landed or is out; true where
+    /// there is none.
     pub fn are_all_at_rest(&self) -> bool {
         self.contacts[..self.roster].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
     }
 
-    /// Time since any neighbour of the roster was heard, or since one reported that it hears us, whichever is longer; zero when
-    /// all of them have landed or are out, or there are none. Where neither ever was, the time since `since`.
+    /// Time since any neighbour of the roster was heard, or since one reported that it hears us,
+    /// whichever is longer; zero when all of them have landed or are out, or there are none. Where
+    /// neither ever was, the time since `since`.
     pub fn silence_duration(&self, now: Instant, since: Instant) -> Duration {
         if self.are_all_at_rest() {
             return Duration::default();

@@ -33,17 +33,25 @@ impl Obstacles {
 
     /// Forgets the obstacle at this place.
     fn remove_at(&mut self, centre: &Point) {
-        while let Some(at) = self.known.iter().position(|o| (o.from - centre).length() < SAME_OBSTACLE_M) {
+        while let Some(at) =
+            self.known.iter().position(|o| (o.from - centre).length() < SAME_OBSTACLE_M)
+        {
             self.known.remove(at);
             self.avoided -= usize::from(at < self.avoided);
             self.requested -= usize::from(at < self.requested);
         }
     }
 
-    /// Takes an obstacle that is not on the map, ENU about `origin`: its centre, and its radius, to which the required clearance is
-    /// added; a radius that is not above zero revokes the one at
-    /// that place. It stays until revoked, or until the companion starts again: a wall does not go away by itself.
-    pub(crate) fn handle_command(&mut self, command: &Command, origin: &Geodetic, clearance_m: f32) -> u8 {
+    /// Takes an obstacle that is not on the map, ENU about `origin`: its centre, and its radius, to
+    /// which the required clearance is added; a radius that is not above zero revokes the one at
+    /// that place. It stays until revoked, or until the companion starts again: a wall does not go
+    /// away by itself.
+    pub(crate) fn handle_command(
+        &mut self,
+        command: &Command,
+        origin: &Geodetic,
+        clearance_m: f32,
+    ) -> u8 {
         let Some((lat, lon, alt_m)) = command.place else { return DENIED };
         let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
         let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
@@ -56,11 +64,18 @@ impl Obstacles {
             return ACCEPTED;
         }
         let radius_m = command.param1 + clearance_m;
-        let told = |o: &KeepOutZone| (o.from - centre).length() < SAME_OBSTACLE_M && o.radius_m >= radius_m;
+        let told = |o: &KeepOutZone| {
+            (o.from - centre).length() < SAME_OBSTACLE_M && o.radius_m >= radius_m
+        };
         if self.known.iter().any(told) {
             return ACCEPTED;
         }
-        match self.known.push(KeepOutZone { from: centre, to: centre, radius_m, kind: ZoneKind::Static }) {
+        match self.known.push(KeepOutZone {
+            from: centre,
+            to: centre,
+            radius_m,
+            kind: ZoneKind::Static,
+        }) {
             Ok(()) => ACCEPTED,
             Err(_) => TEMPORARILY_REJECTED,
         }

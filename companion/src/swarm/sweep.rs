@@ -1,8 +1,10 @@
-//! Is any of many things on the path? Asked a few at a time, since a control step is not to take longer with more neighbours.
+//! Is any of many things on the path? Asked a few at a time, since a control step is not to take
+//! longer with more neighbours.
 //!
-//! The things are stretches to keep off ([`KeepOutZone`]), given by sources: a neighbour gives up to 16 of them. A step asks about as
-//! many as its budget pays for, the next continues from there. One thing that is on the path answers at once, and its source is
-//! asked first the next time: what blocks the way mostly continues doing so. That nothing is, is known after all were asked.
+//! The things are stretches to keep off ([`KeepOutZone`]), given by sources: a neighbour gives up
+//! to 16 of them. A step asks about as many as its budget pays for, the next continues from there.
+//! One thing that is on the path answers at once, and its source is asked first the next time: what
+//! blocks the way mostly continues doing so. That nothing is, is known after all were asked.
 
 use planner_core::detour::KeepOutZone;
 
@@ -19,9 +21,10 @@ pub struct IncrementalScan {
 }
 
 impl IncrementalScan {
-    /// Asks on: `tell` gives the things of a source, each costs `each` of `budget` and a source one. `Some(true)` once one of
-    /// them `is_in_the_way`, `Some(false)` when none of all `sources` is, then from the first; `None` when the budget is spent, which has to
-    /// begin with at least `each`. Where the number of sources changes all are asked again.
+    /// Asks on: `tell` gives the things of a source, each costs `each` of `budget` and a source
+    /// one. `Some(true)` once one of them `is_in_the_way`, `Some(false)` when none of all `sources`
+    /// is, then from the first; `None` when the budget is spent, which has to begin with at least
+    /// `each`. Where the number of sources changes all are asked again.
     pub fn continue_scan(
         &mut self,
         sources: usize,
@@ -75,7 +78,8 @@ mod tests {
 
     use super::*;
 
-    /// Seven sources of so many things; the first number of a thing is its source's, the second its own.
+    /// Seven sources of so many things; the first number of a thing is its source's, the second its
+    /// own.
     const THINGS: [usize; 7] = [0, 3, 16, 0, 1, 0, 2];
 
     fn tell(source: usize, tell: &mut dyn FnMut(KeepOutZone)) {
@@ -89,7 +93,8 @@ mod tests {
     fn ask(sweep: &mut IncrementalScan, each: u16, at: Option<(f32, f32)>) -> (bool, usize) {
         for steps in 1.. {
             let mut budget = 5;
-            let is = |k: &KeepOutZone| at.is_some_and(|(source, i)| k.from.x == source && k.from.y == i);
+            let is =
+                |k: &KeepOutZone| at.is_some_and(|(source, i)| k.from.x == source && k.from.y == i);
             if let Some(found) = sweep.continue_scan(THINGS.len(), &mut budget, each, tell, is) {
                 return (found, steps);
             }

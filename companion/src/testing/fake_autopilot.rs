@@ -1,6 +1,6 @@
 //! A scripted autopilot, PX4 or ArduCopter, for unit tests: the modes, acks and streams that the
-//! companion relies on, and a vehicle that goes where the setpoint says at a limited speed. The real
-//! closed loop is host-sim's.
+//! companion relies on, and a vehicle that goes where the setpoint says at a limited speed. The
+//! real closed loop is host-sim's.
 
 extern crate std;
 use std::vec::Vec;
@@ -101,15 +101,16 @@ pub struct Bench {
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
-    /// Times that the planner takes for its answers, one after the other, from the first again; none: it answers at once.
+    /// Times that the planner takes for its answers, one after the other, from the first again;
+    /// none: it answers at once.
     pub planner_takes: Vec<Duration>,
     plan_requests: PlanRequests,
     answer_under_way: Option<planner::Answer>,
     answer_count: usize,
     /// The vehicle's plan before it requested a detour.
     own_plan: Option<Plan>,
-    /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
-    /// flags of its intent, progress, CRC of its plan.
+    /// The first other vehicle of the roster, or 77, as it reports itself five times a second:
+    /// place, flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
     /// When it last knew where it is; none: always.
     pub neighbour_clock: Option<Instant>,
@@ -233,7 +234,8 @@ impl Bench {
                     break;
                 }
                 let mut input = &out[..len];
-                let frame = self.framers[link as usize].next(self.now, &mut input).expect("a whole frame");
+                let frame =
+                    self.framers[link as usize].next(self.now, &mut input).expect("a whole frame");
                 assert_eq!((frame.system, frame.component), (SYSTEM, crate::COMPANION_COMPONENT));
                 self.receive(link, frame);
             }
@@ -287,7 +289,8 @@ impl Bench {
     /// Started, while vehicle 77 stands on its pad, from where it follows the plan.
     pub fn accompanied(config: Config<4>) -> Self {
         let mut bench = Self::new(config);
-        bench.neighbour = Some((Point::new(8.0, 20.0, 0.0), intent::ON_PLAN | intent::GROUNDED, 0.0, 5));
+        bench.neighbour =
+            Some((Point::new(8.0, 20.0, 0.0), intent::ON_PLAN | intent::GROUNDED, 0.0, 5));
         bench.until(crate::State::Ready, 6.0);
         bench.start();
         bench

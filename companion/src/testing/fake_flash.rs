@@ -1,4 +1,5 @@
-//! A simulated flash: words of 32 bytes that tear when the power goes, and may not be readable afterwards; and files to keep in it.
+//! A simulated flash: words of 32 bytes that tear when the power goes, and may not be readable
+//! afterwards; and files to keep in it.
 
 extern crate std;
 use std::collections::HashSet;
@@ -17,7 +18,8 @@ use rand_pcg::Pcg32;
 
 use crate::storage::mission_file::{self, MissionBlock, MissionHeader, MissionVehicle};
 use crate::storage::store::{
-    ErasePermission, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM, MAX_READ, ReadFlash, Store, WORD,
+    ErasePermission, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM, MAX_READ, ReadFlash,
+    Store, WORD,
 };
 
 /// Layout like the H743's bank, but smaller, so that many cuts are tried in little time.
@@ -102,7 +104,10 @@ impl Flash {
         for (i, word) in bytes.chunks(WORD).enumerate() {
             let at = at as usize + i * WORD;
             let blank = self.bytes[at..at + WORD].iter().all(|b| *b == 0xFF);
-            assert!(blank && !self.torn.contains(&((at / WORD) as u32)), "programmed twice at {at:#x}");
+            assert!(
+                blank && !self.torn.contains(&((at / WORD) as u32)),
+                "programmed twice at {at:#x}"
+            );
             if self.goes() {
                 self.tear(at, word);
                 return Err(Cut);
@@ -167,7 +172,8 @@ pub fn started(flash: &mut Flash) -> Store {
 }
 
 pub fn roadmap(nodes: usize) -> Vec<u8> {
-    let points: Vec<Point> = (0..nodes).map(|i| Point::new(i as f32, (i % 7) as f32, 2.0)).collect();
+    let points: Vec<Point> =
+        (0..nodes).map(|i| Point::new(i as f32, (i % 7) as f32, 2.0)).collect();
     let edges: Vec<Edge> =
         (1..nodes).map(|i| Edge { a: i as u16 - 1, b: i as u16, clearance_m: 1.0 }).collect();
     let header = RoadmapHeader {
@@ -181,7 +187,8 @@ pub fn roadmap(nodes: usize) -> Vec<u8> {
     };
     let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), LANDMARKS).unwrap()];
     let mut workspace = std::boxed::Box::new(planner_core::search::SearchWorkspace::<1024>::new());
-    roadmap::write_with_landmarks(&header, &points, &edges, &[], &mut workspace, &mut bytes).unwrap();
+    roadmap::write_with_landmarks(&header, &points, &edges, &[], &mut workspace, &mut bytes)
+        .unwrap();
     bytes
 }
 

@@ -1,5 +1,5 @@
-//! Every public call of planner-core at its limits and beyond, on a board: run in QEMU, read by `tests/tests/board.rs`, which
-//! knows what the desk comes to. A call that panics is named.
+//! Every public call of planner-core at its limits and beyond, on a board: run in QEMU, read by
+//! `tests/tests/board.rs`, which knows what the desk comes to. A call that panics is named.
 #![no_std]
 #![no_main]
 

@@ -1,5 +1,6 @@
-//! What the board's work costs, in instructions, and what it computes, bit by bit: run in QEMU with `-icount shift=0`, read by
-//! `tests/tests/board.rs`. A roadmap lies in bank 2, a map beyond it. Every line is a name and numbers.
+//! What the board's work costs, in instructions, and what it computes, bit by bit: run in QEMU with
+//! `-icount shift=0`, read by `tests/tests/board.rs`. A roadmap lies in bank 2, a map beyond it.
+//! Every line is a name and numbers.
 #![no_std]
 #![no_main]
 
@@ -47,7 +48,8 @@ fn main() -> ! {
     let ws = CASES.take();
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, ws);
-        let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
+        let [costs, assignment, paths, scales] =
+            [case.costs, case.assignment, case.paths, case.scales];
         println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
     }
     println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
@@ -75,7 +77,8 @@ fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
     let request = cases::plan_request(&vehicles, &descents_m);
     let mut goals = Goals::new();
     print_instructions("costs", || plan::compute_costs(view, &request, ws)).expect("a cost matrix");
-    print_instructions("assign", || plan::assign_goals(&request, ws, &mut goals)).expect("an assignment");
+    print_instructions("assign", || plan::assign_goals(&request, ws, &mut goals))
+        .expect("an assignment");
     print_instructions("paths", || measure_paths(view, &goals, &mut ws.search));
     print_instructions("schedule", || plan::schedule_flights(view, &request, &goals, ws, plan))
         .expect("a schedule");

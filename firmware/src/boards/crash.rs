@@ -19,7 +19,9 @@ static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();
 /// Reads the kept record. Interrupts are off: tasks and the end of the program use it.
 fn read_record() -> Option<CrashRecord> {
     // SAFETY: nobody else runs, and any bytes are words.
-    CrashRecord::from_words(&unsafe { (&raw const RECORD).cast::<[u32; RECORD_WORDS]>().read_volatile() })
+    CrashRecord::from_words(&unsafe {
+        (&raw const RECORD).cast::<[u32; RECORD_WORDS]>().read_volatile()
+    })
 }
 
 fn write_record(kept: &CrashRecord) {
@@ -68,7 +70,8 @@ pub fn restart() -> ! {
     chosen::reset()
 }
 
-/// Keeps what happened, logs it and restarts. Kept first, and logged once: what is wrong may be the log.
+/// Keeps what happened, logs it and restarts. Kept first, and logged once: what is wrong may be the
+/// log.
 fn record_and_restart(text: &str) -> ! {
     cortex_m::interrupt::disable();
     let ended = update_record(|kept| {
@@ -84,7 +87,8 @@ fn record_and_restart(text: &str) -> ! {
     chosen::reset()
 }
 
-/// Records where the panic was, and restarts the board: no task or interrupt of higher priority runs on after a panic.
+/// Records where the panic was, and restarts the board: no task or interrupt of higher priority
+/// runs on after a panic.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     let mut text = String::<200>::new();

@@ -7,7 +7,8 @@ use embassy_executor::{InterruptExecutor, SendSpawner};
 static LINKS: InterruptExecutor = InterruptExecutor::new();
 static PLANS: InterruptExecutor = InterruptExecutor::new();
 
-/// Starts the executor of links and setpoints in an interrupt that no device has, its priority set. To be called once.
+/// Starts the executor of links and setpoints in an interrupt that no device has, its priority set.
+/// To be called once.
 pub(super) fn start_links(irq: impl InterruptNumber) -> SendSpawner {
     LINKS.start(irq)
 }

@@ -1,5 +1,5 @@
-//! How deep the stack ever was: it is painted before the start (cortex-m-rt's `paint-stack`), and what still has the paint was
-//! never used.
+//! How deep the stack ever was: it is painted before the start (cortex-m-rt's `paint-stack`), and
+//! what still has the paint was never used.
 #![expect(unsafe_code, reason = "the stack is read as memory")]
 
 use core::ops::Range;
@@ -24,7 +24,8 @@ pub fn used_bytes() -> usize {
     let end = addr_of!(_stack_end);
     let words = size_bytes() / size_of::<u32>();
     let untouched = (0..words).take_while(|&word| {
-        // SAFETY: between the linker's two symbols lies the stack, readable memory that the start has painted.
+        // SAFETY: between the linker's two symbols lies the stack, readable memory that the start
+        // has painted.
         unsafe { end.add(word).read_volatile() == PAINT }
     });
     size_bytes() - untouched.count() * size_of::<u32>()

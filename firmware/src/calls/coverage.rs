@@ -1,5 +1,6 @@
-//! The calls of a coverage mission: plans of one area for three vehicles, division of what is left after a loss, and areas at a
-//! board's capacities. What they answer is summed up bit by bit, to be compared with the desk's.
+//! The calls of a coverage mission: plans of one area for three vehicles, division of what is left
+//! after a loss, and areas at a board's capacities. What they answer is summed up bit by bit, to be
+//! compared with the desk's.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -47,7 +48,8 @@ impl Checksum {
 
     fn add_plan(&mut self, plan: &Plan<VEHICLES>) {
         for route in &plan.routes {
-            let numbers = [u32::from(route.vehicle), route.first, route.end, u32::from(route.layer)];
+            let numbers =
+                [u32::from(route.vehicle), route.first, route.end, u32::from(route.layer)];
             numbers.into_iter().for_each(|number| self.add(number));
             self.add(route.heading as u32);
             self.add_floats(&[route.ground_m, route.cost_m, route.cost_s]);
@@ -98,26 +100,42 @@ fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {
         let footprint = footprint.expect("a camera");
         sum.add(footprint.along_m.to_bits() ^ footprint.across_m.to_bits());
     }
-    let height_m = meter.call("footprint::Camera::height_for_gsd", 0, || sensor.height_for_gsd(0.02));
+    let height_m =
+        meter.call("footprint::Camera::height_for_gsd", 0, || sensor.height_for_gsd(0.02));
     sum.add(height_m.expect("a sensor").to_bits());
 }
 
 /// The whole plan of three vehicles, and its parts.
-fn measure_plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
+fn measure_plans(
+    meter: &mut impl Meter,
+    area: Area<'_>,
+    lent: &mut CoverageWorkspace,
+    sum: &mut Checksum,
+) {
     let transit = Transit::<1>::empty();
     let few = vehicles(LIMITED_VEHICLES);
     let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
-        let work =
-            Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+        let work = Work {
+            tracks,
+            transit: &transit,
+            vehicles: &few,
+            heights: HEIGHTS,
+            unit: TrackUnit::Waypoint,
+        };
         powell::powell(&work, &POWELL_SEARCH, powell, plan).expect("routes");
     });
     sum.add_tracks(tracks);
     sum.add_plan(plan);
-    let work =
-        Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let work = Work {
+        tracks,
+        transit: &transit,
+        vehicles: &few,
+        heights: HEIGHTS,
+        unit: TrackUnit::Waypoint,
+    };
     meter
         .call("powell::powell, 3", size_of_val(powell), || {
             powell::powell(&work, &POWELL_SEARCH, powell, plan)
@@ -126,10 +144,13 @@ fn measure_plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut CoverageWork
     let pack = &mut powell.pack;
     for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
         let work = Work { unit, ..work };
-        meter.call("pack::binpat, 3", size_of_val(pack), || pack::binpat(&work, pack, plan)).expect("routes");
+        meter
+            .call("pack::binpat, 3", size_of_val(pack), || pack::binpat(&work, pack, plan))
+            .expect("routes");
         sum.add_plan(plan);
     }
-    let bound_s = meter.call("bound::lower_bound_s, 3", 0, || lower_bound_s(&work)).expect("a bound");
+    let bound_s =
+        meter.call("bound::lower_bound_s, 3", 0, || lower_bound_s(&work)).expect("a bound");
     sum.add(bound_s.to_bits());
     // Each has flown ten waypoints, and the first is lost.
     let done = flown_ranges(plan, 10);
@@ -180,15 +201,24 @@ fn measure_division(
         .expect("lanes");
     assert_eq!(tracks.lanes().len(), LANES);
     sum.add_tracks(tracks);
-    let work =
-        Work { tracks, transit: &transit, vehicles: &many, heights: HEIGHTS, unit: TrackUnit::Waypoint };
-    meter.call("pack::binpat, 32", size_of_val(pack), || pack::binpat(&work, pack, plan)).expect("routes");
+    let work = Work {
+        tracks,
+        transit: &transit,
+        vehicles: &many,
+        heights: HEIGHTS,
+        unit: TrackUnit::Waypoint,
+    };
+    meter
+        .call("pack::binpat, 32", size_of_val(pack), || pack::binpat(&work, pack, plan))
+        .expect("routes");
     sum.add_plan(plan);
     for number in [0, 1000, tracks.waypoint_count() - 1] {
-        let place =
-            meter.call("lanes::Tracks::waypoint", 0, || tracks.waypoint(number)).expect("it is there");
-        let along_m =
-            meter.call("lanes::Tracks::distance_to_waypoint_m", 0, || tracks.distance_to_waypoint_m(number));
+        let place = meter
+            .call("lanes::Tracks::waypoint", 0, || tracks.waypoint(number))
+            .expect("it is there");
+        let along_m = meter.call("lanes::Tracks::distance_to_waypoint_m", 0, || {
+            tracks.distance_to_waypoint_m(number)
+        });
         sum.add_floats(&[place.x, place.y, along_m]);
     }
     // Whole lanes from where each began: no lane is cut in two, so all fit again.
@@ -197,7 +227,8 @@ fn measure_division(
         let (from, to) = (lane(range.first), lane(range.end - 1));
         WaypointRange { first: from.first, end: to.first + to.count }
     };
-    let mut done: Vec<WaypointRange, VEHICLES> = flown_ranges(plan, 10).into_iter().map(whole).collect();
+    let mut done: Vec<WaypointRange, VEHICLES> =
+        flown_ranges(plan, 10).into_iter().map(whole).collect();
     for k in 1..done.len() {
         done[k].first = done[k].first.max(done[k - 1].end);
     }
@@ -216,22 +247,27 @@ fn measure_division(
     sum.add_tracks(left);
     sum.add_plan(plan);
     let last = left.waypoint_count() - 1;
-    sum.add(
-        meter.call("divide::original_waypoint_number, 32", 0, || {
-            divide::original_waypoint_number(&done, last)
-        }),
-    );
+    sum.add(meter.call("divide::original_waypoint_number, 32", 0, || {
+        divide::original_waypoint_number(&done, last)
+    }));
 }
 
 /// The way home, and aside, among zones and four things of each vehicle.
-fn measure_ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &mut Checksum) {
+fn measure_ways_home(
+    meter: &mut impl Meter,
+    transit: &Transit<'_, AREA_CORNERS>,
+    sum: &mut Checksum,
+) {
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::new();
     meter.call("transit::Transit::corners", 0, || transit.corners().len());
-    meter.call("transit::Transit::is_in_no_fly_zone", 0, || transit.is_in_no_fly_zone(&Flat::zeros()));
+    meter.call("transit::Transit::is_in_no_fly_zone", 0, || {
+        transit.is_in_no_fly_zone(&Flat::zeros())
+    });
     for case in 0..4 {
         let here = Point::new(150.0, 70.0 - 20.0 * case as f32, 25.0);
         let thing = |i: usize| {
-            let from = Point::new(-120.0 + 7.0 * (i % 32) as f32, -40.0 + 23.0 * (i / 32) as f32, 45.0);
+            let from =
+                Point::new(-120.0 + 7.0 * (i % 32) as f32, -40.0 + 23.0 * (i / 32) as f32, 45.0);
             let to = Point::new(from.x, from.y, if i.is_multiple_of(3) { from.z } else { 0.0 });
             KeepOutZone { from, to, radius_m: 2.0, kind: ZoneKind::Static }
         };
@@ -258,7 +294,8 @@ fn measure_ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>
     }
 }
 
-/// An area with as many vertices as there may be, some of them of no-fly zones with as many corners.
+/// An area with as many vertices as there may be, some of them of no-fly zones with as many
+/// corners.
 fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
     const ZONES: usize = AREA_CORNERS / 4;
     const OUTER: usize = AREA_VERTICES - AREA_CORNERS;
@@ -278,26 +315,36 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
         let end = (OUTER + 4 * (zone + 1)) as u16;
         rings.push(Ring { end, kind: RingKind::NoFly }).expect("there is room");
     }
-    let area = meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
+    let area =
+        meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
     let mut transit = Transit::<AREA_CORNERS>::empty();
     let bytes = size_of_val(&transit);
-    meter.call("transit::Transit::set_area, 32 corners", bytes, || transit.set_area(area)).expect("they fit");
+    meter
+        .call("transit::Transit::set_area, 32 corners", bytes, || transit.set_area(area))
+        .expect("they fit");
     for k in 0..16 {
-        let (from, to) = (Flat::new(-150.0, 10.0 * k as f32 - 80.0), Flat::new(150.0, 70.0 - 9.0 * k as f32));
-        let clear = meter.call("transit::Transit::is_line_clear", 0, || transit.is_line_clear(&from, &to));
-        let far_m = meter.call("transit::Transit::distance_m", 0, || transit.distance_m(&from, &to));
+        let (from, to) =
+            (Flat::new(-150.0, 10.0 * k as f32 - 80.0), Flat::new(150.0, 70.0 - 9.0 * k as f32));
+        let clear =
+            meter.call("transit::Transit::is_line_clear", 0, || transit.is_line_clear(&from, &to));
+        let far_m =
+            meter.call("transit::Transit::distance_m", 0, || transit.distance_m(&from, &to));
         let mut corners: Vec<Flat, AREA_CORNERS> = Vec::new();
         meter
-            .call("transit::Transit::shortest_path", 0, || transit.shortest_path(&from, &to, &mut corners))
+            .call("transit::Transit::shortest_path", 0, || {
+                transit.shortest_path(&from, &to, &mut corners)
+            })
             .expect("a way");
-        let inside = meter.call("area::Area::is_in_no_fly_zone", 0, || area.is_in_no_fly_zone(&from));
+        let inside =
+            meter.call("area::Area::is_in_no_fly_zone", 0, || area.is_in_no_fly_zone(&from));
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
     measure_ways_home(meter, &transit, sum);
     let CoverageWorkspace { tracks, build, powell, plan, .. } = lent;
     let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
-    let direction =
-        meter.call("sweep::least_width, 256", size_of_val(&hull), || sweep::least_width(&area, &mut hull));
+    let direction = meter.call("sweep::least_width, 256", size_of_val(&hull), || {
+        sweep::least_width(&area, &mut hull)
+    });
     sum.add(direction.expect("a direction").along.x.to_bits());
     let bytes = size_of_val(build);
     let pattern = pattern(None, 16.0);
@@ -308,8 +355,13 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
         .expect("lanes");
     sum.add_tracks(tracks);
     let few = vehicles(LIMITED_VEHICLES);
-    let work =
-        Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let work = Work {
+        tracks,
+        transit: &transit,
+        vehicles: &few,
+        heights: HEIGHTS,
+        unit: TrackUnit::Waypoint,
+    };
     meter
         .call("pack::binpat, 3 around zones", size_of_val(&powell.pack), || {
             pack::binpat(&work, &mut powell.pack, plan)

@@ -1,5 +1,6 @@
-//! A coverage mission planned whole, as a board does where its companion asks for a plan, and divided again after a loss: lanes,
-//! routes and the flights of all vehicles with their departures. What is planned is summed up bit by bit, to be compared with the desk's.
+//! A coverage mission planned whole, as a board does where its companion asks for a plan, and
+//! divided again after a loss: lanes, routes and the flights of all vehicles with their departures.
+//! What is planned is summed up bit by bit, to be compared with the desk's.
 
 use companion::planner::coverage::{self, Request};
 use companion::storage::mission_file::coverage::{
@@ -63,7 +64,8 @@ const CLIMB_M: f32 = 2.0;
 /// Distance from pad to pad, metres.
 const PAD_SPACING_M: f32 = 5.0;
 /// Area of five vertices, 300 by 150 m.
-const FIVE_VERTICES: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
+const FIVE_VERTICES: [[f32; 2]; 5] =
+    [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 /// No-fly zones within that area.
 const NO_FLY_ZONES: [[[f32; 2]; 4]; 2] = [
     [[80.0, 40.0], [110.0, 45.0], [105.0, 80.0], [75.0, 70.0]],
@@ -82,7 +84,11 @@ pub fn measure_coverage_flights(
 
 /// Whole plans.
 #[inline(never)]
-fn measure_whole_plans(meter: &mut impl Meter, lent: &mut scratch::AreaWorkspace, out: &mut Flights) -> u32 {
+fn measure_whole_plans(
+    meter: &mut impl Meter,
+    lent: &mut scratch::AreaWorkspace,
+    out: &mut Flights,
+) -> u32 {
     let mut sum = 1;
     for zones in [&[][..], &NO_FLY_ZONES[..]] {
         measure_mission_plans(meter, zones, lent, out, &mut sum);
@@ -96,7 +102,8 @@ fn add_to_checksum(sum: &mut u32, flights: &Flights) {
 
 /// The rings of an area with so many zones.
 fn rings(zones: usize) -> Vec<Ring, 4> {
-    let zone = |k: usize| Ring { end: (FIVE_VERTICES.len() + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
+    let zone =
+        |k: usize| Ring { end: (FIVE_VERTICES.len() + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
     let outer = Ring { end: FIVE_VERTICES.len() as u16, kind: RingKind::Outer };
     core::iter::once(outer).chain((0..zones).map(zone)).collect()
 }
@@ -115,7 +122,12 @@ fn mission_file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
         ground_stations: companion::config::USUAL_GROUND_STATIONS,
     };
     let vehicle = |k: usize| MissionVehicle {
-        task: VehicleTask { id: 1 + k as u8, required_clearance_m: 1.5, climb_m: CLIMB_M, goal: None },
+        task: VehicleTask {
+            id: 1 + k as u8,
+            required_clearance_m: 1.5,
+            climb_m: CLIMB_M,
+            goal: None,
+        },
         start: Point::new(PAD_SPACING_M * k as f32, -10.0, CLIMB_M),
         radius_m: 0.3,
         speed_max_mps: 8.0,
@@ -147,7 +159,11 @@ fn mission_file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
 }
 
 fn spacing(lane_m: f32) -> Spacing {
-    Spacing { footprint: Footprint { along_m: lane_m, across_m: lane_m }, lane_m, waypoint_m: lane_m }
+    Spacing {
+        footprint: Footprint { along_m: lane_m, across_m: lane_m },
+        lane_m,
+        waypoint_m: lane_m,
+    }
 }
 
 /// The plans that a board makes from its mission file, before the start and after two losses.
@@ -162,9 +178,13 @@ fn measure_mission_plans(
     let len = mission_file(zones, &mut bytes);
     let view = MissionView::parse(&bytes[..len]).expect("it was written");
     let MissionKind::Coverage(area) = view.kind() else { return };
-    let request = Request { mission: &view, view: area, field: None, max_gates: GATES, photographed: &[] };
+    let request =
+        Request { mission: &view, view: area, field: None, max_gates: GATES, photographed: &[] };
     let names = match zones.is_empty() {
-        true => ["planner::coverage::plan_flights, 3", "planner::coverage::plan_flights, 3 after two losses"],
+        true => [
+            "planner::coverage::plan_flights, 3",
+            "planner::coverage::plan_flights, 3 after two losses",
+        ],
         false => [
             "planner::coverage::plan_flights, 3, zones",
             "planner::coverage::plan_flights, 3 after two losses, zones",
@@ -174,10 +194,12 @@ fn measure_mission_plans(
     let mut losses: Vec<[DivisionInput; LIMITED_VEHICLES], 2> = Vec::new();
     for lost in [None, Some(0), Some(1)] {
         if let Some(lost) = lost {
-            // Each in the air stands in the middle of its path; one that was lost before is on the ground.
+            // Each in the air stands in the middle of its path; one that was lost before is on the
+            // ground.
             let lot = |k: usize| {
                 let flies = out.flights[k].task.leaves_pad();
-                let along_dm = if flies { (out.flights[k].path.length_m() * 5.0) as u16 } else { 0 };
+                let along_dm =
+                    if flies { (out.flights[k].path.length_m() * 5.0) as u16 } else { 0 };
                 DivisionInput { alive: k > lost, along_dm }
             };
             losses.push(core::array::from_fn(lot)).expect("there is room");
@@ -185,7 +207,14 @@ fn measure_mission_plans(
         let name = names[usize::from(lost.is_some())];
         meter
             .call(name, lent_bytes, || {
-                coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+                coverage::plan_flights::<
+                    AREA_VERTICES,
+                    LANES,
+                    VEHICLES,
+                    AREA_CORNERS,
+                    VEHICLES,
+                    WAYPOINTS,
+                >(
                     &request,
                     losses.iter().map(|lots| &lots[..]),
                     &mut lent.area,
@@ -220,7 +249,8 @@ fn measure_plan_parts(
         measure_division(meter, &case, names, lent, out, &mut sum);
     }
     // The most lanes, for the most vehicles.
-    let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
+    let wide =
+        [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
     let rings = [Ring { end: 4, kind: RingKind::Outer }];
     let case = Case {
         area: Area::new(&wide, &rings).expect("an area"),
@@ -278,7 +308,9 @@ fn measure_division(
 ) {
     let mut transit = Transit::<AREA_CORNERS>::empty();
     transit.set_area(case.area).expect("they fit");
-    let scratch::CoverageWorkspace { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
+    let scratch::CoverageWorkspace {
+        tracks, build, powell, plan: routes, losses, schedule, ..
+    } = lent;
     let pack = &mut powell.pack;
     let looks = super::coverage::MAX_ORDER_CHANGES;
     let pattern = LanePattern {
@@ -289,8 +321,13 @@ fn measure_division(
     };
     tracks::build(&case.area, &pattern, &transit, build, tracks).expect("lanes");
     let (vehicles, pads) = vehicles(case.count);
-    let work =
-        Work { tracks, transit: &transit, vehicles: &vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let work = Work {
+        tracks,
+        transit: &transit,
+        vehicles: &vehicles,
+        heights: HEIGHTS,
+        unit: TrackUnit::Waypoint,
+    };
     losses.start_plan(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
     let manner = CaptureSettings { waypoint_m: case.lane_m, ..SWARM.capture };
@@ -303,11 +340,14 @@ fn measure_division(
     add_to_checksum(sum, out);
     let bytes = size_of_val(losses) + size_of_val(pack) + size_of_val(schedule);
     // Each lives on from where it holds, and the first is lost.
-    let fate = |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
+    let fate =
+        |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
     let fates: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();
     let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
     meter
-        .call(again_name, bytes, || losses::redivide_work(&loss, losses, pack, schedule, routes, out))
+        .call(again_name, bytes, || {
+            losses::redivide_work(&loss, losses, pack, schedule, routes, out)
+        })
         .expect("a division");
     add_to_checksum(sum, out);
 }

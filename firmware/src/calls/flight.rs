@@ -1,7 +1,8 @@
 //! A companion in flight by script, 32 neighbours around it: whole control steps to be counted.
 //!
-//! The script is a PX4 that goes where its setpoint says, and neighbours that send random places, intents and flags, or nothing.
-//! Half of the flights are hard: everybody is near, and off the plan, out of it, or silent for up to 90 s.
+//! The script is a PX4 that goes where its setpoint says, and neighbours that send random places,
+//! intents and flags, or nothing. Half of the flights are hard: everybody is near, and off the
+//! plan, out of it, or silent for up to 90 s.
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
@@ -101,7 +102,8 @@ pub fn has_many_off_plan(seed: u64) -> bool {
     seed.is_multiple_of(2)
 }
 
-/// Whether those of a flight's neighbours that fall silent are far away, at the edge of what a search for a detour looks at.
+/// Whether those of a flight's neighbours that fall silent are far away, at the edge of what a
+/// search for a detour looks at.
 fn has_silent_far_away(seed: u64) -> bool {
     seed % 8 == 2
 }
@@ -136,7 +138,8 @@ pub fn measure_flight<M: Meter>(
         };
         // One neighbour is always heard, so that this vehicle is not alone.
         (other.flags, other.silent) = (flags, silent && i > 0);
-        other.place = flight.place + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
+        other.place =
+            flight.place + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
         if other.silent && has_silent_far_away(seed) {
             other.place += random_point(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_default()
                 * random_between(&mut rng, MIN_FAR_M, MAX_FAR_M);
@@ -157,7 +160,8 @@ pub fn measure_flight<M: Meter>(
         if step.is_multiple_of(8) {
             let here = flight.place;
             for other in flight.others.iter_mut().filter(|other| !other.silent) {
-                other.place = here + offset_to_neighbour(seed, &mut rng, if hard { 3.0 } else { 12.0 });
+                other.place =
+                    here + offset_to_neighbour(seed, &mut rng, if hard { 3.0 } else { 12.0 });
             }
             flight.send_states_from(&mut rng, |other| !other.silent);
         }
@@ -168,8 +172,8 @@ pub fn measure_flight<M: Meter>(
     COUNTED_STEPS
 }
 
-/// One flight among neighbours that are near but rarely on the path, the safety filter alone counted by `meter`: in full flight,
-/// and stopped, when it looks further ahead.
+/// One flight among neighbours that are near but rarely on the path, the safety filter alone
+/// counted by `meter`: in full flight, and stopped, when it looks further ahead.
 ///
 /// # Panics
 /// The companion does not take off: the script is wrong.
@@ -240,7 +244,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         companion: &'a mut BoardCompanion,
         meter: &'a mut M,
     ) -> Self {
-        let far = || SimulatedNeighbour { place: far_away(), flags: AIR, progress_m: 1e3, silent: false };
+        let far =
+            || SimulatedNeighbour { place: far_away(), flags: AIR, progress_m: 1e3, silent: false };
         Self {
             companion,
             meter,
@@ -300,7 +305,12 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         if time > STEP_TIME || self.now.as_micros().is_multiple_of(1_000_000) {
             let [a, b, c, d] = self.mode.to_le_bytes();
             let armed = if self.armed { 129 } else { 1 };
-            self.feed_frame(Link::Autopilot, (SYSTEM, 1), HEARTBEAT, &[a, b, c, d, 2, 12, armed, 4, 3]);
+            self.feed_frame(
+                Link::Autopilot,
+                (SYSTEM, 1),
+                HEARTBEAT,
+                &[a, b, c, d, 2, 12, armed, 4, 3],
+            );
             let landed = if self.place.z > 9.05 { 2 } else { 1 };
             self.feed_frame(Link::Autopilot, (SYSTEM, 1), EXTENDED_SYS_STATE, &[0, landed]);
             let mut status = [0; 31];
@@ -358,7 +368,12 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);
-        self.feed_frame(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
+        self.feed_frame(
+            Link::Swarm,
+            (system_id, companion::COMPANION_COMPONENT),
+            TUNNEL,
+            &payload[..len],
+        );
         if self.has_area() {
             self.send_roster_from(system_id);
         }
@@ -410,9 +425,11 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
             loop {
                 let mut out = [0; MAX_FRAME_LEN];
                 let companion = &mut *self.companion;
-                let len = self.meter.call("Companion::poll_transmit", size_of::<BoardCompanion>(), || {
-                    companion.poll_transmit(link, &mut out)
-                });
+                let len = self.meter.call(
+                    "Companion::poll_transmit",
+                    size_of::<BoardCompanion>(),
+                    || companion.poll_transmit(link, &mut out),
+                );
                 if len == 0 {
                     break;
                 }
@@ -425,10 +442,12 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
             let Event::PlanRequested(wanted) = event else { continue };
             let (now, companion) = (self.now, &mut *self.companion);
             let mut obstacles = 0_usize;
-            let around = self.meter.call("Companion::detour_request", size_of::<BoardCompanion>(), || {
-                companion.detour_request(|_| obstacles += 1)
-            });
-            let answer = if around.is_some() { Err(PlanFailure::Unreachable) } else { Ok(self.plan) };
+            let around =
+                self.meter.call("Companion::detour_request", size_of::<BoardCompanion>(), || {
+                    companion.detour_request(|_| obstacles += 1)
+                });
+            let answer =
+                if around.is_some() { Err(PlanFailure::Unreachable) } else { Ok(self.plan) };
             self.meter.call("Companion::handle_plan", size_of::<BoardCompanion>(), || {
                 companion.handle_plan(now, wanted, answer);
             });

@@ -1,7 +1,9 @@
-//! Every public call of `planner-core` at its limits and beyond: numbers that are NaN, infinite, zero, negative, huge; indices
-//! that there are none of; memory that is too small. Each gives its answer or its error; none panics.
+//! Every public call of `planner-core` at its limits and beyond: numbers that are NaN, infinite,
+//! zero, negative, huge; indices that there are none of; memory that is too small. Each gives its
+//! answer or its error; none panics.
 //!
-//! Runs on the desk and on a board. The answers are summed up, so that a test sees both give the same.
+//! Runs on the desk and on a board. The answers are summed up, so that a test sees both give the
+//! same.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -85,7 +87,8 @@ impl<'a, L: Listener> Results<'a, L> {
 /// Points of hard numbers.
 pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
     let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
-    (0..HARD_NUMBERS.len() * 3).map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
+    (0..HARD_NUMBERS.len() * 3)
+        .map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
 }
 
 /// Makes all calls that need no roadmap.
@@ -113,7 +116,8 @@ fn call_frames(to: &mut Results<'_, impl Listener>) {
             let apart_m = to.call("frames::haversine_m", || frames::haversine_m(&a, &b));
             assert!(!(valid && apart_m.is_nan()), "{a:?} {b:?}");
             for kind in [Projection::Px4, Projection::ArduPilot] {
-                let ned = to.call("frames::geodetic_to_ned", || frames::geodetic_to_ned(kind, &a, &b));
+                let ned =
+                    to.call("frames::geodetic_to_ned", || frames::geodetic_to_ned(kind, &a, &b));
                 to.call("frames::ned_to_geodetic", || frames::ned_to_geodetic(kind, &a, &ned));
             }
         }
@@ -123,7 +127,8 @@ fn call_frames(to: &mut Results<'_, impl Listener>) {
 }
 
 /// A grid of 5 × 6 × 3 cells with one obstacle.
-const SHAPE: GridShape = GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
+const SHAPE: GridShape =
+    GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
 const WORDS: [u64; 4] = [1 << 17, 0, 0, 0];
 
 fn call_grids(to: &mut Results<'_, impl Listener>) {
@@ -134,9 +139,11 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         let count = to.call("voxel::GridShape::brick_count", || shape.brick_count());
         assert!(bricks.iter().all(|&b| b as usize <= count.max(b as usize)));
         to.call("voxel::GridShape::max", || shape.max());
-        let (word, mask) = to.call("voxel::GridShape::address", || shape.address([u32::MAX, 7, dims[i / 6]]));
+        let (word, mask) =
+            to.call("voxel::GridShape::address", || shape.address([u32::MAX, 7, dims[i / 6]]));
         to.add_count(word ^ mask as usize);
-        let grid = to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
+        let grid =
+            to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
         // Of these shapes only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
         assert!(grid.is_err(), "{shape:?}");
     }
@@ -151,7 +158,9 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         to.call("voxel::GridShape::center", || shape.center([u32::MAX; 3]));
     }
     // Bits of words that no cell has, and their neighbours that one has.
-    for (word, bit, padding) in [(1, 1, true), (1, 0, false), (2, 8, true), (2, 4, false), (0, 48, true)] {
+    for (word, bit, padding) in
+        [(1, 1, true), (1, 0, false), (2, 8, true), (2, 4, false), (0, 48, true)]
+    {
         let mut words = WORDS;
         words[word] |= 1 << bit;
         let checked = VoxelGrid::new(SHAPE, Outside::Free, &words).map(|_| ());
@@ -189,11 +198,12 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
                         segment::segment_clearance(&grid, &from, &p, hard)
                     })
                 });
-                distance
-                    .iter()
-                    .for_each(|&d| assert!((0.0..=hard.max(0.0)).contains(&d), "{p:?} {hard}: {d}"));
-                let alone =
-                    to.call("distance::point_clearance", || segment::point_clearance(&grid, &p, hard));
+                distance.iter().for_each(|&d| {
+                    assert!((0.0..=hard.max(0.0)).contains(&d), "{p:?} {hard}: {d}")
+                });
+                let alone = to.call("distance::point_clearance", || {
+                    segment::point_clearance(&grid, &p, hard)
+                });
                 assert_eq!(alone.to_bits(), distance[0].to_bits());
                 to.add_bool(clear);
                 to.add(distance[1]);
@@ -206,8 +216,9 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
         let edge = [MAX_SNAPPED, -MAX_SNAPPED, 0, i32::MAX, i32::MIN];
         for i in 0..25 {
             let (a, b) = ([edge[i % 5], 0, 1], [0, edge[i / 5], edge[(i * 3) % 5]]);
-            let touches =
-                to.call("walk::snapped_segment_touches", || segment::snapped_segment_touches(&grid, &a, &b));
+            let touches = to.call("walk::snapped_segment_touches", || {
+                segment::snapped_segment_touches(&grid, &a, &b)
+            });
             let beyond = a.iter().chain(&b).any(|c| c.unsigned_abs() > MAX_SNAPPED as u32);
             assert!(touches || !beyond, "{a:?} {b:?}");
         }
@@ -216,8 +227,8 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
 
 fn call_sampling(to: &mut Results<'_, impl Listener>) {
     let grid = VoxelGrid::new(SHAPE, Outside::Blocked, &WORDS).expect("a good grid");
-    let solid =
-        VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX]).expect("it is");
+    let solid = VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX])
+        .expect("it is");
     let good = Config {
         nodes: 6,
         edge_min_m: 0.1,
@@ -242,8 +253,9 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
             });
             assert!(checked.is_ok() || sampled == Err(checked.unwrap_err()));
             let mut edges = [prm::Edge { a: 0, b: 0 }; 4];
-            let joined =
-                to.call("prm::connect", || prm::connect(&grid, &nodes[..6], &config, &mut index, &mut edges));
+            let joined = to.call("prm::connect", || {
+                prm::connect(&grid, &nodes[..6], &config, &mut index, &mut edges)
+            });
             let mut pairs = 0;
             let all = to.call("prm::connect_all_pairs", || {
                 prm::connect_all_pairs(&grid, &nodes[..6], &config, |_| pairs += 1)
@@ -256,18 +268,23 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
             to.add_count(pairs);
         }
     }
-    assert!(prm::sample_nodes(&solid, None, &[], &good, &mut nodes) == Err(PrmError::NoFreeSpace(0)));
+    assert!(
+        prm::sample_nodes(&solid, None, &[], &good, &mut nodes) == Err(PrmError::NoFreeSpace(0))
+    );
     assert!(prm::sample_nodes(&grid, None, &[Point::zeros()], &good, &mut nodes[..3]).is_err());
     for p in extreme_points() {
-        let indexed =
-            to.call("neighbours::Workspace::build_index", || index.build_index(&[p, Point::zeros()], &good));
+        let indexed = to.call("neighbours::Workspace::build_index", || {
+            index.build_index(&[p, Point::zeros()], &good)
+        });
         assert_eq!(indexed.is_ok(), p.iter().all(|c| c.abs() <= 1e6));
         let len = to.call("neighbours::Workspace::len", || index.len());
         assert_eq!(len, if indexed.is_ok() { 2 } else { 0 });
         // Places that there are none of have no edges.
         for range in [0..2, 1..usize::MAX, usize::MAX..usize::MAX] {
             let found = to.call("prm::connect_range", || {
-                prm::connect_range(&grid, &index, &good, range.clone(), |_| Err(PrmError::RoadmapFull))
+                prm::connect_range(&grid, &index, &good, range.clone(), |_| {
+                    Err(PrmError::RoadmapFull)
+                })
             });
             to.add_bool(found.is_ok());
             let full = |_: prm::Edge, _: f32| Err(PrmError::RoadmapFull);
@@ -280,8 +297,9 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
         to.add(square);
         let pair = [p, Point::new(1.0, 1.0, 1.0)];
         for (a, b) in [(0, 1), (0, 0), (0, 2), (u16::MAX, 0)] {
-            let clearance_m =
-                to.call("prm::edge_clearance", || prm::edge_clearance(&grid, &pair, prm::Edge { a, b }, p.y));
+            let clearance_m = to.call("prm::edge_clearance", || {
+                prm::edge_clearance(&grid, &pair, prm::Edge { a, b }, p.y)
+            });
             assert_eq!(clearance_m.is_some(), a.max(b) < 2);
             to.add(clearance_m.unwrap_or(-1.0));
         }
@@ -291,8 +309,11 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
 fn call_paths(to: &mut Results<'_, impl Listener>) {
     let mut path: Path<4> = to.call("flight::Path::new", Path::new);
     let track = TrackConfig::default();
-    let advice =
-        |scale: f32, within_m: f32| Advice { speed_scale: scale, stop_within_m: within_m, waiting_for: 0 };
+    let advice = |scale: f32, within_m: f32| Advice {
+        speed_scale: scale,
+        stop_within_m: within_m,
+        waiting_for: 0,
+    };
     assert!(track::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
     assert!(path.point_at(f32::NAN).is_none() && path.points_from(0.0, 1.0).next().is_none());
     for round in 0..3 {
@@ -312,10 +333,12 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
             to.call("flight::Path::label_times_by", || {
                 path.label_times_by(hard, |from, to| (to - from).norm() * other);
             });
-            let at =
-                to.call("flight::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
-            let count =
-                to.call("flight::Path::points_from", || path.points_from(hard, other).take(20).count());
+            let at = to
+                .call("flight::Path::point_at", || path.point_at(hard))
+                .expect("a path with waypoints");
+            let count = to.call("flight::Path::points_from", || {
+                path.points_from(hard, other).take(20).count()
+            });
             assert_eq!(count, 20);
             let along_m = to.call("flight::Path::project", || path.project(&at, hard, other));
             to.add(along_m);
@@ -326,7 +349,10 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
                         track::advance(&track, &path, &mut tracker, &advice(hard, other), dt_s)
                     })
                     .expect("a path with waypoints");
-                assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
+                assert!(
+                    reference.position.iter().all(|c| c.is_finite()),
+                    "{hard} {other} {reference:?}"
+                );
                 assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
                 let waits = dt_s.is_nan() || dt_s <= 0.0;
                 assert!(!waits || tracker == Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 });
@@ -348,28 +374,37 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
 /// Pictures along a path, whatever their spacing.
 fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
     let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
-    let waypoints =
-        WaypointRange { first: PicturePlan::MAX_AREA_WAYPOINTS - 1, end: PicturePlan::MAX_AREA_WAYPOINTS };
+    let waypoints = WaypointRange {
+        first: PicturePlan::MAX_AREA_WAYPOINTS - 1,
+        end: PicturePlan::MAX_AREA_WAYPOINTS,
+    };
     for spacing_m in HARD_NUMBERS {
         let new = || PicturePlan::new(spacing_m, HeadingMode::Ahead, Trigger::Distance);
         let mut plan = to.call("photographs::PicturePlan::new", new);
-        for (from, until) in [(0, last), (last, last), (1, 0), (0, PicturePlan::MAX_PATH_WAYPOINTS), (62, 63)]
+        for (from, until) in
+            [(0, last), (last, last), (1, 0), (0, PicturePlan::MAX_PATH_WAYPOINTS), (62, 63)]
         {
-            let marked =
-                to.call("photographs::PicturePlan::add_stretch", || plan.add_stretch(from, until, waypoints));
+            let marked = to.call("photographs::PicturePlan::add_stretch", || {
+                plan.add_stretch(from, until, waypoints)
+            });
             assert_eq!(marked.is_ok(), from <= until && until < PicturePlan::MAX_PATH_WAYPOINTS);
         }
-        let plan =
-            to.call("photographs::PicturePlan::with_area", || plan.with_area(u32::MAX, spacing_m > 0.0));
+        let plan = to.call("photographs::PicturePlan::with_area", || {
+            plan.with_area(u32::MAX, spacing_m > 0.0)
+        });
         assert_eq!(to.call("photographs::PicturePlan::area", || plan.area()), u32::MAX);
         let all = to.call("photographs::PicturePlan::count", || plan.count(path));
-        let end_m = to.call("photographs::PicturePlan::last_picture_m", || plan.last_picture_m(path));
+        let end_m =
+            to.call("photographs::PicturePlan::last_picture_m", || plan.last_picture_m(path));
         assert!(end_m.is_none_or(|end_m| end_m <= path.length_m()));
-        let stretches = to.call("photographs::PicturePlan::stretches", || plan.stretches(path).count());
+        let stretches =
+            to.call("photographs::PicturePlan::stretches", || plan.stretches(path).count());
         for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {
-            let taken = to.call("photographs::PicturePlan::taken_count", || plan.taken_count(path, along_m));
-            let passed =
-                to.call("photographs::PicturePlan::passed_count", || plan.passed_count(path, along_m));
+            let taken = to
+                .call("photographs::PicturePlan::taken_count", || plan.taken_count(path, along_m));
+            let passed = to.call("photographs::PicturePlan::passed_count", || {
+                plan.passed_count(path, along_m)
+            });
             assert!(passed <= taken || spacing_m <= 0.0, "{along_m}: {passed} of {taken}");
             let at_m = to.call("photographs::PicturePlan::last_picture_before_m", || {
                 plan.last_picture_before_m(path, along_m)
@@ -388,8 +423,9 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
             assert!(shown <= stretches, "{count}: {shown} of {stretches}");
         }
         for shots in plan.stretches(path) {
-            let place_m =
-                to.call("photographs::PictureStretch::picture_at_m", || shots.picture_at_m(shots.count));
+            let place_m = to.call("photographs::PictureStretch::picture_at_m", || {
+                shots.picture_at_m(shots.count)
+            });
             to.add(place_m);
         }
         let task = Task::Photograph(plan);
@@ -419,12 +455,20 @@ fn call_deconfliction(to: &mut Results<'_, impl Listener>) {
                 ..Neighbour::default()
             })
             .collect();
-        let gates = [hard, p.x, -hard].map(|at_m| planner_core::flight::Gate { at_m, id: 2, until_m: p.y });
+        let gates =
+            [hard, p.x, -hard].map(|at_m| planner_core::flight::Gate { at_m, id: 2, until_m: p.y });
         for method in [Method::Off, Method::Algorithm2, Method::Priority] {
-            let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
+            let cfg = DeconflictConfig {
+                method,
+                safety_distance_m: 1.5,
+                cruise_mps: 2.0,
+                accel_mps2: 1.5,
+            };
             for path in [&path, &empty] {
-                let own = OwnVehicle { rank: 0, position: p, along_m: hard, path, detours: i % 2 == 0 };
-                let advice = to.call("deconflict::advise", || deconflict::advise(&cfg, &own, &gates, &all));
+                let own =
+                    OwnVehicle { rank: 0, position: p, along_m: hard, path, detours: i % 2 == 0 };
+                let advice =
+                    to.call("deconflict::advise", || deconflict::advise(&cfg, &own, &gates, &all));
                 assert!((0.0..=1.0).contains(&advice.speed_scale), "{p:?} {hard} {advice:?}");
                 to.add(advice.stop_within_m);
                 let bad = DeconflictConfig { accel_mps2: hard, ..cfg };
@@ -450,10 +494,13 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             speed_max_mps: 2.0,
             silent_s: 45.0,
         };
-        let ahead: Vec<Point, 12> = extreme_points().chain(extreme_points()).skip(i).take(12).collect();
+        let ahead: Vec<Point, 12> =
+            extreme_points().chain(extreme_points()).skip(i).take(12).collect();
         let own = [
             to.call("safety::ReachableSet::at", || ReachableSet::at(p)),
-            to.call("safety::ReachableSet::along", || ReachableSet::along(p, ahead.iter().copied(), hard)),
+            to.call("safety::ReachableSet::along", || {
+                ReachableSet::along(p, ahead.iter().copied(), hard)
+            }),
             to.call("safety::ReachableSet::vertical", || ReachableSet::vertical(p, hard)),
         ];
         for bounds in [bounds, sane] {
@@ -464,20 +511,24 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
                 age_s: p.x,
                 delay_s: 0.3,
                 points: &ahead[..i % 3],
-                place_on_points: to
-                    .call("safety::PlaceOnPoints::find", || PlaceOnPoints::find(&p, &ahead[..i % 3])),
+                place_on_points: to.call("safety::PlaceOnPoints::find", || {
+                    PlaceOnPoints::find(&p, &ahead[..i % 3])
+                }),
                 extent_m: hard,
                 rests_within_m: 0.0,
                 grounded: i % 5 == 0,
                 column_to_m: (i % 2 == 0).then_some(hard),
             };
-            let reach_m = to.call("safety::NeighbourMotion::reach_m", || heard.reach_m(&bounds, hard));
+            let reach_m =
+                to.call("safety::NeighbourMotion::reach_m", || heard.reach_m(&bounds, hard));
             to.add(reach_m);
-            let more_m =
-                to.call("safety::PlaceOnPoints::flown_beyond_m", || heard.place_on_points.flown_beyond_m());
+            let more_m = to.call("safety::PlaceOnPoints::flown_beyond_m", || {
+                heard.place_on_points.flown_beyond_m()
+            });
             to.add(more_m);
-            let other =
-                to.call("safety::NeighbourMotion::reachable_set", || heard.reachable_set(&bounds, hard));
+            let other = to.call("safety::NeighbourMotion::reachable_set", || {
+                heard.reachable_set(&bounds, hard)
+            });
             for own in &own {
                 let mut legs = Legs::new();
                 let own = to.call("own::OwnSet::new", || OwnSet::new(own, &mut legs));

@@ -1,9 +1,12 @@
-//! The calls on the flights of a divided area, on divisions after losses and on ways home at their limits and beyond.
+//! The calls on the flights of a divided area, on divisions after losses and on ways home at their
+//! limits and beyond.
 
 use planner_core::Point;
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
-use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work};
+use planner_core::coverage::pack::{
+    Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work,
+};
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::field::follow::TerrainFollowing;
@@ -59,7 +62,11 @@ const PADS: [Pad; VEHICLES] = [
 ];
 const SWARM: FlightInputs<'_> = FlightInputs {
     pads: &PADS,
-    capture: CaptureSettings { waypoint_m: 10.0, heading_mode: HeadingMode::Ahead, trigger: Trigger::None },
+    capture: CaptureSettings {
+        waypoint_m: 10.0,
+        heading_mode: HeadingMode::Ahead,
+        trigger: Trigger::None,
+    },
     max_gates: GATES,
     ..coverage_flights::SWARM
 };
@@ -102,15 +109,20 @@ fn call_flight_plans(
     ws: &mut ScheduleWorkspace,
     out: &mut Flights,
 ) {
-    let mut plan = |work: &Work<'_, LANES, CORNERS>, routes: &Plan<VEHICLES>, swarm: &FlightInputs<'_>| {
-        let result = to.call("flights::plan_flights", || flights::plan_flights(work, routes, swarm, ws, out));
+    let mut plan = |work: &Work<'_, LANES, CORNERS>,
+                    routes: &Plan<VEHICLES>,
+                    swarm: &FlightInputs<'_>| {
+        let result = to
+            .call("flights::plan_flights", || flights::plan_flights(work, routes, swarm, ws, out));
         to.add_bool(result.is_ok());
         assert!(result.is_err() || is_finite(out), "{swarm:?}");
         result
     };
     assert_eq!(plan(good, routes, &SWARM), Ok(()));
     for hard in HARD_NUMBERS {
-        for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
+        for heights in
+            [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }]
+        {
             let planned = plan(&Work { heights, ..*good }, routes, &SWARM);
             assert_eq!(matches!(planned, Err(PlanError::Config(_))), !is_good(hard));
         }
@@ -139,8 +151,10 @@ fn call_flight_plans(
         }
         for look in [HeadingMode::Ahead, HeadingMode::Fixed(hard)] {
             for clearance_m in [10.0, hard] {
-                let manner = CaptureSettings { waypoint_m: hard, heading_mode: look, ..SWARM.capture };
-                let planned = plan(good, routes, &FlightInputs { capture: manner, clearance_m, ..SWARM });
+                let manner =
+                    CaptureSettings { waypoint_m: hard, heading_mode: look, ..SWARM.capture };
+                let planned =
+                    plan(good, routes, &FlightInputs { capture: manner, clearance_m, ..SWARM });
                 assert!(is_good(hard) || planned.is_err());
             }
         }
@@ -149,8 +163,14 @@ fn call_flight_plans(
         assert!(is_good(hard) || matches!(planned, Err(PlanError::Config(_))));
     }
     let pads = [PADS[0], PADS[0], PADS[2]];
-    assert_eq!(plan(good, routes, &FlightInputs { pads: &pads, ..SWARM }), Err(PlanError::SameId(1)));
-    assert_eq!(plan(good, routes, &FlightInputs { pads: &PADS[1..], ..SWARM }), Err(PlanError::Terminals));
+    assert_eq!(
+        plan(good, routes, &FlightInputs { pads: &pads, ..SWARM }),
+        Err(PlanError::SameId(1))
+    );
+    assert_eq!(
+        plan(good, routes, &FlightInputs { pads: &PADS[1..], ..SWARM }),
+        Err(PlanError::Terminals)
+    );
     let ranges = [WaypointRange { first: 4, end: 9 }, WaypointRange { first: 8, end: u32::MAX }];
     let planned = plan(good, routes, &FlightInputs { photographed: &ranges, ..SWARM });
     assert_eq!(planned, Err(PlanError::Terminals));
@@ -164,10 +184,14 @@ fn call_flight_plans(
     call_field_plans(&mut plan, good, routes);
 }
 
-/// Plans with routes of an unknown vehicle or a wrong waypoint range, which must be refused; with an odd heading or layer, where
-/// any answer will do; and with no routes, which must succeed.
+/// Plans with routes of an unknown vehicle or a wrong waypoint range, which must be refused; with
+/// an odd heading or layer, where any answer will do; and with no routes, which must succeed.
 fn unusual_routes(
-    plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Result<(), PlanError>,
+    plan: &mut impl FnMut(
+        &Work<'_, LANES, CORNERS>,
+        &Plan<VEHICLES>,
+        &FlightInputs<'_>,
+    ) -> Result<(), PlanError>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
 ) {
@@ -188,14 +212,22 @@ fn unusual_routes(
         routes.routes[0] = Route { heading, layer, ..first };
         let _ = plan(good, &routes, &SWARM);
     }
-    let aloft = PADS.map(|pad| Pad { start: pad.start + Point::new(0.0, 0.0, 40.0), airborne: true, ..pad });
+    let aloft = PADS.map(|pad| Pad {
+        start: pad.start + Point::new(0.0, 0.0, 40.0),
+        airborne: true,
+        ..pad
+    });
     assert_eq!(plan(good, &Plan::new(), &FlightInputs { pads: &aloft, ..SWARM }), Ok(()));
     assert_eq!(plan(good, &Plan::new(), &SWARM), Ok(()));
 }
 
 /// Lanes over a field.
 fn call_field_plans(
-    plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Result<(), PlanError>,
+    plan: &mut impl FnMut(
+        &Work<'_, LANES, CORNERS>,
+        &Plan<VEHICLES>,
+        &FlightInputs<'_>,
+    ) -> Result<(), PlanError>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
 ) {
@@ -236,7 +268,9 @@ fn call_divisions(
 ) {
     *memory.losses = to.call("losses::Workspace::new", losses::Workspace::new);
     let all = good.tracks.waypoint_count();
-    for (first, end) in [(0, 0), (1, 3), (all, all), (3, 1), (0, u32::MAX), (u32::MAX, u32::MAX), (0, all)] {
+    for (first, end) in
+        [(0, 0), (1, 3), (all, all), (3, 1), (0, u32::MAX), (u32::MAX, u32::MAX), (0, all)]
+    {
         let done = [WaypointRange { first, end }];
         let begun = to.call("losses::Workspace::start_plan", || {
             memory.losses.start_plan(good.tracks, good.transit, &done).is_ok()
@@ -248,10 +282,15 @@ fn call_divisions(
     let fate = VehicleStatus { alive: true, along_m: 60.0 };
     let lost = VehicleStatus { alive: false, along_m: 60.0 };
     for hard in HARD_NUMBERS {
-        for hit in [VehicleStatus { along_m: hard, ..fate }, VehicleStatus { along_m: hard, ..lost }] {
-            for fates in [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]] {
+        for hit in
+            [VehicleStatus { along_m: hard, ..fate }, VehicleStatus { along_m: hard, ..lost }]
+        {
+            for fates in
+                [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]]
+            {
                 memory.losses.start_plan(good.tracks, good.transit, &[]).expect("nothing is done");
-                flights::plan_flights(good, routes, &SWARM, memory.schedule, memory.out).expect("as before");
+                flights::plan_flights(good, routes, &SWARM, memory.schedule, memory.out)
+                    .expect("as before");
                 let mut routes = routes.clone();
                 let loss = Loss { work: good, swarm: &SWARM, fates };
                 let divided = call_redivide(to, &loss, memory, &mut routes);
@@ -278,8 +317,9 @@ fn call_redivide(
     routes: &mut Plan<VEHICLES>,
 ) -> Result<(), losses::Error> {
     let BorrowedWorkspaces { losses, pack, schedule, out } = memory;
-    let divided =
-        to.call("losses::redivide_work", || losses::redivide_work(loss, losses, pack, schedule, routes, out));
+    let divided = to.call("losses::redivide_work", || {
+        losses::redivide_work(loss, losses, pack, schedule, routes, out)
+    });
     assert!(divided.is_err() || is_finite(out), "{:?}", loss.fates);
     to.add_bool(divided.is_ok());
     divided
@@ -326,8 +366,13 @@ fn call_ways_home(
                 let found = to.call("around::plan_detour", || {
                     around::plan_detour(transit, field, &request, &mut [thing], &mut path)
                 });
-                assert_eq!(matches!(found, Err(DetourError::Config(_))), bad, "{request:?} {thing:?}");
-                let finite = path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()));
+                assert_eq!(
+                    matches!(found, Err(DetourError::Config(_))),
+                    bad,
+                    "{request:?} {thing:?}"
+                );
+                let finite =
+                    path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()));
                 assert!(found.is_err() || finite);
                 to.add_bool(found.is_ok());
                 let again = to.call("around::plan_vehicle_detour", || {
@@ -335,7 +380,9 @@ fn call_ways_home(
                 });
                 assert_eq!(again, found);
                 let mut short = Path::<1>::new();
-                to.add_bool(around::plan_detour(transit, field, &request, &mut [], &mut short).is_ok());
+                to.add_bool(
+                    around::plan_detour(transit, field, &request, &mut [], &mut short).is_ok(),
+                );
             }
         }
     }

@@ -32,9 +32,13 @@ const CORNERS_OF_ALL: [Flat; 8] = [
     Flat::new(18.0, 17.0),
     Flat::new(12.0, 17.0),
 ];
-const RINGS: [Ring; 2] = [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 8, kind: RingKind::NoFly }];
-const SPACING: Spacing =
-    Spacing { footprint: Footprint { along_m: 10.0, across_m: 10.0 }, lane_m: 10.0, waypoint_m: 10.0 };
+const RINGS: [Ring; 2] =
+    [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 8, kind: RingKind::NoFly }];
+const SPACING: Spacing = Spacing {
+    footprint: Footprint { along_m: 10.0, across_m: 10.0 },
+    lane_m: 10.0,
+    waypoint_m: 10.0,
+};
 const PATTERN: LanePattern =
     LanePattern { spacing: SPACING, angle_deg: None, margin_m: 0.0, search_steps: 100 };
 pub(super) const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
@@ -115,7 +119,8 @@ fn call_cameras(to: &mut Results<'_, impl Listener>) {
         ] {
             let checked = to.call("footprint::Camera::check", || camera.check());
             let seen = to.call("footprint::Camera::footprint", || camera.footprint(hard));
-            let height_m = to.call("footprint::Camera::height_for_gsd", || camera.height_for_gsd(hard));
+            let height_m =
+                to.call("footprint::Camera::height_for_gsd", || camera.height_for_gsd(hard));
             assert!(checked.is_ok() || seen.is_err() && height_m.is_err());
             assert!(is_good(hard) || seen.is_err() && height_m.is_err());
             let Ok(footprint) = seen else { continue };
@@ -136,7 +141,10 @@ fn call_cameras(to: &mut Results<'_, impl Listener>) {
     }
 }
 
-fn check_spacing(to: &mut Results<'_, impl Listener>, spacing: &Spacing) -> Result<(), CoverageError> {
+fn check_spacing(
+    to: &mut Results<'_, impl Listener>,
+    spacing: &Spacing,
+) -> Result<(), CoverageError> {
     to.call("footprint::Spacing::check", || spacing.check())
 }
 
@@ -149,7 +157,8 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
             to.add_bool(found.is_ok());
             let place = Flat::new(x, y);
             let holds = to.call("area::Area::contains", || test_area().contains(&place));
-            let forbids = to.call("area::Area::is_in_no_fly_zone", || test_area().is_in_no_fly_zone(&place));
+            let forbids =
+                to.call("area::Area::is_in_no_fly_zone", || test_area().is_in_no_fly_zone(&place));
             assert!(holds || !forbids, "the zone lies in the area");
             let Ok(area) = found else { continue };
             let mut hull: Vec<Flat, VERTICES> = Vec::new();
@@ -161,9 +170,12 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
         to.add(direction.along.x);
     }
     let rings = |ends: [u16; 2], kind: RingKind| ends.map(|end| Ring { end, kind });
-    for (end, kind) in
-        [(0, RingKind::Outer), (9, RingKind::Outer), (u16::MAX, RingKind::NoFly), (4, RingKind::Hole)]
-    {
+    for (end, kind) in [
+        (0, RingKind::Outer),
+        (9, RingKind::Outer),
+        (u16::MAX, RingKind::NoFly),
+        (4, RingKind::Hole),
+    ] {
         for rings in [rings([end, 8], kind), rings([4, end], kind), rings([end, end], kind)] {
             let found = to.call("area::Area::new", || Area::new(&CORNERS_OF_ALL, &rings));
             assert!(found.is_err());
@@ -188,20 +200,26 @@ fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<
     assert_eq!(full, Err(CoverageError::NoFlyFull));
     for known in [false, true] {
         if known {
-            assert_eq!(to.call("transit::Transit::set_area", || transit.set_area(test_area())), Ok(()));
+            assert_eq!(
+                to.call("transit::Transit::set_area", || transit.set_area(test_area())),
+                Ok(())
+            );
         }
         let corners = to.call("transit::Transit::corners", || transit.corners().len());
         assert_eq!(corners, if known { CORNERS } else { 0 });
         for x in HARD_NUMBERS {
             for y in HARD_NUMBERS {
                 let (from, there) = (Flat::new(x, y), Flat::new(15.0, 40.0));
-                let forbids =
-                    to.call("transit::Transit::is_in_no_fly_zone", || transit.is_in_no_fly_zone(&from));
+                let forbids = to.call("transit::Transit::is_in_no_fly_zone", || {
+                    transit.is_in_no_fly_zone(&from)
+                });
                 assert!(known || !forbids);
-                let clear =
-                    to.call("transit::Transit::is_line_clear", || transit.is_line_clear(&from, &there));
+                let clear = to.call("transit::Transit::is_line_clear", || {
+                    transit.is_line_clear(&from, &there)
+                });
                 to.add_bool(clear);
-                let far_m = to.call("transit::Transit::distance_m", || transit.distance_m(&from, &there));
+                let far_m =
+                    to.call("transit::Transit::distance_m", || transit.distance_m(&from, &there));
                 to.add(far_m);
                 let mut corners: Vec<Flat, CORNERS> = Vec::new();
                 let way = to.call("transit::Transit::shortest_path", || {
@@ -238,7 +256,8 @@ fn call_lanes(
             },
             LanePattern { search_steps: 0, ..PATTERN },
         ] {
-            let built = to.call("tracks::build", || tracks::build(area, &pattern, transit, build, tracks));
+            let built =
+                to.call("tracks::build", || tracks::build(area, &pattern, transit, build, tracks));
             to.add_bool(built.is_ok());
             if built.is_ok() {
                 call_waypoint_numbers(to, tracks);
@@ -272,21 +291,27 @@ fn call_waypoint_numbers(to: &mut Results<'_, impl Listener>, tracks: &Lanes) {
         assert!(lane < lanes.max(1));
         let place = to.call("lanes::Tracks::waypoint", || tracks.waypoint(number));
         assert_eq!(place.is_some(), number < count);
-        let along_m =
-            to.call("lanes::Tracks::distance_to_waypoint_m", || tracks.distance_to_waypoint_m(number));
+        let along_m = to.call("lanes::Tracks::distance_to_waypoint_m", || {
+            tracks.distance_to_waypoint_m(number)
+        });
         assert!(along_m <= length_m * 1.001);
         to.add(along_m + along.x);
     }
 }
 
-fn call_divisions(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, lent: &mut CoverageMemory) {
+fn call_divisions(
+    to: &mut Results<'_, impl Listener>,
+    transit: &ZoneTransit<'_>,
+    lent: &mut CoverageMemory,
+) {
     let CoverageMemory { tracks, left, .. } = lent;
     for first in NUMBERS {
         for end in NUMBERS {
             let done = [WaypointRange { first: 0, end: 2 }, WaypointRange { first, end }];
             for done in [&done[..], &done[1..]] {
-                let found = to
-                    .call("divide::remaining_lanes", || divide::remaining_lanes(tracks, done, transit, left));
+                let found = to.call("divide::remaining_lanes", || {
+                    divide::remaining_lanes(tracks, done, transit, left)
+                });
                 assert!(found.is_err() || first <= end && end <= tracks.waypoint_count());
                 to.add_bool(found.is_ok());
                 for number in NUMBERS {
@@ -300,7 +325,10 @@ fn call_divisions(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>
         }
     }
     let all = [WaypointRange { first: 0, end: tracks.waypoint_count() }];
-    assert_eq!(divide::remaining_lanes(tracks, &all, transit, left), Err(CoverageError::NothingToCover));
+    assert_eq!(
+        divide::remaining_lanes(tracks, &all, transit, left),
+        Err(CoverageError::NothingToCover)
+    );
     let mut none = Tracks::<1>::new();
     assert!(divide::remaining_lanes(&none.clone(), &[], transit, &mut none).is_err());
 }
@@ -318,13 +346,21 @@ fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     ]
 }
 
-fn call_packing(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, lent: &mut CoverageMemory) {
+fn call_packing(
+    to: &mut Results<'_, impl Listener>,
+    transit: &ZoneTransit<'_>,
+    lent: &mut CoverageMemory,
+) {
     let CoverageMemory { tracks, powell, plan, .. } = lent;
     *plan = to.call("pack::Plan::new", Plan::new);
     let ws = &mut powell.pack;
     *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
-    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
-    let pack = |to: &mut Results<'_, _>, work: &Work<'_, LANES, CORNERS>, ws: &mut _, plan: &mut Plan<_>| {
+    let good =
+        Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let pack = |to: &mut Results<'_, _>,
+                work: &Work<'_, LANES, CORNERS>,
+                ws: &mut _,
+                plan: &mut Plan<_>| {
         let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
         let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
         assert!(checked.is_ok() || packed == checked);
@@ -332,7 +368,8 @@ fn call_packing(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, 
         let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
         shares.iter().for_each(|share| to.add(*share));
         for vehicle in work.vehicles {
-            let delay_s = to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
+            let delay_s =
+                to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
             to.add(delay_s);
         }
         let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
@@ -346,7 +383,9 @@ fn call_packing(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, 
     };
     for hard in HARD_NUMBERS {
         for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
-            for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
+            for heights in
+                [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }]
+            {
                 pack(to, &Work { unit, heights, ..good }, ws, plan);
             }
             for vehicles in &fleets_with_hard_number(hard) {
@@ -374,7 +413,8 @@ fn call_packing(to: &mut Results<'_, impl Listener>, transit: &ZoneTransit<'_>, 
             let whole = Route { vehicle: u8::MAX, first, end, heading, layer: 0, ..plan.routes[0] };
             for route in [whole, Route { first: end, ..whole }] {
                 let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
-                let waypoints = to.call("pack::Route::waypoints", || route.waypoints().take(3).count());
+                let waypoints =
+                    to.call("pack::Route::waypoints", || route.waypoints().take(3).count());
                 to.add_count((ends.0 ^ ends.1) as usize + waypoints);
             }
         }
@@ -388,7 +428,8 @@ fn call_share_searches(
 ) {
     let CoverageMemory { tracks, powell: ws, plan, .. } = lent;
     *ws = to.call("powell::Workspace::new", powell::Workspace::new);
-    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let good =
+        Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
     let mut ways_m = [0.0; 512];
     let mut reaches = [0; 1024];
     let mut states = [(0, 0); 1 << (2 * VEHICLES)];
@@ -406,10 +447,14 @@ fn call_share_searches(
                 to.add_bool(found.is_ok());
                 to.add(plan.max_cost_s());
             }
-            let mut memory =
-                exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
-            let found =
-                to.call("exact::plan_exact", || exact::plan_exact(&work, &mut memory, &mut ws.pack, plan));
+            let mut memory = exact::Workspace {
+                ways_m: &mut ways_m,
+                reaches: &mut reaches,
+                states: &mut states,
+            };
+            let found = to.call("exact::plan_exact", || {
+                exact::plan_exact(&work, &mut memory, &mut ws.pack, plan)
+            });
             assert!(checked.is_ok() || found == checked);
             to.add_bool(found.is_ok());
             to.add(plan.max_cost_s());
@@ -437,7 +482,8 @@ fn call_waypoint_sets(to: &mut Results<'_, impl Listener>) {
     let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);
     for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {
         let before = to.call("done::WaypointSet::count", || done.count());
-        let inserted = to.call("done::WaypointSet::insert", || done.insert(WaypointRange { first, end }));
+        let inserted =
+            to.call("done::WaypointSet::insert", || done.insert(WaypointRange { first, end }));
         let after = done.count();
         assert_eq!(inserted == Ok(true), after > before, "{first} to {end}: {before}, {after}");
         let ranges = to.call("done::WaypointSet::ranges", || done.ranges().len());

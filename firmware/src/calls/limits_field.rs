@@ -21,7 +21,9 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
     let good = FieldShape { low: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
     let mut file = [0; BYTES];
     for hard in HARD_NUMBERS {
-        for shape in [FieldShape { cell_m: hard, ..good }, FieldShape { low: Flat::new(hard, 0.0), ..good }] {
+        for shape in
+            [FieldShape { cell_m: hard, ..good }, FieldShape { low: Flat::new(hard, 0.0), ..good }]
+        {
             let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
             to.add_bool(written.is_ok());
         }
@@ -34,7 +36,8 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
         let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
         assert!(written.is_err(), "{columns} by {rows}, at most {MAX_NODES}");
     }
-    let length = to.call("field::write", || field::write(&good, &NODES, &mut file)).expect("a field");
+    let length =
+        to.call("field::write", || field::write(&good, &NODES, &mut file)).expect("a field");
     for bytes in [&file, &[0; BYTES]] {
         let head = bytes.first_chunk().expect("it is longer");
         let declared = to.call("field::declared_len", || field::declared_len(head));
@@ -44,7 +47,8 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
         let parsed = to.call("field::FieldView::parse", || FieldView::parse(&file[..cut]));
         assert!(parsed.is_err());
     }
-    let field = to.call("field::FieldView::parse", || FieldView::parse(&file[..length])).expect("a field");
+    let field =
+        to.call("field::FieldView::parse", || FieldView::parse(&file[..length])).expect("a field");
     assert_eq!(to.call("field::FieldView::shape", || *field.shape()), good);
     let crc = to.call("field::FieldView::crc", || field.crc());
     to.add_count(crc as usize);
@@ -52,7 +56,8 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
     to.add(highest_m);
     for x in HARD_NUMBERS {
         for y in HARD_NUMBERS {
-            let height_m = to.call("field::FieldView::height_at", || field.height_at(&Flat::new(x, y)));
+            let height_m =
+                to.call("field::FieldView::height_at", || field.height_at(&Flat::new(x, y)));
             to.add(height_m);
         }
     }
@@ -62,12 +67,15 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
 fn call_field_paths(to: &mut Results<'_, impl Listener>, field: FieldView<'_>) {
     for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
         for end in ENDS.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
-            let following = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
+            let following =
+                TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
             let (here, there) = (Flat::new(0.0, 3.0), Flat::new(end, 4.0));
-            let lowest_m = to.call("follow::TerrainFollowing::lowest_m", || following.lowest_m(&there));
+            let lowest_m =
+                to.call("follow::TerrainFollowing::lowest_m", || following.lowest_m(&there));
             let top_m = to.call("follow::TerrainFollowing::top_m", || following.top_m());
-            let begin =
-                to.call("follow::TerrainFollowing::start_point", || following.start_point(&here, &there));
+            let begin = to.call("follow::TerrainFollowing::start_point", || {
+                following.start_point(&here, &there)
+            });
             let mut corners = 0;
             let counted = |_: Point| -> Result<(), ()> {
                 corners += 1;

@@ -52,8 +52,9 @@ pub(super) fn call_roadmap_files(
 ) -> usize {
     let all = [0, 1, 7, u32::MAX as usize / 4, usize::MAX / 8, usize::MAX];
     for i in 0..all.len() * all.len() {
-        let len =
-            to.call("write::encoded_len", || roadmap::encoded_len(all[i % 6], all[i / 6], all[(i * 7) % 6]));
+        let len = to.call("write::encoded_len", || {
+            roadmap::encoded_len(all[i % 6], all[i / 6], all[(i * 7) % 6])
+        });
         assert!(len.is_none_or(|len| len <= u32::MAX as usize));
     }
     let edges = edges();
@@ -66,9 +67,11 @@ pub(super) fn call_roadmap_files(
             RoadmapHeader { starts: hard as u16, goals: u16::MAX, ..HEADER },
             RoadmapHeader { origin: Geodetic { lat_deg: hard.into(), ..HEADER.origin }, ..HEADER },
         ] {
-            let written = to.call("write::write", || roadmap::write(&header, &NODE_PLACES, &edges, file));
+            let written =
+                to.call("write::write", || roadmap::write(&header, &NODE_PLACES, &edges, file));
             // A file that was written can be read.
-            let read = written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
+            let read =
+                written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
             assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
             to.add_bool(written.is_ok());
         }
@@ -76,7 +79,10 @@ pub(super) fn call_roadmap_files(
         to.add_bool(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok());
     }
     for (a, b) in [(0, 0), (0, 6), (u16::MAX, 0)] {
-        assert!(roadmap::write(&HEADER, &NODE_PLACES, &[Edge { a, b, clearance_m: 1.0 }], file).is_err());
+        assert!(
+            roadmap::write(&HEADER, &NODE_PLACES, &[Edge { a, b, clearance_m: 1.0 }], file)
+                .is_err()
+        );
     }
     for p in extreme_points() {
         let mut places = NODE_PLACES;
@@ -85,14 +91,21 @@ pub(super) fn call_roadmap_files(
     }
     assert!(roadmap::write(&HEADER, &NODE_PLACES, &edges, &mut file[..100]).is_err());
     let mut small = SearchWorkspace::<2>::new();
-    assert!(roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[], &mut small, file).is_err());
+    assert!(
+        roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[], &mut small, file)
+            .is_err()
+    );
     for hard in HARD_NUMBERS {
         let heights_m = [2.0, hard, 2.0, 2.0, 2.0, f32::INFINITY];
-        let written = roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &heights_m, ws, file);
-        let good = (0.0..=roadmap::MAX_LANDMARK_DISTANCE_M).contains(&hard) || hard == f32::INFINITY;
+        let written =
+            roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &heights_m, ws, file);
+        let good =
+            (0.0..=roadmap::MAX_LANDMARK_DISTANCE_M).contains(&hard) || hard == f32::INFINITY;
         assert_eq!(written.is_ok(), good, "{hard}");
     }
-    assert!(roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[1.0; 5], ws, file).is_err());
+    assert!(
+        roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[1.0; 5], ws, file).is_err()
+    );
     let len = to
         .call("write::write_with_landmarks", || {
             roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &HEIGHTS_M, ws, file)
@@ -144,13 +157,15 @@ pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &Roa
         to.add_count(degree);
     }
     for p in extreme_points() {
-        let around = to.call("ground::RoadmapView::ground_range_near", || view.ground_range_near(&p));
+        let around =
+            to.call("ground::RoadmapView::ground_range_near", || view.ground_range_near(&p));
         assert!(around.is_none_or(|(low_m, high_m)| low_m == 0.0 && high_m == 0.0 && p.z >= 0.0));
         to.add_bool(around.is_some());
     }
     let edge = view.edge_between(0, 4).expect("an edge");
     for hard in HARD_NUMBERS {
-        let clears = to.call("roadmap::RoadmapView::has_clearance", || view.has_clearance(&edge, hard));
+        let clears =
+            to.call("roadmap::RoadmapView::has_clearance", || view.has_clearance(&edge, hard));
         assert_eq!(clears, hard < 1.0, "{hard}");
     }
 }
@@ -164,8 +179,12 @@ pub(super) fn call_searches(
     let mut way: Vec<u16, MAX_NODES> = Vec::new();
     for node in NODE_INDICES {
         // Before the first search nothing is reached.
-        assert!(to.call("search::SearchWorkspace::distance_m", || fresh.distance_m(node)).is_infinite());
-        assert!(to.call("search::SearchWorkspace::path_to", || fresh.path_to(node, &mut way)).is_err());
+        assert!(
+            to.call("search::SearchWorkspace::distance_m", || fresh.distance_m(node)).is_infinite()
+        );
+        assert!(
+            to.call("search::SearchWorkspace::path_to", || fresh.path_to(node, &mut way)).is_err()
+        );
     }
     let mut small = SearchWorkspace::<2>::new();
     let mut lengths = [0.0; 18];
@@ -176,7 +195,8 @@ pub(super) fn call_searches(
     for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
         let (a, b) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let there = usize::from(a.max(b)) < view.node_count();
-        let found = to.call("search::astar", || search::astar(view, a, b, any_edge_passable, ws, &mut way));
+        let found =
+            to.call("search::astar", || search::astar(view, a, b, any_edge_passable, ws, &mut way));
         assert_eq!(found.is_ok(), there);
         assert_eq!(search::astar(&with, a, b, any_edge_passable, ws, &mut way), found);
         to.add(found.unwrap_or(-1.0));
@@ -185,7 +205,8 @@ pub(super) fn call_searches(
         let mut short: Vec<u16, 1> = Vec::new();
         assert!(a == b || search::astar(view, a, b, any_edge_passable, ws, &mut short).is_err());
         assert!(search::astar(view, a, b, any_edge_passable, &mut small, &mut way).is_err());
-        let all = to.call("search::dijkstra_all", || search::dijkstra_all(view, a, any_edge_passable, ws));
+        let all = to
+            .call("search::dijkstra_all", || search::dijkstra_all(view, a, any_edge_passable, ws));
         assert_eq!(all.is_ok(), usize::from(a) < view.node_count());
         let mut row = [0.0; 2];
         let answer = to.call("search::dijkstra_row", || {
@@ -201,7 +222,10 @@ pub(super) fn call_searches(
             search::cost_matrix(view, &[a, 0], &[b, 1], any_edge_passable, ws, &mut costs)
         });
         assert_eq!(answer.is_ok(), there);
-        assert!(search::cost_matrix(view, &[a, 0], &[b, 1], any_edge_passable, ws, &mut costs[..3]).is_err());
+        assert!(
+            search::cost_matrix(view, &[a, 0], &[b, 1], any_edge_passable, ws, &mut costs[..3])
+                .is_err()
+        );
     }
     assert_eq!(search::cost_matrix(view, &[], &[1], any_edge_passable, ws, &mut []), Ok(()));
 }
@@ -210,7 +234,8 @@ pub(super) fn call_assignments(to: &mut Results<'_, impl Listener>) {
     let mut ws = to.call("assignment::AssignmentWorkspace::new", AssignmentWorkspace::<3>::new);
     let mut out = [None; 3];
     let mut both = |costs: &[f32], rows: usize, cols: usize, out: &mut [Option<u16>]| {
-        let total = to.call("assignment::assign", || assignment::assign(costs, rows, cols, &mut ws, out));
+        let total =
+            to.call("assignment::assign", || assignment::assign(costs, rows, cols, &mut ws, out));
         let most = to.call("assignment::assign_bottleneck", || {
             assignment::assign_bottleneck(costs, rows, cols, &mut ws, out)
         });

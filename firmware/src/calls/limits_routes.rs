@@ -1,4 +1,5 @@
-//! The calls on plans, schedules and detours at their limits and beyond, after those on the roadmap that they need.
+//! The calls on plans, schedules and detours at their limits and beyond, after those on the roadmap
+//! that they need.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -54,8 +55,8 @@ impl Default for RouteWorkspaces {
     }
 }
 
-/// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches, assignments, plans, schedules,
-/// detours, coverage.
+/// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches,
+/// assignments, plans, schedules, detours, coverage.
 pub fn call_all(to: &mut Results<'_, impl Listener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
     field::call_fields(to);
     let len = graph::call_roadmap_files(to, &mut lent.ws.search, &mut lent.file);
@@ -80,9 +81,14 @@ pub fn call_all(to: &mut Results<'_, impl Listener>, lent: &mut RouteWorkspaces)
     sums
 }
 
-const SCHEDULE: ScheduleConfig =
-    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.75, cruise_mps: 1.8, vertical_mps: 1.0 };
-const TASK: VehicleTask = VehicleTask { id: 1, required_clearance_m: 0.8, climb_m: 1.5, goal: Some(0) };
+const SCHEDULE: ScheduleConfig = ScheduleConfig {
+    separation_m: 2.0,
+    parked_separation_m: 1.75,
+    cruise_mps: 1.8,
+    vertical_mps: 1.0,
+};
+const TASK: VehicleTask =
+    VehicleTask { id: 1, required_clearance_m: 0.8, climb_m: 1.5, goal: Some(0) };
 const TASKS: [VehicleTask; 2] = [TASK, VehicleTask { id: 2, goal: Some(1), ..TASK }];
 
 fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
@@ -99,11 +105,17 @@ fn call_plans(
     to.call("workspace::PlanWorkspace::new", || size_of_val(&PlanWorkspace::<1, 1, 1>::new()));
     let heights = [1.5, 1.5];
     let good = request(&TASKS, &heights);
-    let modes =
-        [Mode::Labelled, Mode::Unlabelled(Objective::TotalDistance), Mode::Unlabelled(Objective::Makespan)];
+    let modes = [
+        Mode::Labelled,
+        Mode::Unlabelled(Objective::TotalDistance),
+        Mode::Unlabelled(Objective::Makespan),
+    ];
     for mode in modes {
         let request = PlanRequest { mode, ..good };
-        assert_eq!(to.call("plan::plan_swarm", || plan::plan_swarm(view, &request, ws, out)), Ok(()));
+        assert_eq!(
+            to.call("plan::plan_swarm", || plan::plan_swarm(view, &request, ws, out)),
+            Ok(())
+        );
         assert!(out.flights.iter().all(|flight| flight.task.leaves_pad()));
         let total_m = to.call("workspace::SwarmPlan::total_m", || out.total_m());
         to.add(total_m as f32);
@@ -139,11 +151,16 @@ fn call_plans(
     refused(&request(&same, &heights), PlanError::SameGoal(2));
     for goal in [2, 3, u16::MAX] {
         let tasks = [TASK, VehicleTask { goal: Some(goal), ..TASKS[1] }];
-        assert_eq!(plan::plan_swarm(view, &request(&tasks, &heights), ws, out), Err(PlanError::BadGoal(2)));
+        assert_eq!(
+            plan::plan_swarm(view, &request(&tasks, &heights), ws, out),
+            Err(PlanError::BadGoal(2))
+        );
     }
-    // More or fewer vehicles than the roadmap has terminals, and more vehicles than the workspace holds.
+    // More or fewer vehicles than the roadmap has terminals, and more vehicles than the workspace
+    // holds.
     let crowd = [5, 6, 7, 8].map(|id| VehicleTask { id, goal: None, ..TASK });
-    for (vehicles, goals) in [(&TASKS[..1], 2), (&TASKS[..], 1), (&crowd[..3], 2), (&crowd[..], 4), (&[], 0)]
+    for (vehicles, goals) in
+        [(&TASKS[..1], 2), (&TASKS[..], 1), (&crowd[..3], 2), (&crowd[..], 4), (&[], 0)]
     {
         let heights = [1.5; 4];
         let request = request(vehicles, &heights[..goals]);
@@ -152,13 +169,17 @@ fn call_plans(
             Err(PlanError::Terminals)
         );
         let mut assigned = Goals::<VEHICLES>::new();
-        let many = to.call("plan::assign_goals", || plan::assign_goals(&request, ws, &mut assigned));
+        let many =
+            to.call("plan::assign_goals", || plan::assign_goals(&request, ws, &mut assigned));
         assert!(vehicles.len() <= VEHICLES || many == Err(PlanError::SwarmFull));
-        let planned =
-            to.call("plan::schedule_flights", || plan::schedule_flights(view, &request, &assigned, ws, out));
+        let planned = to.call("plan::schedule_flights", || {
+            plan::schedule_flights(view, &request, &assigned, ws, out)
+        });
         assert_eq!(planned, Err(PlanError::Terminals));
     }
-    for (first, second) in [(Some(2), None), (None, Some(u16::MAX)), (Some(1), Some(1)), (None, None)] {
+    for (first, second) in
+        [(Some(2), None), (None, Some(u16::MAX)), (Some(1), Some(1)), (None, None)]
+    {
         let mut assigned = Goals::<VEHICLES>::new();
         assigned.extend([first, second]);
         let planned = plan::schedule_flights(view, &good, &assigned, ws, out);
@@ -185,8 +206,9 @@ fn call_schedules(
     to.call("schedule::ScheduleWorkspace::new", || size_of_val(&ScheduleWorkspace::new()));
     to.call("sipp::SippWorkspace::new", || size_of_val(&SippWorkspace::<1, 1>::new()));
     for index in [0, 1, 2, usize::MAX] {
-        let answer = to
-            .call("plan::vehicle_plan", || plan::vehicle_plan(plan, index, &SCHEDULE, &mut ws.schedule, own));
+        let answer = to.call("plan::vehicle_plan", || {
+            plan::vehicle_plan(plan, index, &SCHEDULE, &mut ws.schedule, own)
+        });
         assert_eq!(answer, if index < 2 { Ok(()) } else { Err(ScheduleError::BadIndex) });
         let mut none: Vec<Gate, 0> = Vec::new();
         let answer = to.call("schedule::gates", || {
@@ -211,7 +233,13 @@ fn call_schedules(
             for cfg in [SCHEDULE, cfg] {
                 // A number that is none has no right answer; it must only end.
                 let answer = to.call("schedule::earliest_departure", || {
-                    schedule::earliest_departure(&cfg, &flight, hard, flights[1..].iter(), &mut ws.schedule)
+                    schedule::earliest_departure(
+                        &cfg,
+                        &flight,
+                        hard,
+                        flights[1..].iter(),
+                        &mut ws.schedule,
+                    )
                 });
                 to.add_bool(answer.is_ok());
                 let pair = [flight.clone(), flights[1].clone()];
@@ -241,9 +269,16 @@ fn call_schedules(
         }
     }
     for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
-        let (from, to_node) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
-        let route =
-            RouteQuery { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
+        let (from, to_node) =
+            (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
+        let route = RouteQuery {
+            cfg: &SCHEDULE,
+            from,
+            to: to_node,
+            not_before_s: 0.0,
+            parked: &[],
+            handover_s: 0.0,
+        };
         let mut flight = plan.flights[0].clone();
         let answer = to.call("sipp::find_route", || {
             sipp::find_route(view, &route, any_edge_passable, [].iter(), &mut ws.sipp, &mut flight)
@@ -276,7 +311,8 @@ fn call_detours(
     let empty: Path<WAYPOINTS> = Path::new();
     for (i, p) in extreme_points().enumerate() {
         let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
-        let thing = KeepOutZone { from: p, to: NODE_PLACES[5], radius_m: hard, kind: natures[i % 3] };
+        let thing =
+            KeepOutZone { from: p, to: NODE_PLACES[5], radius_m: hard, kind: natures[i % 3] };
         for request in [
             good,
             DetourRequest { aside: true, ..good },
@@ -305,7 +341,11 @@ fn call_detours(
             );
             assert!(
                 answer.is_err()
-                    || own.path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()))
+                    || own
+                        .path
+                        .waypoints()
+                        .iter()
+                        .all(|w| w.position.iter().all(|c| c.is_finite()))
             );
             to.add_bool(answer.is_ok());
             let again = to.call("detour::plan_vehicle_detour", || {
@@ -316,7 +356,8 @@ fn call_detours(
         for goal in [2, 4, u16::MAX - 1, u16::MAX] {
             let request = DetourRequest { goal: Goal::Node(goal), ..good };
             assert!(
-                detour::plan_detour(view, &request, &mut [thing], ws, &mut nodes, &mut own.path).is_err()
+                detour::plan_detour(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
+                    .is_err()
             );
         }
         let holds = to.call("detour::KeepOutZone::contains", || thing.contains(&NODE_PLACES[5]));
@@ -329,7 +370,8 @@ fn call_detours(
                 detour::is_path_blocked(path, -1.0..hard, p.x, p.y, &p, &thing)
             });
             to.add_bool(blocked);
-            let count = to.call("detour::count_segments_ahead", || detour::count_segments_ahead(path, hard));
+            let count = to
+                .call("detour::count_segments_ahead", || detour::count_segments_ahead(path, hard));
             assert!(count <= path.waypoints().len() + 2);
         }
     }

@@ -1,4 +1,5 @@
-//! The public functions of a source file, read line by line as rustfmt lays them out. The tests of `tests/` include this file.
+//! The public functions of a source file, read line by line as rustfmt lays them out. The tests of
+//! `tests/` include this file.
 
 use std::borrow::ToOwned;
 use std::string::String;
@@ -19,11 +20,12 @@ fn impl_type_name(line: &str) -> Option<String> {
     Some(of.split(['<', ' ', '{']).next()?.to_owned())
 }
 
-/// Each public function outside the file's module of tests, which comes last: the type that has it if one does, and its name.
+/// Each public function outside the file's module of tests, which comes last: the type that has it
+/// if one does, and its name.
 pub fn public_functions(source: &str) -> Vec<(Option<String>, &str)> {
-    let tests = source
-        .match_indices("#[cfg(test)]\n")
-        .find(|(at, head)| source[at + head.len()..].lines().next().is_some_and(|line| line.ends_with('{')));
+    let tests = source.match_indices("#[cfg(test)]\n").find(|(at, head)| {
+        source[at + head.len()..].lines().next().is_some_and(|line| line.ends_with('{'))
+    });
     let mut functions = Vec::new();
     let mut owner = None;
     for line in source[..tests.map_or(source.len(), |(at, _)| at)].lines() {
@@ -33,7 +35,9 @@ pub fn public_functions(source: &str) -> Vec<(Option<String>, &str)> {
             owner = None;
         }
         let Some(item) = line.trim_start().strip_prefix("pub ") else { continue };
-        let Some(item) = item.strip_prefix("const ").unwrap_or(item).strip_prefix("fn ") else { continue };
+        let Some(item) = item.strip_prefix("const ").unwrap_or(item).strip_prefix("fn ") else {
+            continue;
+        };
         functions.push((owner.clone(), item.split(['(', '<']).next().unwrap_or_default()));
     }
     functions

@@ -57,8 +57,9 @@ pub const RCC_AHB2ENR: u32 = 0x5802_44DC;
 /// RCC_RSR's bit that clears the others.
 pub const RMVF: u32 = 1 << 16;
 
-/// Reason why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset sources). All
-/// causes but a wake-up press the reset pin too, and the power's coming is also a brown-out.
+/// Reason why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset
+/// sources). All causes but a wake-up press the reset pin too, and the power's coming is also a
+/// brown-out.
 pub const fn reset_cause(rsr: u32) -> ResetCause {
     const BOR: u32 = 1 << 21;
     const PIN: u32 = 1 << 22;
@@ -91,7 +92,8 @@ pub const BANK2: Region = Region::new(0x0810_0000, 1 << 20, Access::Uncached);
 pub const NULL: Region = Region::new(0, 256, Access::None);
 /// Where external memory would be, 0x6000_0000 to 0xDFFF_FFFF: by default the processor may read
 /// ahead there, from controllers that are off. Four eighths of all there is.
-pub const EXTERNAL: Region = Region { base: 0, len_log2: 32, access: Access::None, without: 0b1000_0111 };
+pub const EXTERNAL: Region =
+    Region { base: 0, len_log2: 32, access: Access::None, without: 0b1000_0111 };
 
 /// The sectors of bank 2 that a roadmap lies in, cached; the MPU then holds them read only. `at`
 /// and `len` count from the bank's first byte. An eighth of the bank is a sector of 128 kB.

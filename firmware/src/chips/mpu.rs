@@ -31,7 +31,10 @@ impl Region {
     /// # Panics
     /// It cannot be one: too small, or not on a multiple of its length.
     pub const fn new(base: u32, len: u32, access: Access) -> Self {
-        assert!(len.is_power_of_two() && len >= 32, "a region's length is a power of two from 32 on");
+        assert!(
+            len.is_power_of_two() && len >= 32,
+            "a region's length is a power of two from 32 on"
+        );
         assert!(base.is_multiple_of(len), "a region lies on a multiple of its length");
         Self { base, len_log2: len.trailing_zeros(), access, without: 0 }
     }

@@ -15,8 +15,8 @@ pub const STKOFHFNMIGN: u32 = 1 << 10;
 /// 4 of 32 bytes, 43 µs at 921 600 baud; 24 bytes are 260 µs.
 pub const RX_QUARTER: u8 = 0b001;
 
-/// Reason why it started: POWMAN_CHIP_RESET and WATCHDOG_REASON (data sheet, "Chip level resets" and
-/// "Watchdog", registers).
+/// Reason why it started: POWMAN_CHIP_RESET and WATCHDOG_REASON (data sheet, "Chip level resets"
+/// and "Watchdog", registers).
 pub const fn reset_cause(chip_reset: u32, watchdog_reason: u32) -> ResetCause {
     const POWER: u32 = 1 << 16;
     const BROWN_OUT: u32 = 1 << 17;
@@ -30,7 +30,9 @@ pub const fn reset_cause(chip_reset: u32, watchdog_reason: u32) -> ResetCause {
     match chip_reset {
         _ if watchdog_reason & FORCED != 0 => ResetCause::Request,
         _ if watchdog_reason & TIMED_OUT != 0 => ResetCause::Watchdog,
-        _ if chip_reset & (BROWN_OUT | GLITCH) != 0 && chip_reset & POWER == 0 => ResetCause::BrownOut,
+        _ if chip_reset & (BROWN_OUT | GLITCH) != 0 && chip_reset & POWER == 0 => {
+            ResetCause::BrownOut
+        }
         _ if chip_reset & POWER != 0 => ResetCause::Power,
         _ if chip_reset & RUN_PIN != 0 => ResetCause::Key,
         _ if chip_reset & DEBUGGER != 0 => ResetCause::Request,

@@ -32,7 +32,9 @@ fn only_the_sectors_of_the_roadmap_are_cached_and_read_only() {
 
 #[test]
 fn every_revision_of_the_h743_has_a_clock_it_can_run_at() {
-    for (idc, mhz) in [(0x1001_6450, 400), (0x1003_6450, 400), (0x2001_6450, 480), (0x2003_6450, 480)] {
+    for (idc, mhz) in
+        [(0x1001_6450, 400), (0x1003_6450, 400), (0x2001_6450, 480), (0x2003_6450, 480)]
+    {
         let revision = h743::Revision::from_idcode(idc);
         assert_eq!(revision.core_mhz(), mhz);
         for (has_hse, source) in [(true, 8), (false, 64)] {
@@ -66,7 +68,9 @@ fn the_h743_tells_its_resets_apart() {
 
 #[test]
 fn the_level_of_the_brown_out_reset_is_read() {
-    for (optsr, level) in [(0x1BC6_AAF0, 0), (0x1BC6_AAF4, 1), (0x1BC6_AAF8, 2), (0x1BC6_AAFC, 3), (0xC, 3)] {
+    for (optsr, level) in
+        [(0x1BC6_AAF0, 0), (0x1BC6_AAF4, 1), (0x1BC6_AAF8, 2), (0x1BC6_AAFC, 3), (0xC, 3)]
+    {
         assert_eq!(h743::brown_out_level(optsr), level);
     }
 }

@@ -5,7 +5,8 @@ use geojson::{GeoJson, Geometry, GeometryValue};
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
-    let file: GeoJson = text.parse().map_err(|error| AreaFileError::malformed("GeoJSON", &error))?;
+    let file: GeoJson =
+        text.parse().map_err(|error| AreaFileError::malformed("GeoJSON", &error))?;
     let mut polygons = Polygons::default();
     match &file {
         GeoJson::Geometry(geometry) => add(geometry, &mut polygons)?,
@@ -39,7 +40,10 @@ fn add(geometry: &Geometry, polygons: &mut Polygons) -> Result<(), AreaFileError
 fn rings(polygon: &geojson::PolygonType) -> Result<Vec<RingXy>, AreaFileError> {
     let place = |position: &geojson::Position| match position.as_slice() {
         [x, y, ..] => Ok([*x, *y]),
-        short => Err(AreaFileError::malformed("GeoJSON", &format!("a position has {} numbers", short.len()))),
+        short => Err(AreaFileError::malformed(
+            "GeoJSON",
+            &format!("a position has {} numbers", short.len()),
+        )),
     };
     polygon.iter().map(|ring| ring.iter().map(place).collect()).collect()
 }

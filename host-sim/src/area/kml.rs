@@ -12,9 +12,13 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     // The reader calls itself for each folder and geometry within another one.
     let nested = ["<Folder", "<Document", "<MultiGeometry"];
     if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > MAX_FOLDER_DEPTH {
-        return Err(AreaFileError::malformed("KML that can be read", &"it has more than 64 folders"));
+        return Err(AreaFileError::malformed(
+            "KML that can be read",
+            &"it has more than 64 folders",
+        ));
     }
-    let file: Kml<f64> = text.parse().map_err(|error: kml::Error| AreaFileError::malformed("KML", &error))?;
+    let file: Kml<f64> =
+        text.parse().map_err(|error: kml::Error| AreaFileError::malformed("KML", &error))?;
     let mut polygons = Polygons::default();
     add(&file, &mut polygons);
     Ok(polygons)
@@ -37,7 +41,9 @@ fn add(element: &Kml<f64>, polygons: &mut Polygons) {
 fn add_geometry(geometry: &Geometry<f64>, polygons: &mut Polygons) {
     match geometry {
         Geometry::Polygon(polygon) => polygons.add(rings(polygon)),
-        Geometry::MultiGeometry(many) => many.geometries.iter().for_each(|g| add_geometry(g, polygons)),
+        Geometry::MultiGeometry(many) => {
+            many.geometries.iter().for_each(|g| add_geometry(g, polygons))
+        }
         _ => {}
     }
 }

@@ -1,7 +1,8 @@
-//! Polygons from files: what is to be photographed, holes in it, and zones that no vehicle may enter.
+//! Polygons from files: what is to be photographed, holes in it, and zones that no vehicle may
+//! enter.
 //!
-//! GeoJSON, WKT, KML and QGroundControl `.plan`. Points and lines in a file are passed over. Coordinates are as the file
-//! has them, x (east or longitude) first.
+//! GeoJSON, WKT, KML and QGroundControl `.plan`. Points and lines in a file are passed over.
+//! Coordinates are as the file has them, x (east or longitude) first.
 
 mod geojson;
 mod kml;
@@ -73,7 +74,12 @@ pub fn parse(text: &str, format: AreaFormat) -> Result<Polygons, AreaFileError> 
         };
         return Err(AreaFileError::NoPolygon(hint));
     }
-    polygons.outers.iter_mut().chain(&mut polygons.holes).chain(&mut polygons.no_fly).for_each(open_ring);
+    polygons
+        .outers
+        .iter_mut()
+        .chain(&mut polygons.holes)
+        .chain(&mut polygons.no_fly)
+        .for_each(open_ring);
     let count = polygons.vertex_count();
     if count > MAX_VERTICES { Err(AreaFileError::TooManyVertices(count)) } else { Ok(polygons) }
 }

@@ -1,8 +1,9 @@
-//! Rings that share ground although their edges do not cross: one inside another, the same one twice, or two whose edges lie
-//! on each other. What is inside an odd number of rings is photographed, so that two holes over each other are none.
+//! Rings that share ground although their edges do not cross: one inside another, the same one
+//! twice, or two whose edges lie on each other. What is inside an odd number of rings is
+//! photographed, so that two holes over each other are none.
 //!
-//! Each edge is cut where the other ring meets it; the middle of every piece lies inside the other ring, outside or on its
-//! border. f64, metres; cost n · m for rings whose boxes meet.
+//! Each edge is cut where the other ring meets it; the middle of every piece lies inside the other
+//! ring, outside or on its border. f64, metres; cost n · m for rings whose boxes meet.
 
 use planner_core::coverage::Flat;
 
@@ -35,7 +36,9 @@ pub fn find_overlap(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
     let mut left_m2: Vec<f64> = outers.iter().map(RingF64::area_m2).collect();
     for (index, hole) in holes.iter().enumerate() {
         let around = |outer: &RingF64| !hole.relation_to(outer).outside;
-        let Some(own) = outers.iter().position(around) else { return Some(Overlap::HoleOut(index)) };
+        let Some(own) = outers.iter().position(around) else {
+            return Some(Overlap::HoleOut(index));
+        };
         left_m2[own] -= hole.area_m2();
     }
     let nothing = |(ring, left_m2): (&RingF64, &f64)| *left_m2 < ON_BORDER_M * ring.perimeter_m();
@@ -76,7 +79,11 @@ fn rings_to_f64(rings: &[&[Flat]]) -> Vec<RingF64> {
         let side = |from: f64, pick: fn(f64, f64) -> f64| {
             [0, 1].map(|axis| ring.iter().map(|v| v[axis]).fold(from, pick))
         };
-        RingF64 { low: side(f64::INFINITY, f64::min), high: side(f64::NEG_INFINITY, f64::max), ring }
+        RingF64 {
+            low: side(f64::INFINITY, f64::min),
+            high: side(f64::NEG_INFINITY, f64::max),
+            ring,
+        }
     };
     rings.iter().map(wide).collect()
 }
@@ -176,7 +183,9 @@ mod tests {
 
     /// A rectangle by its corners in whole metres.
     fn rectangle([x0, y0, x1, y1]: [u32; 4]) -> Vec<Flat> {
-        [[x0, y0], [x1, y0], [x1, y1], [x0, y1]].map(|[x, y]| Flat::new(x as f32, y as f32)).to_vec()
+        [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+            .map(|[x, y]| Flat::new(x as f32, y as f32))
+            .to_vec()
     }
 
     fn random(pcg: &mut rand_pcg::Pcg32, most: u32) -> [u32; 4] {
@@ -196,14 +205,16 @@ mod tests {
             let mut pcg = rand_pcg::Pcg32::seed_from_u64(seed);
             let outers: Vec<[u32; 4]> = (0..1 + seed % 2).map(|_| random(&mut pcg, 6)).collect();
             let holes: Vec<[u32; 4]> = (0..seed % 3).map(|_| random(&mut pcg, 6)).collect();
-            let holds = |r: &[u32; 4], x: u32, y: u32| r[0] <= x && x < r[2] && r[1] <= y && y < r[3];
+            let holds =
+                |r: &[u32; 4], x: u32, y: u32| r[0] <= x && x < r[2] && r[1] <= y && y < r[3];
             let count = |all: &[[u32; 4]], x, y| all.iter().filter(|r| holds(r, x, y)).count();
             let cells = || (0..6).flat_map(|x| (0..6).map(move |y| (x, y)));
             let within = |hole: &[u32; 4], outer: &[u32; 4]| {
                 cells().all(|(x, y)| !holds(hole, x, y) || holds(outer, x, y))
             };
-            let full =
-                |outer: &[u32; 4]| cells().all(|(x, y)| !holds(outer, x, y) || count(&holes, x, y) > 0);
+            let full = |outer: &[u32; 4]| {
+                cells().all(|(x, y)| !holds(outer, x, y) || count(&holes, x, y) > 0)
+            };
             let right = if cells().any(|(x, y)| count(&outers, x, y) > 1) {
                 1
             } else if cells().any(|(x, y)| count(&holes, x, y) > 1) {
@@ -215,8 +226,8 @@ mod tests {
             };
             let [outer_rings, hole_rings] =
                 [&outers, &holes].map(|all| all.iter().copied().map(rectangle).collect::<Vec<_>>());
-            let [o, h] =
-                [&outer_rings, &hole_rings].map(|all| all.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            let [o, h] = [&outer_rings, &hole_rings]
+                .map(|all| all.iter().map(Vec::as_slice).collect::<Vec<_>>());
             let found = match find_overlap(&o, &h) {
                 None => 0,
                 Some(Overlap::Outers(..)) => 1,

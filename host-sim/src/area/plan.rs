@@ -1,6 +1,8 @@
-//! QGroundControl `.plan`: the polygons of its surveys, else its inclusion fences; exclusion fences are no-fly zones.
+//! QGroundControl `.plan`: the polygons of its surveys, else its inclusion fences; exclusion fences
+//! are no-fly zones.
 //!
-//! Format: <https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html>. Latitude stands first in it.
+//! Format: <https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html>.
+//! Latitude stands first in it.
 
 use serde::Deserialize;
 
@@ -62,21 +64,32 @@ struct Circle {
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     const FORMAT: &str = "a plan of QGroundControl";
-    let file: File = serde_json::from_str(text).map_err(|error| AreaFileError::malformed(FORMAT, &error))?;
+    let file: File =
+        serde_json::from_str(text).map_err(|error| AreaFileError::malformed(FORMAT, &error))?;
     if file.file_type != "Plan" || file.version != 1 {
-        let why = format!("fileType {:?}, version {}: expected \"Plan\", 1", file.file_type, file.version);
+        let why = format!(
+            "fileType {:?}, version {}: expected \"Plan\", 1",
+            file.file_type, file.version
+        );
         return Err(AreaFileError::malformed(FORMAT, &why));
     }
     let surveys = file.mission.items.into_iter();
     let surveys = surveys.filter(|item| item.complex_item_type.as_deref() == Some("survey"));
     let mut polygons = Polygons {
-        outers: surveys.filter_map(|item| item.polygon).map(|ring| longitude_first(&ring)).collect(),
+        outers: surveys
+            .filter_map(|item| item.polygon)
+            .map(|ring| longitude_first(&ring))
+            .collect(),
         ..Polygons::default()
     };
     let has_survey = !polygons.outers.is_empty();
-    let fences = file.geo_fence.polygons.into_iter().map(|f| (f.inclusion, longitude_first(&f.polygon)));
-    let circles =
-        file.geo_fence.circles.into_iter().map(|f| (f.inclusion, circle_polygon(&f.circle, f.inclusion)));
+    let fences =
+        file.geo_fence.polygons.into_iter().map(|f| (f.inclusion, longitude_first(&f.polygon)));
+    let circles = file
+        .geo_fence
+        .circles
+        .into_iter()
+        .map(|f| (f.inclusion, circle_polygon(&f.circle, f.inclusion)));
     for (inclusion, ring) in fences.chain(circles) {
         match (inclusion, has_survey) {
             (false, _) => polygons.no_fly.push(ring),

@@ -38,7 +38,9 @@ fn all_formats_say_the_same() {
 #[test]
 fn a_plan_gives_its_survey_or_its_fence() {
     let plan = |items: &str, fence: &str| {
-        format!(r#"{{"fileType":"Plan","version":1,"mission":{{"items":[{items}]}},"geoFence":{fence}}}"#)
+        format!(
+            r#"{{"fileType":"Plan","version":1,"mission":{{"items":[{items}]}},"geoFence":{fence}}}"#
+        )
     };
     let survey = r#"{"complexItemType":"survey","polygon":[[2,1],[2,5],[6,5],[6,1]]}"#;
     let fence = r#"{"polygons":[{"inclusion":true,"polygon":[[0,0],[0,9],[9,9]]},

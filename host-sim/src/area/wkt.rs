@@ -12,7 +12,10 @@ const MAX_COLLECTIONS: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     if text.to_ascii_uppercase().matches("COLLECTION").count() > MAX_COLLECTIONS {
-        return Err(AreaFileError::malformed("WKT that can be read", &"it has more than 64 collections"));
+        return Err(AreaFileError::malformed(
+            "WKT that can be read",
+            &"it has more than 64 collections",
+        ));
     }
     // PostGIS writes the reference system before it; [area] says what the coordinates are.
     let text = text.trim();
@@ -20,7 +23,8 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
         Some((system, rest)) if system.to_ascii_uppercase().starts_with("SRID=") => rest,
         _ => text,
     };
-    let geometry = Wkt::<f64>::from_str(text).map_err(|error| AreaFileError::malformed("WKT", &error))?;
+    let geometry =
+        Wkt::<f64>::from_str(text).map_err(|error| AreaFileError::malformed("WKT", &error))?;
     let mut polygons = Polygons::default();
     add(&geometry, &mut polygons);
     Ok(polygons)

@@ -45,13 +45,21 @@ pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8
         settle(&mut store);
         for (i, piece) in bytes.chunks(MAX_DATA).enumerate() {
             let taken = store.take_piece((i * MAX_DATA) as u32, piece);
-            ensure!(taken == PieceOutcome::Yes, "a board's store refuses {}: {taken:?}", file.name());
+            ensure!(
+                taken == PieceOutcome::Yes,
+                "a board's store refuses {}: {taken:?}",
+                file.name()
+            );
             settle(&mut store);
         }
         store.finish_upload();
         settle(&mut store);
         let ended = store.upload_state();
-        ensure!(ended == Some(UploadState::Ended(Ok(()))), "a board refuses {}: {ended:?}", file.name());
+        ensure!(
+            ended == Some(UploadState::Ended(Ok(()))),
+            "a board refuses {}: {ended:?}",
+            file.name()
+        );
     }
     Ok(flash.into_bytes())
 }

@@ -1,8 +1,9 @@
 //! Boards in QEMU whose time is the simulation's: lock step.
 //!
-//! A board is the firmware as it is built for `qemu`, on a Cortex-M7 whose instructions take 2 ns each (`-icount
-//! shift=1,sleep=off`). It runs for as long as it is granted, and stands still until the next grant; so what it does
-//! depends on no clock and no load of this machine ([`lock_step`] has the protocol).
+//! A board is the firmware as it is built for `qemu`, on a Cortex-M7 whose instructions take 2 ns
+//! each (`-icount shift=1,sleep=off`). It runs for as long as it is granted, and stands still until
+//! the next grant; so what it does depends on no clock and no load of this machine ([`lock_step`]
+//! has the protocol).
 
 mod bank;
 mod probe;
@@ -135,7 +136,8 @@ impl EmulatedBoard {
         self.finish_grant_within(ANSWER_TIMEOUT)
     }
 
-    /// The same with another patience: a board that goes nowhere until its watchdog resets it takes this machine seconds.
+    /// The same with another patience: a board that goes nowhere until its watchdog resets it takes
+    /// this machine seconds.
     ///
     /// # Errors
     /// As [`finish_grant`](Self::finish_grant).
@@ -155,13 +157,21 @@ impl EmulatedBoard {
     ///
     /// # Errors
     /// As [`begin_grant`](Self::begin_grant) and [`finish_grant`](Self::finish_grant).
-    pub fn run_grant(&mut self, until_us: u64, pieces: &[PortBytes]) -> anyhow::Result<GrantResult> {
+    pub fn run_grant(
+        &mut self,
+        until_us: u64,
+        pieces: &[PortBytes],
+    ) -> anyhow::Result<GrantResult> {
         self.begin_grant(until_us, pieces)?;
         self.finish_grant()
     }
 
     fn send(&mut self, message: &[u8]) -> anyhow::Result<()> {
-        ensure!(message.len() <= LONGEST, "{} bytes at once are too many for a board", message.len());
+        ensure!(
+            message.len() <= LONGEST,
+            "{} bytes at once are too many for a board",
+            message.len()
+        );
         let length = (message.len() as u32).to_le_bytes();
         self.input.write_all(&[&length, message].concat()).context("the board is gone")
     }
@@ -185,9 +195,12 @@ fn read_answer(output: &mut BufReader<ChildStdout>) -> anyhow::Result<GrantResul
         let mut bytes = vec![0; record.payload_len()];
         output.read_exact(&mut bytes).context("the board is gone")?;
         match record {
-            FromBoard::Started => return Ok(GrantResult { restarted: true, ..GrantResult::default() }),
+            FromBoard::Started => {
+                return Ok(GrantResult { restarted: true, ..GrantResult::default() });
+            }
             FromBoard::Sent { port, at_us, .. } => {
-                let port = if port == Port::Autopilot as u8 { Port::Autopilot } else { Port::Swarm };
+                let port =
+                    if port == Port::Autopilot as u8 { Port::Autopilot } else { Port::Swarm };
                 answer.sent.push(PortBytes { port, at_us, bytes });
             }
             FromBoard::Memory { .. } => answer.memory.extend(bytes),

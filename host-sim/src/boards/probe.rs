@@ -40,16 +40,18 @@ impl EmulatedBoard {
     /// The board is gone.
     pub fn write_memory(&mut self, address: u32, bytes: &[u8]) -> anyhow::Result<()> {
         for (i, bytes) in bytes.chunks(MEMORY_CHUNK).enumerate() {
-            let head =
-                ToBoard::Poke { address: address + (i * MEMORY_CHUNK) as u32, len: bytes.len() as u16 };
+            let head = ToBoard::Poke {
+                address: address + (i * MEMORY_CHUNK) as u32,
+                len: bytes.len() as u16,
+            };
             self.send(&[&head.to_bytes(), bytes].concat())?;
             self.finish_grant()?;
         }
         Ok(())
     }
 
-    /// Calls a function, above every task and at this moment of the board's time; what came of it is that the board waits
-    /// again, or that it starts again.
+    /// Calls a function, above every task and at this moment of the board's time; what came of it
+    /// is that the board waits again, or that it starts again.
     ///
     /// # Errors
     /// The board is gone, or hangs for longer than `patience`.

@@ -1,7 +1,9 @@
-//! `host-sim autopilot`: one simulated autopilot in real time, on flat ground at the altitude of its home.
+//! `host-sim autopilot`: one simulated autopilot in real time, on flat ground at the altitude of
+//! its home.
 //!
-//! Steps of 4 ms are made when the clock has passed them; between them the process sleeps. A machine too slow for that
-//! (more than a second behind) lets simulated time lag rather than run ever later.
+//! Steps of 4 ms are made when the clock has passed them; between them the process sleeps. A
+//! machine too slow for that (more than a second behind) lets simulated time lag rather than run
+//! ever later.
 
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -26,8 +28,8 @@ const MAX_DATAGRAM: usize = 1400;
 /// Arguments of `host-sim autopilot`.
 #[derive(Args, Clone, Debug)]
 pub struct AutopilotArgs {
-    /// Link to serve: tcp:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT, udp-listen:HOST:PORT or serial:PATH:BAUD; may
-    /// be repeated
+    /// Link to serve: tcp:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT, udp-listen:HOST:PORT or
+    /// serial:PATH:BAUD; may be repeated
     #[arg(long, value_name = "URL", required = true)]
     pub listen: Vec<LinkUrl>,
     /// Which autopilot to be
@@ -76,14 +78,16 @@ impl FromStr for Place {
         };
         let place = Geodetic { lat_deg, lon_deg, alt_m };
         if text.split(',').count() != 3 || !place.is_valid() {
-            return Err("expected latitude within ±90, longitude within ±180, finite altitude".to_owned());
+            return Err(
+                "expected latitude within ±90, longitude within ±180, finite altitude".to_owned()
+            );
         }
         Ok(Self(place))
     }
 }
 
-/// Serves one simulated autopilot until the process is ended. Prints `listening URL` for each link, with the port it
-/// got where 0 was asked for.
+/// Serves one simulated autopilot until the process is ended. Prints `listening URL` for each link,
+/// with the port it got where 0 was asked for.
 ///
 /// # Errors
 /// A link that cannot be opened or is lost for good, a personality not simulated.
@@ -96,12 +100,15 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         ekf_origin: args.origin.map_or(home, |place| place.0),
         start: Point::zeros(),
         estimator_ready_s: args.ready_after,
-        boot_unix_us: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_micros() as u64),
+        boot_unix_us: SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .map_or(0, |t| t.as_micros() as u64),
         ports: args.listen.len(),
         forwards: true,
         ..Config::default()
     };
-    let mut autopilot = Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
+    let mut autopilot =
+        Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
     let mut links = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
@@ -114,7 +121,8 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     let mut next = Instant::now();
     loop {
         for (port, (url, link)) in links.iter_mut().enumerate() {
-            exchange_bytes(&mut autopilot, port, &mut **link).with_context(|| format!("link lost: {url}"))?;
+            exchange_bytes(&mut autopilot, port, &mut **link)
+                .with_context(|| format!("link lost: {url}"))?;
         }
         autopilot.step(PHYSICS_STEP.as_secs_f32(), ground_up_m);
         next += PHYSICS_STEP;
@@ -127,7 +135,11 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Everything that came in, then everything that is to go out.
-fn exchange_bytes(autopilot: &mut Autopilot, port: usize, link: &mut dyn Link) -> std::io::Result<()> {
+fn exchange_bytes(
+    autopilot: &mut Autopilot,
+    port: usize,
+    link: &mut dyn Link,
+) -> std::io::Result<()> {
     let mut buffer = [0; 2048];
     loop {
         let len = link.receive(&mut buffer)?;

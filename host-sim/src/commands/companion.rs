@@ -27,8 +27,8 @@ use crate::swarm::vehicles::companion_config;
 pub struct Args {
     /// The mission of the whole swarm
     scenario: PathBuf,
-    /// Link to the autopilot: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT, tcp-listen:HOST:PORT or
-    /// serial:PATH:BAUD
+    /// Link to the autopilot: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT,
+    /// tcp-listen:HOST:PORT or serial:PATH:BAUD
     #[arg(long, value_name = "URL")]
     autopilot: LinkUrl,
     /// Link to the other companions; without it this vehicle flies as the only one
@@ -40,8 +40,8 @@ pub struct Args {
     /// Start the mission as soon as it is ready, without a ground station's command
     #[arg(long)]
     start: bool,
-    /// Keep what ground stations upload and set in this file, as a board keeps it in its flash; without it that is gone at the
-    /// end
+    /// Keep what ground stations upload and set in this file, as a board keeps it in its flash;
+    /// without it that is gone at the end
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
 }
@@ -74,11 +74,16 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
         say!("no --swarm link: vehicle {} flies as the only one", args.id);
-        config.roster =
-            config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
+        config.roster = config
+            .roster
+            .iter()
+            .filter(|e| e.system_id == args.id)
+            .copied()
+            .collect::<FixedVec<_, _>>();
     }
     let mut companion = start(&config, &mut flash)?;
-    let mut links: Vec<(Link, Box<dyn link::Link>)> = vec![(Link::Autopilot, args.autopilot.open()?)];
+    let mut links: Vec<(Link, Box<dyn link::Link>)> =
+        vec![(Link::Autopilot, args.autopilot.open()?)];
     if let Some(swarm) = &args.swarm {
         links.push((Link::Swarm, swarm.open()?));
     }
@@ -109,10 +114,16 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             match event {
                 Event::RestartRequested => restarts = true,
                 Event::WaitsForStart { id } => {
-                    say!("{:9.3} s  waiting for vehicle {id}: not started", began.elapsed().as_secs_f32());
+                    say!(
+                        "{:9.3} s  waiting for vehicle {id}: not started",
+                        began.elapsed().as_secs_f32()
+                    );
                 }
                 Event::FlownAround { left } => {
-                    say!("{:9.3} s  flown around: {left} waypoints are left", began.elapsed().as_secs_f32());
+                    say!(
+                        "{:9.3} s  flown around: {left} waypoints are left",
+                        began.elapsed().as_secs_f32()
+                    );
                 }
                 Event::PlanRequested(wanted) => {
                     let mut own = mission.answer_plan_request(&plan, index, wanted, &mut companion);
@@ -120,7 +131,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                         own.gates.clear();
                         own.depart_s = 0.0;
                     }
-                    companion.handle_plan(now(), wanted, own.as_deref().map_err(|failure| *failure));
+                    companion.handle_plan(
+                        now(),
+                        wanted,
+                        own.as_deref().map_err(|failure| *failure),
+                    );
                 }
                 Event::StateChanged { from, to, text, .. } => {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
@@ -153,7 +168,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         if !is_finished(state) || flies {
             finished_at = None;
         } else if finished_at.get_or_insert_with(Clock::now).elapsed() > REPORT_END_FOR {
-            return Ok(if state == State::Done && !is_short { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+            return Ok(if state == State::Done && !is_short {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            });
         }
         sleep(POLL_SLEEP);
     }

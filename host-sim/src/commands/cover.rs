@@ -15,7 +15,9 @@ use crate::files::ResultFiles;
 use crate::output;
 use crate::quote::quoted_path;
 use crate::report;
-use crate::result::{self, CoverageResult, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded};
+use crate::result::{
+    self, CoverageResult, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded,
+};
 use crate::say;
 use crate::scenario::coverage::Method;
 use crate::scenario::{self, Scenario};
@@ -25,11 +27,13 @@ use crate::scenario::{self, Scenario};
 pub struct Args {
     /// The scenario, with an `[area]`
     scenario: PathBuf,
-    /// Directory for `result.json`, `timing.json`, `report.html`, `waypoints.csv`, `area.geojson`, and for each vehicle's
-    /// `vehicle-N.plan` and `vehicle-N.waypoints` (`vehicle-N-sortie-K` where it takes more than one battery)
+    /// Directory for `result.json`, `timing.json`, `report.html`, `waypoints.csv`, `area.geojson`,
+    /// and for each vehicle's `vehicle-N.plan` and `vehicle-N.waypoints` (`vehicle-N-sortie-K`
+    /// where it takes more than one battery)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Divide the work so, whatever the scenario says: simple-binpat, binpat, powell-binpat or exact
+    /// Divide the work so, whatever the scenario says: simple-binpat, binpat, powell-binpat or
+    /// exact
     #[arg(long, value_name = "METHOD", value_parser = Method::named)]
     method: Option<Method>,
 }
@@ -58,7 +62,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = scenario::load(&args.scenario)?;
     scenario.check_supported()?;
     let files = extra_file_names(&scenario);
-    let names: Vec<&str> = output::RESULT_FILES.into_iter().chain(files.iter().map(String::as_str)).collect();
+    let names: Vec<&str> =
+        output::RESULT_FILES.into_iter().chain(files.iter().map(String::as_str)).collect();
     let mut results = ResultFiles::open(&args.out, &names)?;
     let usual = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
     let planned = CoveragePlan::new(&scenario, args.method.unwrap_or(usual))?;
@@ -115,17 +120,20 @@ fn add_flights(
         }
     }
     results.add("waypoints.csv", export::flights_csv(planned, flights).as_bytes())?;
-    results.add("area.geojson", result::json(&export::area_geojson(planned, flights))?.as_bytes())?;
+    results
+        .add("area.geojson", result::json(&export::area_geojson(planned, flights))?.as_bytes())?;
     Ok(written)
 }
 
-/// Removes the plans of an earlier run that this one did not write: nobody is to upload one of them with the others.
+/// Removes the plans of an earlier run that this one did not write: nobody is to upload one of them
+/// with the others.
 fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_plan = |name: &str| {
         let stem = name.strip_suffix(".plan").or_else(|| name.strip_suffix(".waypoints"));
         stem.and_then(|stem| stem.strip_prefix("vehicle-")).is_some_and(|ids| {
-            ids.split_once("-sortie-").map_or(number(ids), |(id, sortie)| number(id) && number(sortie))
+            ids.split_once("-sortie-")
+                .map_or(number(ids), |(id, sortie)| number(id) && number(sortie))
         })
     };
     for entry in fs::read_dir(dir)? {
@@ -134,7 +142,8 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
         let stale = |name: &str| is_plan(name) && !written.iter().any(|own| own == name);
         if entry.file_type()?.is_file() && name.to_str().is_some_and(stale) {
             let path = entry.path();
-            fs::remove_file(&path).with_context(|| format!("cannot remove: {}", quoted_path(&path)))?;
+            fs::remove_file(&path)
+                .with_context(|| format!("cannot remove: {}", quoted_path(&path)))?;
         }
     }
     Ok(())
@@ -205,8 +214,11 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
             route.cost_m
         );
         for (number, sortie) in (1..).zip(&route.sorties).filter(|_| route.sorties.len() > 1) {
-            let (first, last) =
-                if route.backward { (sortie.last, sortie.first) } else { (sortie.first, sortie.last) };
+            let (first, last) = if route.backward {
+                (sortie.last, sortie.first)
+            } else {
+                (sortie.first, sortie.last)
+            };
             say!(
                 "  sortie {number:<4}  {:<10}  {:>7}  {:>8.1}  {:>7.1}  {:>7.1}",
                 format!("{first} to {last}"),
@@ -250,10 +262,9 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
 
 /// Without `endurance_s` nothing says whether a battery lasts.
 fn print_batteries(planned: &CoveragePlan<'_>) {
-    let unknown = planned
-        .sorties
-        .iter()
-        .filter(|sortie| planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none());
+    let unknown = planned.sorties.iter().filter(|sortie| {
+        planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none()
+    });
     let longest_s = unknown.map(|sortie| sortie.flown_s).fold(0.0, f32::max);
     if longest_s > 0.0 && !planned.wanted.batteries {
         say!("batteries  not checked: vehicles without endurance_s fly up to {longest_s:.0} s");

@@ -37,26 +37,31 @@ pub struct FlyArgs {
     /// Fly at the speed of the clock instead of as fast as it goes
     #[arg(long)]
     realtime: bool,
-    /// Show the swarm to a ground station behind this link, at the speed of the clock: udp:HOST:14550 for QGroundControl
+    /// Show the swarm to a ground station behind this link, at the speed of the clock:
+    /// udp:HOST:14550 for QGroundControl
     #[arg(long, value_name = "URL")]
     qgc: Option<LinkUrl>,
     /// Take this seed instead of the scenario's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// A board or another process decides for the scenario's first vehicle; given again, for the second, and so on. Its port for
-    /// the autopilot: tcp:HOST:PORT, udp:HOST:PORT, serial:PATH:BAUD or one that listens. Flies at the speed of the clock
+    /// A board or another process decides for the scenario's first vehicle; given again, for the
+    /// second, and so on. Its port for the autopilot: tcp:HOST:PORT, udp:HOST:PORT,
+    /// serial:PATH:BAUD or one that listens. Flies at the speed of the clock
     #[arg(long, value_name = "URL")]
     companion: Vec<LinkUrl>,
-    /// The first such companion's port for the radio; given again, the second's, and so on. One without it and the
-    /// others hear each other only where its own radio joins them, and do not start where they are to
+    /// The first such companion's port for the radio; given again, the second's, and so on. One
+    /// without it and the others hear each other only where its own radio joins them, and do not
+    /// start where they are to
     #[arg(long, value_name = "URL", requires = "companion")]
     radio: Vec<LinkUrl>,
-    /// Boards in QEMU decide, in lock step with the simulation: the firmware that `cargo xtask build --board qemu` makes. Each has
-    /// roadmap and mission in its flash and logs to board-N.defmt in the directory
+    /// Boards in QEMU decide, in lock step with the simulation: the firmware that
+    /// `cargo xtask build --board qemu` makes. Each has roadmap and mission in its flash and logs
+    /// to board-N.defmt in the directory
     #[arg(long, value_name = "FIRMWARE", conflicts_with = "companion")]
     emulate: Option<PathBuf>,
-    /// Keep what each companion keeps in its flash in this directory, as boards do: parameters, and in a coverage mission
-    /// what is photographed. The next flight continues there, and is judged by the pictures of all
+    /// Keep what each companion keeps in its flash in this directory, as boards do: parameters, and
+    /// in a coverage mission what is photographed. The next flight continues there, and is judged
+    /// by the pictures of all
     #[arg(long, value_name = "DIR", conflicts_with_all = ["companion", "emulate"])]
     flash: Option<PathBuf>,
     /// How many of the scenario's first vehicles have such a board, if not all
@@ -103,21 +108,27 @@ fn set_board_links(
     radios: &[LinkUrl],
 ) -> anyhow::Result<()> {
     let (boards, vehicles) = (companions.len(), scenario.vehicles.len());
-    ensure!(boards <= vehicles, "too many --companion: {boards}: {} has {vehicles} vehicles", scenario.path);
+    ensure!(
+        boards <= vehicles,
+        "too many --companion: {boards}: {} has {vehicles} vehicles",
+        scenario.path
+    );
     ensure!(
         radios.len() <= boards,
         "too many --radio: {}: each belongs to one --companion, of which there are {boards}",
         radios.len()
     );
     for (i, (vehicle, autopilot)) in scenario.vehicles.iter_mut().zip(companions).enumerate() {
-        vehicle.companion = Companion::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
+        vehicle.companion =
+            Companion::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
     }
     Ok(())
 }
 
 /// Each companion has a file in this directory for its flash.
 fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
-    fs::create_dir_all(dir).with_context(|| format!("cannot keep flashes: {}", quoted_path(dir)))?;
+    fs::create_dir_all(dir)
+        .with_context(|| format!("cannot keep flashes: {}", quoted_path(dir)))?;
     for vehicle in &mut scenario.vehicles {
         ensure!(
             matches!(vehicle.companion, Companion::InProcess { .. }),
@@ -139,7 +150,11 @@ fn set_emulated_boards(
 ) -> anyhow::Result<()> {
     let vehicles = scenario.vehicles.len();
     let boards = boards.unwrap_or(vehicles);
-    ensure!(boards <= vehicles, "too many --boards: {boards}: {} has {vehicles} vehicles", scenario.path);
+    ensure!(
+        boards <= vehicles,
+        "too many --boards: {boards}: {} has {vehicles} vehicles",
+        scenario.path
+    );
     for vehicle in &mut scenario.vehicles[..boards] {
         let log = out.join(format!("board-{}.defmt", vehicle.id));
         vehicle.companion = Companion::Emulated { program: program.to_owned(), log };
@@ -172,7 +187,9 @@ fn plan_and_fly(
     let mut mission = Mission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
     let mut flight = match gateway {
-        Some(gateway) => swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?,
+        Some(gateway) => {
+            swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?
+        }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
     if let Some(kept) = &kept {

@@ -22,12 +22,13 @@ use crate::shortage;
 pub struct Args {
     /// The scenario
     scenario: PathBuf,
-    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`, and for the files that a board
-    /// is given: `roadmap.bin`, or `field.bin` over terrain, and `mission.bin`
+    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`, and
+    /// for the files that a board is given: `roadmap.bin`, or `field.bin` over terrain, and
+    /// `mission.bin`
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Make files that this board holds: nucleo-h743, qemu or pico2. Of the roadmap's edges some are left out, paths lengthen
-    /// little
+    /// Make files that this board holds: nucleo-h743, qemu or pico2. Of the roadmap's edges some
+    /// are left out, paths lengthen little
     #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
     board: Option<&'static BoardCapacity>,
 }
@@ -71,7 +72,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             Some(why) => say!("board      {} does not hold the files: {why}", board.name),
         }
     }
-    let BuildTimes { boxes_s, nodes_s, edges_s, passages_s, cap_s, file_s } = mission.timing.roadmap_parts;
+    let BuildTimes { boxes_s, nodes_s, edges_s, passages_s, cap_s, file_s } =
+        mission.timing.roadmap_parts;
     say!(
         "times      map {:.1} ms, roadmap {:.1} ms: boxes {:.1}, nodes {:.1}, edges {:.1}, passages {:.1}, capping {:.1}, \
          file {:.1}",

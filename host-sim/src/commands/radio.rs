@@ -17,8 +17,8 @@ use crate::swarm::radio::{Radio, RadioConfig};
 /// Arguments of `host-sim radio`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A companion's or ground station's link, one for each: udp-listen:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT,
-    /// tcp:HOST:PORT or serial:PATH:BAUD
+    /// A companion's or ground station's link, one for each: udp-listen:HOST:PORT,
+    /// tcp-listen:HOST:PORT, udp:HOST:PORT, tcp:HOST:PORT or serial:PATH:BAUD
     #[arg(long, value_name = "URL", required = true)]
     listen: Vec<LinkUrl>,
     /// Share of frames that a receiver misses
@@ -47,7 +47,8 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_number(text, 60.0)
 }
 
-/// Passes every frame on to all other links until the process is ended. Prints `listening URL` for each.
+/// Passes every frame on to all other links until the process is ended. Prints `listening URL` for
+/// each.
 ///
 /// # Errors
 /// A link that cannot be opened or is lost for good.

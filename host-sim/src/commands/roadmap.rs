@@ -59,7 +59,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Action::Info { file } => {
             let bytes = files::read(file, files::BINARY_BYTES)
                 .with_context(|| format!("cannot read: {}", quoted_path(file)))?;
-            let view = parse(&bytes).with_context(|| format!("not a roadmap: {}", quoted_path(file)))?;
+            let view =
+                parse(&bytes).with_context(|| format!("not a roadmap: {}", quoted_path(file)))?;
             print(&view);
         }
     }
@@ -73,7 +74,10 @@ fn print(view: &RoadmapView<'_>) {
     say!("nodes          {} ({} starts, {} goals)", view.node_count(), header.starts, header.goals);
     say!("edges          {}", view.half_edge_count() / 2);
     say!("edge length    {} to {} m", header.edge_min_m, header.edge_max_m);
-    say!("clearance      tested above {} m, narrowest edge {narrowest} m", header.tested_clearance_m);
+    say!(
+        "clearance      tested above {} m, narrowest edge {narrowest} m",
+        header.tested_clearance_m
+    );
     say!(
         "origin         {:.7}, {:.7}, {:.1} m",
         header.origin.lat_deg,
@@ -81,7 +85,8 @@ fn print(view: &RoadmapView<'_>) {
         header.origin.alt_m
     );
     say!("landmarks      {}", if view.has_landmarks() { LANDMARKS } else { 0 });
-    let grounded = (0..view.node_count() as u16).filter(|node| view.ground_m(*node).is_some()).count();
+    let grounded =
+        (0..view.node_count() as u16).filter(|node| view.ground_m(*node).is_some()).count();
     say!("ground         known below {grounded} nodes");
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }
@@ -89,7 +94,11 @@ fn print(view: &RoadmapView<'_>) {
 /// A file that is a roadmap and nothing else.
 pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
     let view = RoadmapView::parse(bytes).map_err(|error| anyhow!(describe_error(&error)))?;
-    ensure!(view.byte_len() == bytes.len(), "{} bytes follow its end", bytes.len() - view.byte_len());
+    ensure!(
+        view.byte_len() == bytes.len(),
+        "{} bytes follow its end",
+        bytes.len() - view.byte_len()
+    );
     Ok(view)
 }
 

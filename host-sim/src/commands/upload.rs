@@ -22,8 +22,8 @@ use crate::upload::FtpClient;
 pub struct Args {
     /// A roadmap or mission file, as `host-sim plan` writes them
     file: PathBuf,
-    /// Link to the vehicle's autopilot, which passes it on, or to the companion itself: udp:HOST:PORT, udp-listen:HOST:PORT,
-    /// tcp:HOST:PORT, tcp-listen:HOST:PORT or serial:PATH:BAUD
+    /// Link to the vehicle's autopilot, which passes it on, or to the companion itself:
+    /// udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT, tcp-listen:HOST:PORT or serial:PATH:BAUD
     #[arg(long, value_name = "URL")]
     link: LinkUrl,
     /// Which vehicle, by its MAVLink system id; the first companion heard if not given
@@ -32,8 +32,8 @@ pub struct Args {
     /// System id to send from: one that the companion's mission names as a ground station
     #[arg(long, value_name = "N", default_value_t = 255, value_parser = clap::value_parser!(u8).range(1..))]
     ground_station: u8,
-    /// The vehicle's board: nucleo-h743, qemu or pico2. A file that it does not hold is not sent; without this option, one
-    /// that no board holds
+    /// The vehicle's board: nucleo-h743, qemu or pico2. A file that it does not hold is not sent;
+    /// without this option, one that no board holds
     #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
     board: Option<&'static BoardCapacity>,
 }
@@ -44,11 +44,12 @@ pub struct Args {
 /// A file that is neither; no companion heard; a companion that refuses it; a link that fails.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let path = quoted_path(&args.file);
-    let bytes =
-        files::read(&args.file, files::BINARY_BYTES).with_context(|| format!("cannot read: {path}"))?;
+    let bytes = files::read(&args.file, files::BINARY_BYTES)
+        .with_context(|| format!("cannot read: {path}"))?;
     let board = args.board.unwrap_or(&BOARDS[0]);
     let file = file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
-    let mut client = FtpClient::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
+    let mut client =
+        FtpClient::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
     let system = client.wait_for_companion()?;
     let bar = Progress::on_terminal().begin_counted_stage("upload", bytes.len() as u64);
     client

@@ -1,10 +1,11 @@
-//! The one checker of coverage plans: is everything photographed, every waypoint once, on routes without a break, outside
-//! no-fly zones?
+//! The one checker of coverage plans: is everything photographed, every waypoint once, on routes
+//! without a break, outside no-fly zones?
 //!
-//! It compares flights as they are written, or at pictures as they were taken, in f64, and shares no code with the planner. Cells are a tenth of the lane
-//! spacing. A cell counts if its middle is in the area and outside no-fly zones; it is photographed if one picture shows
-//! all its corners. Where overlaps are less than a cell, pictures must show its middle and each corner that is in the
-//! area.
+//! It compares flights as they are written, or at pictures as they were taken, in f64, and shares
+//! no code with the planner. Cells are a tenth of the lane spacing. A cell counts if its middle is
+//! in the area and outside no-fly zones; it is photographed if one picture shows all its corners.
+//! Where overlaps are less than a cell, pictures must show its middle and each corner that is in
+//! the area.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
@@ -61,7 +62,10 @@ pub fn check_plan(planned: &CoveragePlan<'_>) -> Findings {
 }
 
 /// The flights as the checker takes them.
-pub fn flights_to_check<'f>(planned: &CoveragePlan<'_>, flights: &'f [Flight]) -> Vec<TimedFlight<'f>> {
+pub fn flights_to_check<'f>(
+    planned: &CoveragePlan<'_>,
+    flights: &'f [Flight],
+) -> Vec<TimedFlight<'f>> {
     let flown = |(sortie, stops, times_s): &'f Flight| {
         let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         TimedFlight { vehicle, stops, times_s }
@@ -74,8 +78,9 @@ pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) ->
     let mut findings = Findings::default();
     count_waypoints(planned, flights, &mut findings);
     for flight in flights {
-        let enters =
-            |pair: &&[Stop]| does_leg_enter_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
+        let enters = |pair: &&[Stop]| {
+            does_leg_enter_zone(planned, &pair[0].position.xy(), &pair[1].position.xy())
+        };
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
     findings.heights = heights::check_heights(planned, flights);
@@ -95,16 +100,19 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
         let vehicle = Some(flight.vehicle);
         let stops = flight.stops.iter().zip(flight.times_s);
         let photos = stops.filter(|(stop, _)| matches!(stop.act, StopAction::Photo(_)));
-        let taken = photos.map(|(stop, &t_s)| Picture { vehicle, t_s, position: stop.position, heading });
+        let taken =
+            photos.map(|(stop, &t_s)| Picture { vehicle, t_s, position: stop.position, heading });
         taken.collect::<Vec<_>>()
     };
     flights.iter().flat_map(taken).collect()
 }
 
-/// Judges pictures that were taken in a flight, by where the camera truly was. Waypoints are judged as [`taken`] says.
+/// Judges pictures that were taken in a flight, by where the camera truly was. Waypoints are judged
+/// as [`taken`] says.
 pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Findings {
     let (left, twice) = taken::count_waypoints(planned, &pictures);
-    let mut findings = Findings { photos: pictures.len() as u64, left, twice, ..Findings::default() };
+    let mut findings =
+        Findings { photos: pictures.len() as u64, left, twice, ..Findings::default() };
     CoverageCells::finest_needed(planned).judge_coverage(planned, pictures, &mut findings);
     findings
 }
@@ -115,7 +123,11 @@ pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32
     pictures.iter().map(|picture| cells.footprint_corners(planned, picture)).collect()
 }
 
-fn count_waypoints(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>], findings: &mut Findings) {
+fn count_waypoints(
+    planned: &CoveragePlan<'_>,
+    flights: &[TimedFlight<'_>],
+    findings: &mut Findings,
+) {
     let mut times = vec![0u32; planned.tracks.waypoint_count() as usize];
     for flight in flights {
         let photos = flight.stops.iter().filter_map(|stop| match stop.act {
@@ -125,14 +137,16 @@ fn count_waypoints(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>], find
         let numbers: Vec<u32> = photos.collect();
         numbers.iter().for_each(|number| times[*number as usize] += 1);
         findings.photos += numbers.len() as u64;
-        let step = |by: i64| numbers.windows(2).all(|pair| i64::from(pair[1]) - i64::from(pair[0]) == by);
+        let step =
+            |by: i64| numbers.windows(2).all(|pair| i64::from(pair[1]) - i64::from(pair[0]) == by);
         findings.broken += u64::from(!step(1) && !step(-1));
     }
     findings.left = times.iter().filter(|times| **times == 0).count() as u64;
     findings.twice = times.iter().filter(|times| **times > 1).count() as u64;
 }
 
-/// Whether a straight leg enters a no-fly zone: its middle between two edges that it crosses is inside, or an end is.
+/// Whether a straight leg enters a no-fly zone: its middle between two edges that it crosses is
+/// inside, or an end is.
 fn does_leg_enter_zone(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> bool {
     let wide = |place: &Flat| [f64::from(place.x), f64::from(place.y)];
     let (a, b) = (wide(from), wide(to));
@@ -197,7 +211,8 @@ impl CoverageCells {
     fn finest_needed(planned: &CoveragePlan<'_>) -> Self {
         let mut cells = Self::new(planned);
         let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MAX_CHECKED_CELLS;
-        while !cells.cells_inside_area(planned, cells.size, 0.5).contains(&true) && most(cells.size) {
+        while !cells.cells_inside_area(planned, cells.size, 0.5).contains(&true) && most(cells.size)
+        {
             cells.side /= 2.0;
             cells.size = cells.size.map(|count| 2 * count);
         }
@@ -209,8 +224,8 @@ impl CoverageCells {
         [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
     }
 
-    /// Whether the area holds each place of a grid, row by row: the middles of the cells, or their corners, half a cell
-    /// before them and one more each way.
+    /// Whether the area holds each place of a grid, row by row: the middles of the cells, or their
+    /// corners, half a cell before them and one more each way.
     fn cells_inside_area(
         &self,
         planned: &CoveragePlan<'_>,
@@ -219,17 +234,22 @@ impl CoverageCells {
     ) -> Vec<bool> {
         let area = planned.wanted;
         let rings = |kind| {
-            let turned = |ring: &[Flat]| ring.iter().map(|v| self.to_lane_frame(v)).collect::<Vec<_>>();
+            let turned =
+                |ring: &[Flat]| ring.iter().map(|v| self.to_lane_frame(v)).collect::<Vec<_>>();
             area.rings_of(kind).map(turned).collect::<Vec<_>>()
         };
-        let wanted: Vec<_> = rings(RingKind::Outer).into_iter().chain(rings(RingKind::Hole)).collect();
+        let wanted: Vec<_> =
+            rings(RingKind::Outer).into_iter().chain(rings(RingKind::Hole)).collect();
         let zones = rings(RingKind::NoFly);
         let mut held = vec![false; columns * rows];
         for (row, line) in held.chunks_mut(columns).enumerate() {
-            let at = [self.low[0] + offset * self.side, self.low[1] + (row as f64 + offset) * self.side];
+            let at =
+                [self.low[0] + offset * self.side, self.low[1] + (row as f64 + offset) * self.side];
             self.for_row_inside_rings(line, &wanted, at, |place| *place = true);
             for zone in &zones {
-                self.for_row_inside_rings(line, std::slice::from_ref(zone), at, |place| *place = false);
+                self.for_row_inside_rings(line, std::slice::from_ref(zone), at, |place| {
+                    *place = false
+                });
             }
         }
         held
@@ -260,8 +280,8 @@ impl CoverageCells {
         }
     }
 
-    /// Half of what a picture shows along and across the lanes. Of one that is taken askew, as large a rectangle of the same
-    /// sides' ratio as lies within it.
+    /// Half of what a picture shows along and across the lanes. Of one that is taken askew, as
+    /// large a rectangle of the same sides' ratio as lies within it.
     fn half_footprint(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [f64; 2] {
         let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.height_m);
         let above_m = picture.position.z - planned.wanted.ground_m(&picture.position.xy());
@@ -337,7 +357,8 @@ impl CoverageCells {
                 for column in (c0 - more).max(0)..(c1 + more).min(columns as i64) {
                     let middle = middle_shown(0, column) && middle_shown(1, row);
                     let (row, column) = (row as usize, column as usize);
-                    let corner = |r: usize, c: usize| corners[(row + r) * (columns + 1) + column + c];
+                    let corner =
+                        |r: usize, c: usize| corners[(row + r) * (columns + 1) + column + c];
                     let all = corner(0, 0) && corner(0, 1) && corner(1, 0) && corner(1, 1);
                     let cell = row * columns + column;
                     middles[cell] |= middle;
@@ -357,7 +378,9 @@ impl CoverageCells {
             let (u, v) = (at(0, cell % columns), at(1, cell / columns));
             [u * self.along[0] - v * self.along[1], u * self.along[1] + v * self.along[0]]
         });
-        let good = counted.iter().zip(&shown).filter(|(counted, shown)| **counted && **shown).count();
-        findings.covered_share = if findings.cells == 0 { 1.0 } else { good as f64 / findings.cells as f64 };
+        let good =
+            counted.iter().zip(&shown).filter(|(counted, shown)| **counted && **shown).count();
+        findings.covered_share =
+            if findings.cells == 0 { 1.0 } else { good as f64 / findings.cells as f64 };
     }
 }

@@ -1,8 +1,11 @@
-//! Flights as ground stations read them: QGroundControl `.plan`, `.waypoints` (QGC WPL 110), CSV and GeoJSON.
+//! Flights as ground stations read them: QGroundControl `.plan`, `.waypoints` (QGC WPL 110), CSV
+//! and GeoJSON.
 //!
-//! A flight is NAV_DELAY (93) where it leaves later than others, NAV_TAKEOFF (22), DO_CHANGE_SPEED (178), waypoints (16), the camera's trigger, and
-//! NAV_RETURN_TO_LAUNCH (20) above the pad. Heights are relative to the vehicle's home (frame 3), so that neither map nor
-//! geoid matters; terrain is relative to the vehicle's home too, as the height map has both. Between both ends of a lane nothing is written where the autopilot triggers by distance.
+//! A flight is NAV_DELAY (93) where it leaves later than others, NAV_TAKEOFF (22), DO_CHANGE_SPEED
+//! (178), waypoints (16), the camera's trigger, and NAV_RETURN_TO_LAUNCH (20) above the pad.
+//! Heights are relative to the vehicle's home (frame 3), so that neither map nor geoid matters;
+//! terrain is relative to the vehicle's home too, as the height map has both. Between both ends of
+//! a lane nothing is written where the autopilot triggers by distance.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -125,7 +128,8 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
                     items.push(waypoint(index));
                 }
                 if trigger == Trigger::Distance && begins && !ends {
-                    let mut later = stops[index + 1..].iter().take_while(|next| next.lane == stop.lane);
+                    let mut later =
+                        stops[index + 1..].iter().take_while(|next| next.lane == stop.lane);
                     let next = later.find(|next| matches!(next.act, StopAction::Photo(_)));
                     let step = next.map_or(planned.wanted.spacing.waypoint_m, |next| {
                         (next.position - stop.position).xy().norm()
@@ -135,8 +139,9 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
                     items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
-                    // The last one at once too: autopilots look some times a second, and by then are past the distance, so
-                    // that pictures are a little further apart than asked for, and the last would be behind the end.
+                    // The last one at once too: autopilots look some times a second, and by then
+                    // are past the distance, so that pictures are a little further apart than asked
+                    // for, and the last would be behind the end.
                     items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
                 }
             }
@@ -155,7 +160,8 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Va
     let home = home_position(planned, route);
     let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
     let item = |(index, item): (usize, &Item)| {
-        let mut params: Vec<Value> = item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
+        let mut params: Vec<Value> =
+            item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
         params.extend(item.place.map(Value::from));
         let mut value = json!({
             "autoContinue": true,
@@ -200,26 +206,35 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Va
 pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> String {
     let home = home_position(planned, route);
     let mut text = "QGC WPL 110\n".to_owned();
-    let mut line = |index: usize, current: u8, frame: u8, command: u16, params: [f64; 4], place: [f64; 3]| {
-        let numbers: Vec<String> = params.iter().map(|p| format!("{p:.8}")).collect();
-        let [lat, lon, alt] = place;
-        text += &format!(
-            "{index}\t{current}\t{frame}\t{command}\t{}\t{lat:.9}\t{lon:.9}\t{alt:.6}\t1\n",
-            numbers.join("\t")
-        );
-    };
+    let mut line =
+        |index: usize, current: u8, frame: u8, command: u16, params: [f64; 4], place: [f64; 3]| {
+            let numbers: Vec<String> = params.iter().map(|p| format!("{p:.8}")).collect();
+            let [lat, lon, alt] = place;
+            text += &format!(
+                "{index}\t{current}\t{frame}\t{command}\t{}\t{lat:.9}\t{lon:.9}\t{alt:.6}\t1\n",
+                numbers.join("\t")
+            );
+        };
     line(0, 1, 0, NAV_WAYPOINT, [0.0; 4], [home.lat_deg, home.lon_deg, home.alt_m]);
     for (index, item) in items.iter().enumerate() {
-        line(index + 1, 0, item.frame, item.command, item.params.map(|p| p.unwrap_or(0.0)), item.place);
+        line(
+            index + 1,
+            0,
+            item.frame,
+            item.command,
+            item.params.map(|p| p.unwrap_or(0.0)),
+            item.place,
+        );
     }
     text
 }
 
-/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames, sortie,
-/// the ground there.
+/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in
+/// both frames, sortie, the ground there.
 pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
     let mut text =
-        "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n".to_owned();
+        "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n"
+            .to_owned();
     for (sortie, stops, times) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
@@ -266,8 +281,10 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
         }
     }
     for (sortie, stops, _) in flights {
-        let photos = stops.iter().filter(|stop| matches!(stop.act, StopAction::Photo(_) | StopAction::Lane));
-        let places: Vec<Value> = photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
+        let photos =
+            stops.iter().filter(|stop| matches!(stop.act, StopAction::Photo(_) | StopAction::Lane));
+        let places: Vec<Value> =
+            photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
         let geometry = match places.as_slice() {
             [one] => json!({ "type": "Point", "coordinates": one }),
             all => json!({ "type": "LineString", "coordinates": all }),

@@ -1,7 +1,8 @@
-//! The flight of one vehicle: up to its layer, over to the first waypoint, down, along the lanes, up, home, down.
+//! The flight of one vehicle: up to its layer, over to the first waypoint, down, along the lanes,
+//! up, home, down.
 //!
-//! Metres, ENU in the mission frame. The height of the pictures is above the mission's origin, or above terrain: then lanes
-//! and the ways between them have corners where they rise and fall.
+//! Metres, ENU in the mission frame. The height of the pictures is above the mission's origin, or
+//! above terrain: then lanes and the ways between them have corners where they rise and fall.
 
 use std::convert::Infallible;
 
@@ -62,7 +63,8 @@ pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
     let stop = |position: Point, act: StopAction| Stop { position, act, lane: None };
     let (first, last) = route.end_waypoints();
     let ends = [first, last].map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.place));
-    let mut stops = vec![stop(pad, StopAction::Pad), stop(at(&vehicle.place, layer_m), StopAction::Transit)];
+    let mut stops =
+        vec![stop(pad, StopAction::Pad), stop(at(&vehicle.place, layer_m), StopAction::Transit)];
     stops.extend(
         corners_between(planned, &vehicle.place, &ends[0])
             .iter()
@@ -87,8 +89,10 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
     let mut here: Option<Point> = None;
     for own in numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b)) {
         let lane = Some(planned.tracks.lane_of(own[0]) as u16);
-        let places: Vec<(u32, Flat)> =
-            own.iter().filter_map(|number| Some((*number, planned.tracks.waypoint(*number)?))).collect();
+        let places: Vec<(u32, Flat)> = own
+            .iter()
+            .filter_map(|number| Some((*number, planned.tracks.waypoint(*number)?)))
+            .collect();
         let (Some((_, begin)), Some((_, end))) = (places.first(), places.last()) else { continue };
         let from = match here {
             None => first_lane_start(planned, begin, end),
@@ -104,7 +108,8 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
                 from
             }
         };
-        let path: Vec<Point> = std::iter::once(from).chain(leg_corners(planned, &from, end)).collect();
+        let path: Vec<Point> =
+            std::iter::once(from).chain(leg_corners(planned, &from, end)).collect();
         add_picture_stops(planned, &path, &places, lane, stops);
         here = path.last().copied();
     }
@@ -155,8 +160,11 @@ fn add_picture_stops(
         }
         let end = path[(leg + 1).min(path.len() - 1)];
         let length_m = (end - path[leg]).xy().norm();
-        let share =
-            if length_m > 0.0 { ((at_m - along_m(&path[leg].xy())) / length_m).clamp(0.0, 1.0) } else { 0.0 };
+        let share = if length_m > 0.0 {
+            ((at_m - along_m(&path[leg].xy())) / length_m).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         let height_m = path[leg].z + (end.z - path[leg].z) * share;
         let position = Point::new(place.x, place.y, height_m);
         stops.push(Stop { position, act: StopAction::Photo(*number), lane });
@@ -186,7 +194,8 @@ pub fn stop_times_s(planned: &CoveragePlan<'_>, route: &Route, stops: &[Stop]) -
     let mut times = vec![time_s];
     for pair in stops.windows(2) {
         let step = pair[1].position - pair[0].position;
-        let vertical = if step.z > 0.0 { step.z / vehicle.climb_mps } else { -step.z / vehicle.descend_mps };
+        let vertical =
+            if step.z > 0.0 { step.z / vehicle.climb_mps } else { -step.z / vehicle.descend_mps };
         time_s += step.xy().norm() / vehicle.cruise_mps + vertical;
         times.push(time_s);
     }

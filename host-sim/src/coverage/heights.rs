@@ -1,4 +1,5 @@
-//! The checker's part on heights: the ground is the height map itself, not the field that the planner follows.
+//! The checker's part on heights: the ground is the height map itself, not the field that the
+//! planner follows.
 
 use planner_core::Point;
 
@@ -22,7 +23,8 @@ pub struct HeightFindings {
     pub steepest: f32,
     /// Legs, above pads or not, that come nearer to the ground than the height of the pictures.
     pub too_low: u64,
-    /// Lanes and ways between that are steeper than their vehicle climbs or descends at cruise speed.
+    /// Lanes and ways between that are steeper than their vehicle climbs or descends at cruise
+    /// speed.
     pub too_steep: u64,
 }
 
@@ -34,13 +36,22 @@ impl HeightFindings {
 }
 
 /// Checks flights against the ground; none where it is level.
-pub fn check_heights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Option<HeightFindings> {
+pub fn check_heights(
+    planned: &CoveragePlan<'_>,
+    flights: &[TimedFlight<'_>],
+) -> Option<HeightFindings> {
     let terrain = planned.wanted.terrain.as_ref()?;
     let sample_m = (terrain.grid.cell_m() / 4.0).min(MAX_SAMPLE_SPACING_M);
-    let mut findings =
-        HeightFindings { least_m: f32::INFINITY, most_m: 0.0, steepest: 0.0, too_low: 0, too_steep: 0 };
+    let mut findings = HeightFindings {
+        least_m: f32::INFINITY,
+        most_m: 0.0,
+        steepest: 0.0,
+        too_low: 0,
+        too_steep: 0,
+    };
     for flight in flights {
-        let index = planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
+        let index =
+            planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
         let vehicle = &planned.vehicles[index];
         for leg in flight.stops.windows(2) {
             if leg.iter().any(|stop| stop.act == StopAction::Pad) {

@@ -50,14 +50,16 @@ impl PictureStore {
         pictures.splice(..0, self.before.iter().copied());
     }
 
-    /// Keeps all pictures for the next flight; none where the area is whole, which is begun again then.
+    /// Keeps all pictures for the next flight; none where the area is whole, which is begun again
+    /// then.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn store_pictures(&self, pictures: &[Picture], whole: bool) -> anyhow::Result<()> {
         let pictures = if whole { &[] } else { pictures };
-        let row =
-            |p: &Picture| -> PictureRow { [p.t_s, p.position.x, p.position.y, p.position.z, p.heading] };
+        let row = |p: &Picture| -> PictureRow {
+            [p.t_s, p.position.x, p.position.y, p.position.z, p.heading]
+        };
         let rows: Vec<PictureRow> = pictures.iter().map(row).collect();
         let mut results = ResultFiles::single_file(&self.path)?;
         results.add_file(&self.path, &serde_json::to_vec(&rows)?)?;
@@ -72,7 +74,8 @@ mod tests {
     #[test]
     fn pictures_come_back_until_the_area_is_whole() {
         let dir = tempfile::tempdir().unwrap();
-        let picture = Picture { vehicle: None, t_s: 7.0, position: Point::new(1.0, 2.0, 3.0), heading: 0.5 };
+        let picture =
+            Picture { vehicle: None, t_s: 7.0, position: Point::new(1.0, 2.0, 3.0), heading: 0.5 };
         PictureStore::open(dir.path()).unwrap().store_pictures(&[picture], false).unwrap();
         let mut pictures = vec![Picture { t_s: 1.0, ..picture }];
         let kept = PictureStore::open(dir.path()).unwrap();

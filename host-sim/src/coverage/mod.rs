@@ -1,7 +1,7 @@
 //! Coverage on the desk: from a scenario to each vehicle's flight.
 //!
-//! `planner_core::coverage` plans; this lends it memory, turns routes into flights ([`flight`]), writes them for ground
-//! stations ([`export`]) and checks what came out ([`check`]).
+//! `planner_core::coverage` plans; this lends it memory, turns routes into flights ([`flight`]),
+//! writes them for ground stations ([`export`]) and checks what came out ([`check`]).
 
 pub mod check;
 pub mod export;
@@ -64,7 +64,11 @@ impl<'a> CoveragePlan<'a> {
         Self::plan_with_search(scenario, method, companion::planner::coverage::MAX_ORDER_CHANGES)
     }
 
-    fn plan_with_search(scenario: &'a Scenario, method: Method, search_steps: u32) -> anyhow::Result<Self> {
+    fn plan_with_search(
+        scenario: &'a Scenario,
+        method: Method,
+        search_steps: u32,
+    ) -> anyhow::Result<Self> {
         let Some(wanted) = &scenario.area else {
             bail!(
                 "area is missing: {}\nhint: add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`",
@@ -73,7 +77,8 @@ impl<'a> CoveragePlan<'a> {
         };
         let area = Area::new(&wanted.vertices, &wanted.rings)
             .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
-        let vehicles: Vec<Vehicle> = scenario.vehicles.iter().map(|v| planner_vehicle(v, scenario)).collect();
+        let vehicles: Vec<Vehicle> =
+            scenario.vehicles.iter().map(|v| planner_vehicle(v, scenario)).collect();
         check_places(scenario, &area, &vehicles)?;
         let failed = |error: CoverageError| explain_error(error, wanted, scenario.vehicles.len());
         let began = Instant::now();
@@ -93,15 +98,21 @@ impl<'a> CoveragePlan<'a> {
             transit: &transit,
             vehicles: &vehicles,
             heights: wanted.heights,
-            unit: if method == Method::SimpleBinpat { TrackUnit::Lane } else { TrackUnit::Waypoint },
+            unit: if method == Method::SimpleBinpat {
+                TrackUnit::Lane
+            } else {
+                TrackUnit::Waypoint
+            },
         };
         let mut plan = Plan::new();
         let shares = divide_by_method(&work, method, &mut plan).map_err(failed)?;
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
-        let following = wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
-        let following = following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))?;
+        let following =
+            wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
+        let following =
+            following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))?;
         let mut planned = Self {
             scenario,
             wanted,
@@ -127,8 +138,8 @@ impl<'a> CoveragePlan<'a> {
         Ok(planned)
     }
 
-    /// Latitude and longitude of a place of the plan. Heights are above the ground there, not above the plane that touches
-    /// the earth at the origin: 100 km away that plane is 780 m up.
+    /// Latitude and longitude of a place of the plan. Heights are above the ground there, not above
+    /// the plane that touches the earth at the origin: 100 km away that plane is 780 m up.
     pub fn geodetic(&self, place: &Point) -> Geodetic {
         let origin = &self.wanted.origin;
         let mut up_m = 0.0;
@@ -159,7 +170,8 @@ impl<'a> CoveragePlan<'a> {
     /// Cost of a route with all its sorties and the swaps between them, seconds.
     pub fn cost_s(&self, route: &Route) -> f32 {
         let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
-        self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>() + swaps * BATTERY_SWAP_S
+        self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>()
+            + swaps * BATTERY_SWAP_S
     }
 
     /// Cost of a route without the swaps, metres.
@@ -191,7 +203,8 @@ impl<'a> CoveragePlan<'a> {
                     100.0 * (1.0 - USABLE_CHARGE)
                 )
             };
-            let parts = sorties::cut_route(self, route, USABLE_CHARGE * lasts_s).map_err(too_long)?;
+            let parts =
+                sorties::cut_route(self, route, USABLE_CHARGE * lasts_s).map_err(too_long)?;
             let of = parts.len() as u16;
             let numbered = parts.into_iter().zip(1..);
             sorties.extend(numbered.map(|(route, number)| Sortie {
@@ -214,7 +227,8 @@ impl<'a> CoveragePlan<'a> {
                 .iter()
                 .map(|(_, stops, times_s)| separation::DepartureFlight { stops, times_s })
                 .collect();
-            let Some((departures_s, least_m)) = separation::plan_departures(&timed, separation_m) else {
+            let Some((departures_s, least_m)) = separation::plan_departures(&timed, separation_m)
+            else {
                 bail!(
                     "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: \
                      fewer vehicles, or places further apart",
@@ -239,7 +253,9 @@ impl<'a> CoveragePlan<'a> {
         let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
         for sortie in &self.sorties {
             let stops = flight::route_stops(self, &sortie.route);
-            let Some(stop) = stops.iter().find(|stop| !fence.contains(&stop.position)) else { continue };
+            let Some(stop) = stops.iter().find(|stop| !fence.contains(&stop.position)) else {
+                continue;
+            };
             let (place, index) = (stop.position, usize::from(sortie.route.vehicle));
             bail!(
                 "outside mission.geofence: {}: vehicle {} would fly to [{:.1}, {:.1}, {:.1}]\nhint: a geofence around area \
@@ -254,7 +270,8 @@ impl<'a> CoveragePlan<'a> {
         Ok(())
     }
 
-    /// A sortie for each route. Nobody is sent out for longer than its battery lasts, where that is known.
+    /// A sortie for each route. Nobody is sent out for longer than its battery lasts, where that is
+    /// known.
     fn one_sortie_per_route(&self) -> anyhow::Result<Vec<Sortie>> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
@@ -281,7 +298,8 @@ impl<'a> CoveragePlan<'a> {
 /// A vehicle does not stand there, by name.
 pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
-    let above_m = |vehicle: &crate::scenario::Vehicle| vehicle.start.z - area.ground_m(&vehicle.start.xy());
+    let above_m =
+        |vehicle: &crate::scenario::Vehicle| vehicle.start.z - area.ground_m(&vehicle.start.xy());
     let stray = |vehicle: &crate::scenario::Vehicle| above_m(vehicle).abs() > MAX_OFF_GROUND_M;
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
@@ -297,9 +315,13 @@ pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
 
 /// No vehicle starts inside a no-fly zone.
 fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> anyhow::Result<()> {
-    if let Some(index) = vehicles.iter().position(|vehicle| area.is_in_no_fly_zone(&vehicle.place)) {
+    if let Some(index) = vehicles.iter().position(|vehicle| area.is_in_no_fly_zone(&vehicle.place))
+    {
         let place = &scenario.vehicle_places[index];
-        bail!("bad vehicle: {place}: vehicle {} starts inside a no-fly zone", scenario.vehicles[index].id);
+        bail!(
+            "bad vehicle: {place}: vehicle {} starts inside a no-fly zone",
+            scenario.vehicles[index].id
+        );
     }
     Ok(())
 }
@@ -321,7 +343,8 @@ fn planner_vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> V
 /// Least share of the path, metres: far below any spacing of waypoints.
 const MIN_SHARE_M: f32 = 1e-3;
 
-/// Divides the path by a method. Returns the shares by which companions divide it in the same way, if there are some.
+/// Divides the path by a method. Returns the shares by which companions divide it in the same way,
+/// if there are some.
 ///
 /// # Errors
 /// As the method.
@@ -342,18 +365,24 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
         }
         Method::Exact => {
             let count = work.tracks.waypoint_count() as usize;
-            let [ways, reaches, states] = exact::Workspace::required_lengths(work.vehicles.len(), count);
+            let [ways, reaches, states] =
+                exact::Workspace::required_lengths(work.vehicles.len(), count);
             let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
             let mut states = vec![(0, 0); states];
-            let mut ws = exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
+            let mut ws = exact::Workspace {
+                ways_m: &mut ways_m,
+                reaches: &mut reaches,
+                states: &mut states,
+            };
             exact::plan_exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
             shares_of_exact_plan(work, plan)
         }
     }
 }
 
-/// Shares by which BINPAT cuts the path as the exact division does, where the vehicles that it then gives the parts to take no
-/// longer: that plan is the exact one from then on. Companions plan by shares alone, so none means that they cannot plan it.
+/// Shares by which BINPAT cuts the path as the exact division does, where the vehicles that it then
+/// gives the parts to take no longer: that plan is the exact one from then on. Companions plan by
+/// shares alone, so none means that they cannot plan it.
 fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     exact: &mut Plan<K>,
@@ -368,8 +397,11 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     }
     let mut plan = Plan::new();
     binpat_by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
-    let alike =
-        plan.routes.iter().map(|r| (r.first, r.end)).eq(exact.routes.iter().map(|r| (r.first, r.end)));
+    let alike = plan
+        .routes
+        .iter()
+        .map(|r| (r.first, r.end))
+        .eq(exact.routes.iter().map(|r| (r.first, r.end)));
     if !alike || plan.max_cost_s() > exact.max_cost_s() {
         return Ok(None);
     }
@@ -385,16 +417,21 @@ fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize)
         CoverageError::Setting(name) => format!("{name} is out of its range"),
         CoverageError::Gaps => "the spacings leave gaps between the pictures".to_owned(),
         CoverageError::LanesFull => {
-            format!("it takes more than {MAX_LANES} lanes\nhint: a greater height_m or lane_m takes fewer")
+            format!(
+                "it takes more than {MAX_LANES} lanes\nhint: a greater height_m or lane_m takes fewer"
+            )
         }
         CoverageError::NoFlyFull => {
-            format!("no-fly zones have more than {MAX_CORNERS} outward corners\nhint: draw them with fewer")
+            format!(
+                "no-fly zones have more than {MAX_CORNERS} outward corners\nhint: draw them with fewer"
+            )
         }
         CoverageError::NothingToCover => "no-fly zones hold the whole area".to_owned(),
         CoverageError::InsideNoFly(index) => format!("vehicle {index} starts inside a no-fly zone"),
         CoverageError::Unreachable => "no-fly zones leave no way to a part of it".to_owned(),
         CoverageError::Vehicles => {
-            let most = if vehicles > MAX_VEHICLES { MAX_VEHICLES } else { exact::MAX_EXACT_VEHICLES };
+            let most =
+                if vehicles > MAX_VEHICLES { MAX_VEHICLES } else { exact::MAX_EXACT_VEHICLES };
             format!("it takes 1 to {most} vehicles, not {vehicles}")
         }
         CoverageError::WorkspaceTooSmall => "the planner's memory is too small for it".to_owned(),

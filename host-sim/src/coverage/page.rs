@@ -21,7 +21,8 @@ pub fn report_data(
 ) -> ReportData {
     let scenario = planned.scenario;
     let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
-        let own = flights.iter().filter(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
+        let own =
+            flights.iter().filter(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
         let passed = own.flat_map(|(_, stops, times)| stops.iter().zip(times));
         let at = |(stop, time): (&Stop, &f32)| TrackPoint { t_s: *time, position: stop.position };
         let track: Vec<TrackPoint> = passed.map(at).collect();
@@ -51,7 +52,11 @@ pub fn report_data(
 }
 
 /// The share photographed, and above terrain the heights.
-fn coverage_plots(planned: &CoveragePlan<'_>, flights: &[Flight], findings: &Findings) -> Vec<Plot> {
+fn coverage_plots(
+    planned: &CoveragePlan<'_>,
+    flights: &[Flight],
+    findings: &Findings,
+) -> Vec<Plot> {
     let mut plots = vec![photographed_share_plot(findings)];
     if planned.following.is_some() {
         plots.push(height_profile_plot(planned, flights));
@@ -64,14 +69,17 @@ fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Plot {
     let mut curves = Vec::new();
     for (sortie, stops, times_s) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
-        let mut path = Curve { name: format!("vehicle {id}"), vehicle: Some(id), ..Curve::default() };
+        let mut path =
+            Curve { name: format!("vehicle {id}"), vehicle: Some(id), ..Curve::default() };
         let mut ground = Curve { name: format!("ground below {id}"), ..Curve::default() };
         for (leg, times) in stops.windows(2).zip(times_s.windows(2)) {
             let step = leg[1].position - leg[0].position;
             let parts = (step.xy().norm() / PROFILE_SPACING_M).ceil().max(1.0) as usize;
             for share in (0..=parts).map(|part| part as f32 / parts as f32) {
-                let (at, t_s) = (leg[0].position + step * share, times[0] + (times[1] - times[0]) * share);
-                for (curve, height_m) in [(&mut path, at.z), (&mut ground, planned.wanted.ground_m(&at.xy()))]
+                let (at, t_s) =
+                    (leg[0].position + step * share, times[0] + (times[1] - times[0]) * share);
+                for (curve, height_m) in
+                    [(&mut path, at.z), (&mut ground, planned.wanted.ground_m(&at.xy()))]
                 {
                     curve.t_s.push(t_s);
                     curve.values.push(height_m);
@@ -107,5 +115,10 @@ pub(super) fn photographed_share_plot(findings: &Findings) -> Plot {
         curve.t_s.push(*time);
         curve.values.push(100.0 * cells as f32 / findings.cells.max(1) as f32);
     }
-    Plot { title: "Area photographed".to_owned(), unit: "%".to_owned(), limit: None, curves: vec![curve] }
+    Plot {
+        title: "Area photographed".to_owned(),
+        unit: "%".to_owned(),
+        limit: None,
+        curves: vec![curve],
+    }
 }

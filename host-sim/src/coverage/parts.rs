@@ -63,7 +63,9 @@ pub fn flown_layers(
     for division in std::iter::once(&whole).chain(&flight.divisions) {
         // Other vehicles fly the same later; a division whose inputs no vehicle reported cannot be
         // planned here.
-        if usize::from(division.number) != shown.len() || (division.number > 0 && division.lots.is_empty()) {
+        if usize::from(division.number) != shown.len()
+            || (division.number > 0 && division.lots.is_empty())
+        {
             continue;
         }
         losses.extend((division.number > 0).then_some(&division.lots[..]));
@@ -79,7 +81,11 @@ pub fn flown_layers(
         shown.push(Division {
             t_s: division.t_s,
             lost,
-            parts: flights.iter().filter(|flight| flight.task.leaves_pad()).map(flight_part).collect(),
+            parts: flights
+                .iter()
+                .filter(|flight| flight.task.leaves_pad())
+                .map(flight_part)
+                .collect(),
             taken: reassigned_waypoints(&before, &own),
         });
         before = own;
@@ -120,7 +126,9 @@ fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
     let mut owners = WaypointOwners::new();
     for flight in flights {
         let Task::Photograph(photographs) = &flight.task else { continue };
-        for range in photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: u32::MAX }) {
+        for range in
+            photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: u32::MAX })
+        {
             owners.extend((range.first..range.end).map(|number| (number, flight.id)));
         }
     }

@@ -60,7 +60,8 @@ pub struct CoveragePlan<'a> {
     pub transit: Box<Transit<'a, MAX_CORNERS>>,
     /// The routes.
     pub plan: Plan<MAX_VEHICLES>,
-    /// The shares W that they are packed by, one a vehicle; none where they follow from nothing of the kind.
+    /// The shares W that they are packed by, one a vehicle; none where they follow from nothing of
+    /// the kind.
     pub shares: Option<Vec<f32>>,
     /// No division can end before, seconds.
     pub lower_bound_s: f32,

@@ -1,8 +1,10 @@
-//! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. The vehicle that flies longest
-//! leaves first; each other one leaves as soon as it keeps the separation to all before it, as planned.
+//! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up
+//! and down. The vehicle that flies longest leaves first; each other one leaves as soon as it keeps
+//! the separation to all before it, as planned.
 //!
-//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights deviate from that: on
-//! board the safety filter is what keeps vehicles apart, and this only keeps it from having to.
+//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights
+//! deviate from that: on board the safety filter is what keeps vehicles apart, and this only keeps
+//! it from having to.
 
 use planner_core::Point;
 
@@ -25,9 +27,13 @@ pub struct DepartureFlight<'a> {
     pub times_s: &'a [f32],
 }
 
-/// Departures of all flights, seconds, and the least distance between any two vehicles, one of them in the air; infinite
-/// for one vehicle. None where no departure within [`MAX_GROUND_WAIT_S`] keeps the separation.
-pub fn plan_departures(flights: &[DepartureFlight<'_>], separation_m: f32) -> Option<(Vec<f32>, f32)> {
+/// Departures of all flights, seconds, and the least distance between any two vehicles, one of them
+/// in the air; infinite for one vehicle. None where no departure within [`MAX_GROUND_WAIT_S`] keeps
+/// the separation.
+pub fn plan_departures(
+    flights: &[DepartureFlight<'_>],
+    separation_m: f32,
+) -> Option<(Vec<f32>, f32)> {
     let tracks: Vec<Vec<Point>> = flights.iter().map(sample_positions).collect();
     let mut order: Vec<usize> = (0..flights.len()).collect();
     order.sort_by_key(|i| std::cmp::Reverse(tracks[*i].len()));
@@ -36,19 +42,25 @@ pub fn plan_departures(flights: &[DepartureFlight<'_>], separation_m: f32) -> Op
     let step = (DEPARTURE_STEP_S / COMPARISON_STEP_S) as usize;
     for &own in &order {
         let gap = |delay: usize| {
-            let others = order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
+            let others =
+                order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
             let mut least_m = f32::INFINITY;
             for other in others {
-                least_m = least_m.min(min_distance_m((&tracks[own][..], delay), other, separation_m)?);
+                least_m =
+                    least_m.min(min_distance_m((&tracks[own][..], delay), other, separation_m)?);
             }
             Some(least_m)
         };
         let tried = (0..=(MAX_GROUND_WAIT_S / DEPARTURE_STEP_S) as usize).map(|k| k * step);
-        let (delay, gap_m) = tried.into_iter().find_map(|delay| gap(delay).map(|gap_m| (delay, gap_m)))?;
+        let (delay, gap_m) =
+            tried.into_iter().find_map(|delay| gap(delay).map(|gap_m| (delay, gap_m)))?;
         delays[own] = Some(delay);
         least_m = least_m.min(gap_m);
     }
-    Some((delays.iter().map(|delay| delay.unwrap_or(0) as f32 * COMPARISON_STEP_S).collect(), least_m))
+    Some((
+        delays.iter().map(|delay| delay.unwrap_or(0) as f32 * COMPARISON_STEP_S).collect(),
+        least_m,
+    ))
 }
 
 /// Place of a vehicle at each step of its flight.
@@ -67,9 +79,10 @@ fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
     (0..=(end_s / COMPARISON_STEP_S).ceil() as usize).map(place).collect()
 }
 
-/// The least distance between two flights that begin with these delays, while one of them is in the air. None where it is less
-/// than the separation. Pads may be nearer than that, which nothing here can change: it is all that is kept while both
-/// vehicles are over theirs, or one stands on its own.
+/// The least distance between two flights that begin with these delays, while one of them is in the
+/// air. None where it is less than the separation. Pads may be nearer than that, which nothing here
+/// can change: it is all that is kept while both vehicles are over theirs, or one stands on its
+/// own.
 fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
     let at = |(track, delay): (&[Point], usize), step: usize| {
         track[step.saturating_sub(delay).min(track.len() - 1)]
@@ -99,7 +112,8 @@ mod tests {
     use crate::coverage::flight::StopAction;
 
     fn flight(places: &[[f32; 3]]) -> (Vec<Stop>, Vec<f32>) {
-        let stop = |p: &[f32; 3]| Stop { position: Point::from(*p), act: StopAction::Lane, lane: None };
+        let stop =
+            |p: &[f32; 3]| Stop { position: Point::from(*p), act: StopAction::Lane, lane: None };
         let stops: Vec<Stop> = places.iter().map(stop).collect();
         let mut times = vec![0.0];
         for pair in stops.windows(2) {
@@ -110,9 +124,11 @@ mod tests {
 
     #[test]
     fn lanes_side_by_side_are_not_flown_at_once() {
-        let long = flight(&[[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [100.0, 0.0, 30.0], [0.0, 9.0, 30.0]]);
+        let long =
+            flight(&[[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [100.0, 0.0, 30.0], [0.0, 9.0, 30.0]]);
         let beside = flight(&[[0.0, 3.0, 0.0], [0.0, 1.0, 30.0], [100.0, 1.0, 30.0]]);
-        let timed = |f: &'static (Vec<Stop>, Vec<f32>)| DepartureFlight { stops: &f.0, times_s: &f.1 };
+        let timed =
+            |f: &'static (Vec<Stop>, Vec<f32>)| DepartureFlight { stops: &f.0, times_s: &f.1 };
         let (long, beside) = (&*Box::leak(Box::new(long)), &*Box::leak(Box::new(beside)));
         let (departures_s, least_m) =
             plan_departures(&[timed(beside), timed(long)], 2.0).expect("they can wait");
@@ -128,13 +144,17 @@ mod tests {
         let (long_places, beside_places) =
             (places(&timed(long), 0.0), places(&timed(beside), departures_s[0]));
         for step in 0..long_places.0.len() {
-            let other = beside_places.0[step.saturating_sub(beside_places.1).min(beside_places.0.len() - 1)];
+            let other = beside_places.0
+                [step.saturating_sub(beside_places.1).min(beside_places.0.len() - 1)];
             let own = long_places.0[step];
             let in_the_air = own.z > 29.0 && other.z > 29.0;
             assert!(!in_the_air || (own - other).norm() >= 8.0 * 0.999, "{own} {other}");
         }
         let apart = flight(&[[0.0, 30.0, 0.0], [0.0, 30.0, 30.0], [90.0, 30.0, 30.0]]);
         let apart = &*Box::leak(Box::new(apart));
-        assert_eq!(plan_departures(&[timed(long), timed(apart)], 2.0).expect("apart").0, [0.0, 0.0]);
+        assert_eq!(
+            plan_departures(&[timed(long), timed(apart)], 2.0).expect("apart").0,
+            [0.0, 0.0]
+        );
     }
 }

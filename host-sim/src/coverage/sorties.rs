@@ -1,15 +1,17 @@
-//! Sorties: a route that takes longer than a battery lasts is cut between its lanes, and each part is flown from the pad
-//! and home again, in the route's layer.
+//! Sorties: a route that takes longer than a battery lasts is cut between its lanes, and each part
+//! is flown from the pad and home again, in the route's layer.
 //!
-//! Of all cuts with the fewest sorties, the one that takes least time (dynamic programming over the lanes). A part costs
-//! no less than what it holds: ways are the shortest, so a detour over the pad never is. So the search for the first lane
-//! of a sortie ends at the first one that is too far back: n lanes, at most m a sortie: n · m.
+//! Of all cuts with the fewest sorties, the one that takes least time (dynamic programming over the
+//! lanes). A part costs no less than what it holds: ways are the shortest, so a detour over the pad
+//! never is. So the search for the first lane of a sortie ends at the first one that is too far
+//! back: n lanes, at most m a sortie: n · m.
 //!
-//! Sorties are flown in rounds: the k-th of all vehicles begin together, [`BATTERY_SWAP_S`] after the last one of the round before
-//! is home. So departures keep vehicles apart, however long a swap really takes. Seconds, metres.
+//! Sorties are flown in rounds: the k-th of all vehicles begin together, [`BATTERY_SWAP_S`] after
+//! the last one of the round before is home. So departures keep vehicles apart, however long a swap
+//! really takes. Seconds, metres.
 //!
-//! C_k has one climb and one descent and no turns, as in the paper. A battery has to last for what is flown: down to the
-//! lanes from the layer, up again, and turns from rest to rest, too.
+//! C_k has one climb and one descent and no turns, as in the paper. A battery has to last for what
+//! is flown: down to the lanes from the layer, up again, and turns from rest to rest, too.
 
 use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
@@ -91,11 +93,16 @@ pub struct LaneTooLong {
     pub takes_s: f32,
 }
 
-/// Cuts a route into as few parts as there can be that take at most `most_s` each, in the order in which they are flown.
+/// Cuts a route into as few parts as there can be that take at most `most_s` each, in the order in
+/// which they are flown.
 ///
 /// # Errors
 /// A lane that takes longer alone.
-pub fn cut_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Result<Vec<Route>, LaneTooLong> {
+pub fn cut_route(
+    planned: &CoveragePlan<'_>,
+    route: &Route,
+    most_s: f32,
+) -> Result<Vec<Route>, LaneTooLong> {
     if route_duration_s(planned, route) <= most_s {
         return Ok(vec![*route]);
     }
@@ -104,10 +111,12 @@ pub fn cut_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Resu
     // Sorties and seconds up to a lane, and where the last of these sorties begins.
     let mut best = vec![(0u32, 0.0f64, 0usize)];
     for end in 1..=count {
-        let parts =
-            (0..end).rev().map(|first| (first, route_duration_s(planned, &lanes.sub_route(first, end))));
+        let parts = (0..end)
+            .rev()
+            .map(|first| (first, route_duration_s(planned, &lanes.sub_route(first, end))));
         let fitting = parts.take_while(|(_, own_s)| *own_s <= most_s);
-        let all = fitting.map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
+        let all = fitting
+            .map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
         let found = all.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         best.push(found.ok_or_else(|| LaneTooLong {
             lane: planned.tracks.lane_of(lanes.bounds[end - 1]),
@@ -142,7 +151,8 @@ impl<'a> RouteLanes<'a> {
         let tracks = &planned.tracks;
         let [from, to] = [route.first, route.end - 1].map(|number| tracks.lane_of(number));
         let inner = tracks.lanes()[from + 1..=to].iter().map(|lane| lane.first);
-        let bounds: Vec<u32> = std::iter::once(route.first).chain(inner).chain([route.end]).collect();
+        let bounds: Vec<u32> =
+            std::iter::once(route.first).chain(inner).chain([route.end]).collect();
         let pad = planned.vehicles[usize::from(route.vehicle)].place;
         let way_m = |number: u32| {
             tracks.waypoint(number).map_or(0.0, |place| planned.transit.distance_m(&pad, &place))
@@ -156,8 +166,8 @@ impl<'a> RouteLanes<'a> {
         let (planned, heights) = (self.planned, self.planned.wanted.heights);
         let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];
         let (from, to) = (self.bounds[first], self.bounds[end]);
-        let inside_m =
-            planned.tracks.distance_to_waypoint_m(to - 1) - planned.tracks.distance_to_waypoint_m(from);
+        let inside_m = planned.tracks.distance_to_waypoint_m(to - 1)
+            - planned.tracks.distance_to_waypoint_m(from);
         let ground_m = self.ways_m[first][0] + inside_m + self.ways_m[end - 1][1];
         let top_m = heights.mission_m + f32::from(self.route.layer) * heights.layer_m;
         let delay_s = top_m / vehicle.climb_mps + top_m / vehicle.descend_mps;

@@ -1,19 +1,24 @@
-//! Which waypoints of a plan have their picture after a flight, and which were flown more than once.
+//! Which waypoints of a plan have their picture after a flight, and which were flown more than
+//! once.
 //!
-//! Pictures are not taken where waypoints are. By distance each waits for the autopilot's next look, so that all further ones
-//! are later: on a long lane they lie anywhere between waypoints, and are none the worse for it. So waypoints are judged by the
-//! gaps between pictures. One has its picture
+//! Pictures are not taken where waypoints are. By distance each waits for the autopilot's next
+//! look, so that all further ones are later: on a long lane they lie anywhere between waypoints,
+//! and are none the worse for it. So waypoints are judged by the gaps between pictures. One has its
+//! picture
 //!
-//! - if one was taken no further from it along its lane than half a spacing, or than [`Tolerance::off_m`] where that is more;
-//! - or if the pictures before it and behind it on its lane are no further apart than the spacing and `off_m`: one of them as
-//!   far off as a picture may be.
+//! - if one was taken no further from it along its lane than half a spacing, or than
+//!   [`Tolerance::off_m`] where that is more;
+//! - or if the pictures before it and behind it on its lane are no further apart than the spacing
+//!   and `off_m`: one of them as far off as a picture may be.
 //!
-//! A picture is on a lane within half a lane spacing of it, or [`Tolerance::beside_m`] where that is more. One that is missing
-//! leaves a gap of two spacings: its waypoint is found while a spacing is more than `off_m`. On a short lane whose waypoints are
-//! nearer than the spacing it may not be found; the cells judge whether the area is photographed.
+//! A picture is on a lane within half a lane spacing of it, or [`Tolerance::beside_m`] where that
+//! is more. One that is missing leaves a gap of two spacings: its waypoint is found while a spacing
+//! is more than `off_m`. On a short lane whose waypoints are nearer than the spacing it may not be
+//! found; the cells judge whether the area is photographed.
 //!
-//! A waypoint is flown twice if vehicles came to it twice: each picture belongs to the nearest waypoint, and pictures that
-//! a vehicle takes there one after the other belong to one pass. Metres, mission frame.
+//! A waypoint is flown twice if vehicles came to it twice: each picture belongs to the nearest
+//! waypoint, and pictures that a vehicle takes there one after the other belong to one pass.
+//! Metres, mission frame.
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -49,10 +54,14 @@ impl Tolerance {
     pub fn of_plan(planned: &CoveragePlan<'_>) -> Self {
         let scenario = planned.scenario;
         let distances = margins::required_distances(&scenario.simulation, 0.0, &scenario.vehicles);
-        Self { beside_m: distances.margin_m, late_m: margins::TRIGGER_DELAY_S * scenario.mission.cruise_mps }
+        Self {
+            beside_m: distances.margin_m,
+            late_m: margins::TRIGGER_DELAY_S * scenario.mission.cruise_mps,
+        }
     }
 
-    /// From a waypoint to its picture along the lane: the most that [`margins::usable_footprint`] counts with.
+    /// From a waypoint to its picture along the lane: the most that [`margins::usable_footprint`]
+    /// counts with.
     pub fn off_m(&self) -> f32 {
         self.beside_m + self.late_m
     }
@@ -62,7 +71,8 @@ impl Tolerance {
 pub fn count_waypoints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
     let tolerance = Tolerance::of_plan(planned);
     let lanes = planned.tracks.lanes();
-    let left: u64 = lanes.iter().map(|lane| left_on_lane(planned, lane, pictures, &tolerance)).sum();
+    let left: u64 =
+        lanes.iter().map(|lane| left_on_lane(planned, lane, pictures, &tolerance)).sum();
     (left, flown_twice(lanes, planned.tracks.waypoint_count(), pictures))
 }
 
@@ -77,7 +87,12 @@ fn along_and_beside(lane: &Lane, place: &Flat) -> (f32, f32) {
     }
 }
 
-fn left_on_lane(planned: &CoveragePlan<'_>, lane: &Lane, pictures: &[Picture], tolerance: &Tolerance) -> u64 {
+fn left_on_lane(
+    planned: &CoveragePlan<'_>,
+    lane: &Lane,
+    pictures: &[Picture],
+    tolerance: &Tolerance,
+) -> u64 {
     let spacing = planned.wanted.spacing;
     let beside_m = tolerance.beside_m.max(spacing.lane_m / 2.0);
     let near_m = tolerance.off_m().max(spacing.waypoint_m / 2.0);
@@ -116,7 +131,8 @@ fn flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
     vehicles.dedup();
     for vehicle in vehicles {
         let own = pictures.iter().filter(|picture| picture.vehicle == vehicle);
-        let mut flown: Vec<u32> = own.filter_map(|p| nearest_waypoint(lanes, &p.position.xy())).collect();
+        let mut flown: Vec<u32> =
+            own.filter_map(|p| nearest_waypoint(lanes, &p.position.xy())).collect();
         // Of earlier flights it is not known which vehicle took which.
         if vehicle.is_none() {
             flown.sort_unstable();
@@ -133,15 +149,16 @@ mod tests {
     use crate::scenario;
     use crate::scenario::coverage::Method;
 
-    /// Pictures of a plan of three lanes and more, 5 m apart at 5 m/s, changed by `change`: index, distance along the path.
+    /// Pictures of a plan of three lanes and more, 5 m apart at 5 m/s, changed by `change`: index,
+    /// distance along the path.
     fn counted(change: impl Fn(&mut Vec<Picture>)) -> (u64, u64) {
         let text = "[area]\npolygon = [[0, 0], [60, 0], [60, 30], [0, 30]]\nheight_m = 20.0\nlane_m = 10.0\n\
                     waypoint_m = 5.0\ncamera = { fov_deg = 73.7, aspect = 1.5 }\n[mission]\ncruise_mps = 5.0\n\
                     [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n";
         let scenario = scenario::parse(text, "taken").unwrap();
         let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
-        let waypoints =
-            (0..planned.tracks.waypoint_count()).filter_map(|number| planned.tracks.waypoint(number));
+        let waypoints = (0..planned.tracks.waypoint_count())
+            .filter_map(|number| planned.tracks.waypoint(number));
         let picture = |place: Flat| Picture {
             vehicle: Some(1),
             t_s: 0.0,
@@ -159,7 +176,10 @@ mod tests {
         // Later and later, as by distance: up to a whole spacing.
         let later = |pictures: &mut Vec<Picture>| {
             let step = pictures[1].position - pictures[0].position;
-            assert!(((pictures[12].position - pictures[0].position) - step * 12.0).norm() < 0.01, "one lane");
+            assert!(
+                ((pictures[12].position - pictures[0].position) - step * 12.0).norm() < 0.01,
+                "one lane"
+            );
             for (k, picture) in pictures[1..12].iter_mut().enumerate() {
                 picture.position += step * ((k + 1) as f32 / 12.0);
             }
@@ -188,7 +208,8 @@ mod tests {
     fn who_comes_back_or_after_another_flies_twice_and_who_waits_does_not() {
         let again = |from: usize, vehicle: Option<u8>| {
             counted(move |pictures| {
-                let more = pictures[from..from + 3].iter().map(|picture| Picture { vehicle, ..*picture });
+                let more =
+                    pictures[from..from + 3].iter().map(|picture| Picture { vehicle, ..*picture });
                 pictures.extend(more.collect::<Vec<_>>());
             })
         };

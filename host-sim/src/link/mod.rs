@@ -1,4 +1,5 @@
-//! Byte links between processes and devices: URLs, and nonblocking TCP, UDP and serial ports behind one small trait.
+//! Byte links between processes and devices: URLs, and nonblocking TCP, UDP and serial ports behind
+//! one small trait.
 //!
 //! | URL | is |
 //! |---|---|
@@ -10,7 +11,8 @@
 //!
 //! A TCP client and a serial port that are lost are opened again, tried once a second.
 //!
-//! A datagram is one or more whole frames: a sender hands whole frames to [`Link::send`]. A stream may cut anywhere.
+//! A datagram is one or more whole frames: a sender hands whole frames to [`Link::send`]. A stream
+//! may cut anywhere.
 
 mod reconnect;
 mod serial;
@@ -74,8 +76,9 @@ impl FromStr for LinkUrl {
         let (scheme, rest) = text
             .split_once(':')
             .ok_or_else(|| bad("expected tcp:, tcp-listen:, udp:, udp-listen: or serial:"))?;
-        let (head, number) =
-            rest.rsplit_once(':').ok_or_else(|| bad("expected HOST:PORT, or PATH:BAUD for serial"))?;
+        let (head, number) = rest
+            .rsplit_once(':')
+            .ok_or_else(|| bad("expected HOST:PORT, or PATH:BAUD for serial"))?;
         if head.is_empty() {
             return Err(bad("the host or path is empty"));
         }
@@ -139,17 +142,21 @@ impl LinkUrl {
     fn open_once(&self, timeout: Duration) -> Result<Box<dyn Link>, LinkError> {
         let failed = |why| LinkError::Open { url: self.clone(), why };
         match self {
-            Self::Tcp(at) => {
-                Ok(Box::new(tcp::Client::connect(resolve(at).map_err(failed)?, timeout).map_err(failed)?))
-            }
+            Self::Tcp(at) => Ok(Box::new(
+                tcp::Client::connect(resolve(at).map_err(failed)?, timeout).map_err(failed)?,
+            )),
             Self::TcpListen(at) => {
                 Ok(Box::new(tcp::Server::bind(resolve(at).map_err(failed)?).map_err(failed)?))
             }
-            Self::Udp(at) => Ok(Box::new(udp::UdpPeer::new(resolve(at).map_err(failed)?).map_err(failed)?)),
+            Self::Udp(at) => {
+                Ok(Box::new(udp::UdpPeer::new(resolve(at).map_err(failed)?).map_err(failed)?))
+            }
             Self::UdpListen(at) => {
                 Ok(Box::new(udp::UdpHub::bind(resolve(at).map_err(failed)?).map_err(failed)?))
             }
-            Self::Serial { path, baud } => Ok(Box::new(serial::Port::open(path, *baud).map_err(failed)?)),
+            Self::Serial { path, baud } => {
+                Ok(Box::new(serial::Port::open(path, *baud).map_err(failed)?))
+            }
         }
     }
 }
@@ -184,9 +191,12 @@ mod tests {
 
     #[test]
     fn urls_are_read_and_written_alike() {
-        for text in
-            ["tcp:localhost:5760", "tcp-listen:0.0.0.0:0", "udp:[::1]:14540", "serial:/dev/ttyACM0:921600"]
-        {
+        for text in [
+            "tcp:localhost:5760",
+            "tcp-listen:0.0.0.0:0",
+            "udp:[::1]:14540",
+            "serial:/dev/ttyACM0:921600",
+        ] {
             assert_eq!(text.parse::<LinkUrl>().unwrap().to_string(), text);
         }
     }

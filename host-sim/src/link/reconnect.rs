@@ -1,4 +1,5 @@
-//! A link that is opened again when it was lost: a simulator that restarts, an adapter that is plugged in again.
+//! A link that is opened again when it was lost: a simulator that restarts, an adapter that is
+//! plugged in again.
 
 use std::io;
 use std::net::SocketAddr;

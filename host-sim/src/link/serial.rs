@@ -103,7 +103,8 @@ mod tests {
 
     #[test]
     fn a_device_that_is_not_there_is_named() {
-        let error = "serial:/dev/no-such-device:57600".parse::<super::super::LinkUrl>().unwrap().open();
+        let error =
+            "serial:/dev/no-such-device:57600".parse::<super::super::LinkUrl>().unwrap().open();
         assert!(error.err().unwrap().to_string().contains("serial:/dev/no-such-device:57600"));
     }
 }

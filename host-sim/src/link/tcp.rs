@@ -1,4 +1,5 @@
-//! TCP links. What a peer does not take at once waits in a queue; a peer that lags [`MAX_QUEUED_BYTES`] bytes behind is cut off.
+//! TCP links. What a peer does not take at once waits in a queue; a peer that lags
+//! [`MAX_QUEUED_BYTES`] bytes behind is cut off.
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -24,9 +25,10 @@ impl Connection {
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.stream.read(buffer) {
-            Ok(0) => {
-                Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the other side closed the connection"))
-            }
+            Ok(0) => Err(io::Error::new(
+                io::ErrorKind::UnexpectedEof,
+                "the other side closed the connection",
+            )),
             Err(error) if is_would_block(&error) => Ok(0),
             result => result,
         }

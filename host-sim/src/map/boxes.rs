@@ -1,10 +1,12 @@
-//! Distances from segments to a map's obstacles, by a tree of boxes: for the many edges of a roadmap.
+//! Distances from segments to a map's obstacles, by a tree of boxes: for the many edges of a
+//! roadmap.
 //!
-//! The obstacles are joined into boxes, each brick of 4 × 4 × 4 cells by itself and then along x, y and z where boxes
-//! have equal sides: a wall is one box or a few. Over them lies a tree of boxes, eight to a node. The nearest is found by
-//! branch and bound: what is no nearer than what is known already is not opened. Work does not grow with the cube of the
-//! distance, as that of [`planner_core::segment::segment_clearance`] does, and the result is the same but for rounding: both
-//! are f32 in cells, n · 2⁻²³ a coordinate of n cells. Memory: 30 bytes a box.
+//! The obstacles are joined into boxes, each brick of 4 × 4 × 4 cells by itself and then along x, y
+//! and z where boxes have equal sides: a wall is one box or a few. Over them lies a tree of boxes,
+//! eight to a node. The nearest is found by branch and bound: what is no nearer than what is known
+//! already is not opened. Work does not grow with the cube of the distance, as that of
+//! [`planner_core::segment::segment_clearance`] does, and the result is the same but for rounding:
+//! both are f32 in cells, n · 2⁻²³ a coordinate of n cells. Memory: 30 bytes a box.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
@@ -51,8 +53,8 @@ impl CellBox {
         sides.into_iter().fold(0, |all, side| all << 16 | u64::from(side))
     }
 
-    /// A measure of how many segments pass it within a distance, in cells: half the surface of all places that near, but
-    /// for a constant.
+    /// A measure of how many segments pass it within a distance, in cells: half the surface of all
+    /// places that near, but for a constant.
     fn split_cost(&self, near: f32) -> f32 {
         let [x, y, z] = [0, 1, 2].map(|a| f32::from(self.high[a] - self.low[a]));
         x * y + y * z + z * x + core::f32::consts::PI * near * (x + y + z)
@@ -87,8 +89,8 @@ fn brick_to_boxes(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
 fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
     boxes.sort_by_cached_key(|b| (b.cross_section_key(axis), b.low[axis]));
     boxes.dedup_by(|next, last| {
-        let joins =
-            last.cross_section_key(axis) == next.cross_section_key(axis) && last.high[axis] == next.low[axis];
+        let joins = last.cross_section_key(axis) == next.cross_section_key(axis)
+            && last.high[axis] == next.low[axis];
         if joins {
             last.high[axis] = next.high[axis];
         }
@@ -132,16 +134,18 @@ pub struct BoxTree {
 impl BoxTree {
     /// The tree over a map. O(bricks + boxes · log boxes).
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
-        let nodes = build_nodes(&mut boxes_of_map(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
+        let nodes =
+            build_nodes(&mut boxes_of_map(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
         Self { shape: *grid.shape(), outside: grid.outside(), nodes, arch: Arch::new() }
     }
 
-    /// Distance from the segment to the nearest obstacle, metres, at most `max_m`. Once it is seen to be at most
-    /// `enough_m`, the search ends with what it has. Of a segment that touches an obstacle it may be a rounding above zero;
-    /// an end that is not finite is at distance 0.
+    /// Distance from the segment to the nearest obstacle, metres, at most `max_m`. Once it is seen
+    /// to be at most `enough_m`, the search ends with what it has. Of a segment that touches an
+    /// obstacle it may be a rounding above zero; an end that is not finite is at distance 0.
     pub fn clearance_m(&self, a: &Point, b: &Point, max_m: f32, enough_m: f32) -> f32 {
         let resolution_m = self.shape.resolution_m;
-        let cells = |p: &Point| [0, 1, 2].map(|axis| (p[axis] - self.shape.min[axis]) / resolution_m);
+        let cells =
+            |p: &Point| [0, 1, 2].map(|axis| (p[axis] - self.shape.min[axis]) / resolution_m);
         let segment = Segment::new(cells(a), cells(b));
         if !segment.is_finite() {
             return 0.0;
@@ -151,8 +155,12 @@ impl BoxTree {
             limit = limit.min(segment.distance_to_faces(self.shape.dims)).max(0.0);
         }
         let enough = (enough_m / resolution_m).max(0.0);
-        let search =
-            Search { nodes: &self.nodes, segment: &segment, bound: limit * limit, enough: enough * enough };
+        let search = Search {
+            nodes: &self.nodes,
+            segment: &segment,
+            bound: limit * limit,
+            enough: enough * enough,
+        };
         let nearest = self.arch.dispatch(search);
         let nearest = if nearest < limit * limit { nearest.sqrt() } else { limit };
         (nearest * resolution_m).min(max_m)
@@ -179,7 +187,8 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     let is_large = boxes.len() > MAX_BOXES_PER_THREAD;
     let mut parts = vec![boxes];
     while parts.len() < BOXES_PER_NODE {
-        let Some(largest) = (0..parts.len()).filter(|&i| parts[i].len() > 1).max_by_key(|&i| parts[i].len())
+        let Some(largest) =
+            (0..parts.len()).filter(|&i| parts[i].len() > 1).max_by_key(|&i| parts[i].len())
         else {
             break;
         };
@@ -200,8 +209,9 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     std::iter::once(node).chain(below.into_iter().flatten()).collect()
 }
 
-/// Parts two boxes or more so that few segments have to open both halves, of which neither has less than a third: the surface
-/// area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for segments that pass within `near` cells. O(boxes).
+/// Parts two boxes or more so that few segments have to open both halves, of which neither has less
+/// than a third: the surface area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for
+/// segments that pass within `near` cells. O(boxes).
 fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
@@ -257,7 +267,8 @@ fn centre_extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
     Some((centers().min()?, centers().max()?))
 }
 
-/// Which of [`SPLIT_BINS`] bins along an axis a box is in; `None` where the centres of all are at one place.
+/// Which of [`SPLIT_BINS`] bins along an axis a box is in; `None` where the centres of all are at
+/// one place.
 fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
     let (low, high) = centre_extent(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {

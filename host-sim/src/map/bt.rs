@@ -1,10 +1,11 @@
 //! OctoMap's binary octree file, `.bt`: occupied, free and unknown, without probabilities.
 //!
-//! A text header (`# Octomap OcTree binary file`, then `id`, `size`, `res` and `data`, one a line), then the inner
-//! nodes depth first, each one little-endian 16-bit word of eight children, two bits a child from the lowest up:
-//! 0 unknown, 1 free leaf, 2 occupied leaf, 3 inner node, whose word follows. Source: OctoMap 1.9,
-//! `OccupancyOcTreeBase::readBinaryNode`. Every inner node read has taken two bytes of the file, so memory is
-//! bounded by four times its length whatever the header claims.
+//! A text header (`# Octomap OcTree binary file`, then `id`, `size`, `res` and `data`, one a line),
+//! then the inner nodes depth first, each one little-endian 16-bit word of eight children, two bits
+//! a child from the lowest up: 0 unknown, 1 free leaf, 2 occupied leaf, 3 inner node, whose word
+//! follows. Source: OctoMap 1.9, `OccupancyOcTreeBase::readBinaryNode`. Every inner node read has
+//! taken two bytes of the file, so memory is bounded by four times its length whatever the header
+//! claims.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,14 +17,16 @@ use crate::files;
 /// Values of the header's `id` that are read; the colours of a ColorOcTree are dropped.
 const IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
 const MAGIC: &str = "# Octomap OcTree binary file";
-/// Longest file read: four times its length is what it takes in memory. The largest public scans have a tenth of it.
+/// Longest file read: four times its length is what it takes in memory. The largest public scans
+/// have a tenth of it.
 const MAX_BYTES: u64 = 1 << 26;
 /// Longest header line; OctoMap's own comment takes 75 bytes.
 const MAX_LINE: usize = 1024;
 
 /// Reads a `.bt` file.
 pub fn read(path: &Path) -> Result<Octree, MapError> {
-    let bytes = files::read(path, MAX_BYTES).map_err(|source| MapError::from_io("read", path, source))?;
+    let bytes =
+        files::read(path, MAX_BYTES).map_err(|source| MapError::from_io("read", path, source))?;
     parse(&bytes, path)
 }
 
@@ -62,7 +65,12 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn error_at(&self, offset: usize, expected: impl Into<String>, found: impl Into<String>) -> MapError {
+    fn error_at(
+        &self,
+        offset: usize,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> MapError {
         MapError::Malformed {
             file: self.path.into(),
             offset: offset as u64,
@@ -76,7 +84,8 @@ impl<'a> Reader<'a> {
         let begin = self.at;
         let rest = &self.bytes[begin..self.bytes.len().min(begin + MAX_LINE)];
         let Some(length) = rest.iter().position(|&b| b == b'\n') else {
-            let found = if begin == self.bytes.len() { "the end of the file" } else { "no end of line" };
+            let found =
+                if begin == self.bytes.len() { "the end of the file" } else { "no end of line" };
             return Err(self.error_at(begin, expected, found));
         };
         self.at = begin + length + 1;
@@ -112,11 +121,17 @@ impl<'a> Reader<'a> {
                 _ if line.starts_with('#') => {}
                 "id" if IDS.contains(&value) => id = true,
                 "id" => {
-                    return Err(self.error_at(value_at, "the id `OcTree` or `ColorOcTree`", quoted(value)));
+                    return Err(self.error_at(
+                        value_at,
+                        "the id `OcTree` or `ColorOcTree`",
+                        quoted(value),
+                    ));
                 }
                 "size" => match value.parse::<u64>() {
                     Ok(n) => nodes = Some((n, value_at)),
-                    Err(_) => return Err(self.error_at(value_at, "a number of nodes", quoted(value))),
+                    Err(_) => {
+                        return Err(self.error_at(value_at, "a number of nodes", quoted(value)));
+                    }
                 },
                 "res" => match value.parse::<f64>() {
                     Ok(r) if r.is_finite() && (1e-6..=1e6).contains(&r) => resolution_m = Some(r),
@@ -189,7 +204,8 @@ fn quoted(text: &str) -> String {
 pub fn to_bytes(tree: &Octree) -> Vec<u8> {
     let mut header = String::new();
     let (nodes, res) = (tree.counts().nodes, tree.resolution_m());
-    writeln!(header, "{MAGIC}\nid OcTree\nsize {nodes}\nres {res}\ndata").expect("a String takes any text");
+    writeln!(header, "{MAGIC}\nid OcTree\nsize {nodes}\nres {res}\ndata")
+        .expect("a String takes any text");
     let mut bytes = header.into_bytes();
     if let Some(root) = tree.root() {
         push_node(tree, root, &mut bytes);
@@ -259,14 +275,21 @@ mod tests {
     #[test]
     fn the_deepest_leaf_is_read() {
         let bytes = file(HEADER, &[b"size 17\nres 0.1\ndata\n".as_slice(), &chain(15, 2)].concat());
-        assert_eq!(parse(&bytes, Path::new("deep.bt")).unwrap().at_key([0, 0, 0]), Occupancy::Occupied);
+        assert_eq!(
+            parse(&bytes, Path::new("deep.bt")).unwrap().at_key([0, 0, 0]),
+            Occupancy::Occupied
+        );
     }
 
     #[test]
     fn malformed_files_are_named_with_offset_and_expectation() {
-        let body = |data: &[u8]| file(HEADER, &[b"size 2\nres 0.1\ndata\n".as_slice(), data].concat());
+        let body =
+            |data: &[u8]| file(HEADER, &[b"size 2\nres 0.1\ndata\n".as_slice(), data].concat());
         let cases: [(Vec<u8>, &str); 14] = [
-            (b"".to_vec(), "byte 0: expected `# Octomap OcTree binary file`, found the end of the file"),
+            (
+                b"".to_vec(),
+                "byte 0: expected `# Octomap OcTree binary file`, found the end of the file",
+            ),
             (
                 b"PK\x03\x04\n".to_vec(),
                 "byte 0: expected `# Octomap OcTree binary file`, found `PK\\u{3}\\u{4}`",
@@ -275,7 +298,10 @@ mod tests {
                 b"\xff\xfe\n".to_vec(),
                 "byte 0: expected `# Octomap OcTree binary file`, found bytes that are no text",
             ),
-            (vec![b'#'; 5000], "byte 0: expected `# Octomap OcTree binary file`, found no end of line"),
+            (
+                vec![b'#'; 5000],
+                "byte 0: expected `# Octomap OcTree binary file`, found no end of line",
+            ),
             (file(HEADER, b""), "byte 39: expected `size N`, found the end of the file"),
             (
                 file("# Octomap OcTree binary file\nid ScalarField\n", b""),

@@ -1,11 +1,13 @@
 //! `builtin:building`: the nine-floor building of P3D §4, 41 × 24 × 49 m, generated from a seed.
 //!
-//! The paper gives the outer size (its Fig. 8) and that there are many rooms, doors, windows and a stairwell, no plan.
-//! Ours: a corridor along the middle of every floor with rooms on both sides, a stairwell at the west end, an atrium
-//! in the middle and a lift shaft at the east end, all three open through every slab between the floors; the ground
-//! floor is a lobby. The seed places partitions and doors. Doors and shafts are as wide as they are so that a uniform
-//! roadmap of the paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's does, and no longer
-//! with far fewer. The interior is known to be free; nothing is unknown. Corner of the outer walls at (0, 0, 0), metres.
+//! The paper gives the outer size (its Fig. 8) and that there are many rooms, doors, windows and a
+//! stairwell, no plan. Ours: a corridor along the middle of every floor with rooms on both sides, a
+//! stairwell at the west end, an atrium in the middle and a lift shaft at the east end, all three
+//! open through every slab between the floors; the ground floor is a lobby. The seed places
+//! partitions and doors. Doors and shafts are as wide as they are so that a uniform roadmap of the
+//! paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's does, and no
+//! longer with far fewer. The interior is known to be free; nothing is unknown. Corner of the outer
+//! walls at (0, 0, 0), metres.
 
 use planner_core::Point;
 use planner_core::voxel::GridShape;
@@ -134,7 +136,10 @@ impl BlockList {
         // Walls across the corridor, each with a wide opening.
         for x in CROSS_WALLS_M {
             self.add_solid([x, CORRIDOR_M[0], z], [x + WALL_M, CORRIDOR_M[1], ceiling]);
-            self.add_opening([x, CORRIDOR_M[0] + 0.75, z], [x + WALL_M, CORRIDOR_M[1] - 0.75, z + 4.0]);
+            self.add_opening(
+                [x, CORRIDOR_M[0] + 0.75, z],
+                [x + WALL_M, CORRIDOR_M[1] - 0.75, z + 4.0],
+            );
         }
         if floor == 0 {
             let [x0, x1] = LOBBY_M;

@@ -1,10 +1,12 @@
-//! The vertical flight between the ground and a start or goal: has it the clearance that every edge has?
+//! The vertical flight between the ground and a start or goal: has it the clearance that every edge
+//! has?
 //!
-//! The ground is the top of the first seen obstacle below the point; unknown space and the map's bottom are none. A
-//! vehicle stands there with its centre a radius above. From that place up to the point, every cell that rises above the
-//! ground must be farther than the required clearance: obstacles, unknown space where that is blocked, and the map's
-//! faces. The segment is vertical and cells are boxes, so distances are exact but for rounding in f64. Metres, mission frame.
-//! Cost: the cells within the required clearance.
+//! The ground is the top of the first seen obstacle below the point; unknown space and the map's
+//! bottom are none. A vehicle stands there with its centre a radius above. From that place up to
+//! the point, every cell that rises above the ground must be farther than the required clearance:
+//! obstacles, unknown space where that is blocked, and the map's faces. The segment is vertical and
+//! cells are boxes, so distances are exact but for rounding in f64. Metres, mission frame. Cost:
+//! the cells within the required clearance.
 
 use planner_core::Point;
 use planner_core::voxel::Outside;
@@ -46,7 +48,8 @@ pub enum ColumnError {
     },
 }
 
-/// Height of the ground below `point`, if a vehicle that needs `required_m` may fly straight between the two.
+/// Height of the ground below `point`, if a vehicle that needs `required_m` may fly straight
+/// between the two.
 ///
 /// # Errors
 /// The first thing that is wrong; of all that is too near, the nearest.
@@ -62,7 +65,8 @@ pub fn ground_below_column(
     }
     let [i, j, top] = shape.cell_of(point).ok_or(ColumnError::NotFree)?;
     let grid = map.grid();
-    let below = (0..=top).rev().find(|&k| grid.is_occupied([i, j, k])).ok_or(ColumnError::NoGround)?;
+    let below =
+        (0..=top).rev().find(|&k| grid.is_occupied([i, j, k])).ok_or(ColumnError::NoGround)?;
     let ground_m = shape.min.z + (below + 1) as f32 * shape.resolution_m;
     if map.is_unknown([i, j, below]) {
         return Err(ColumnError::UnknownBelow { top_m: ground_m });
@@ -70,7 +74,8 @@ pub fn ground_below_column(
     if point.z - ground_m < radius_m {
         return Err(ColumnError::TooLow { ground_m });
     }
-    let (place, distance_m, unknown) = nearest_above(map, point, below, ground_m + radius_m, required_m);
+    let (place, distance_m, unknown) =
+        nearest_above(map, point, below, ground_m + radius_m, required_m);
     if f64::from(required_m) < distance_m {
         return Ok(ground_m);
     }
@@ -80,7 +85,13 @@ pub fn ground_below_column(
 /// The nearest cell or face to the segment from the height `low_m` up to `point`, of all cells
 /// above layer `ground` and the faces of the map but the lowest: its place, its distance, and
 /// whether it is unknown. Only cells within `reach_m` are compared.
-fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m: f32) -> (Point, f64, bool) {
+fn nearest_above(
+    map: &VoxelMap,
+    point: &Point,
+    ground: u32,
+    low_m: f32,
+    reach_m: f32,
+) -> (Point, f64, bool) {
     let shape = &map.shape;
     let (min, max, cell_m) =
         (shape.min.cast::<f64>(), shape.max().cast::<f64>(), f64::from(shape.resolution_m));
@@ -132,8 +143,14 @@ fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m
     nearest
 }
 
-/// The nearest place at the same height whose column is clear, within 5 m, or nearer where much room is required.
-pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> Option<Point> {
+/// The nearest place at the same height whose column is clear, within 5 m, or nearer where much
+/// room is required.
+pub fn nearest_column(
+    map: &VoxelMap,
+    point: &Point,
+    radius_m: f32,
+    required_m: f32,
+) -> Option<Point> {
     let steps = (NEAREST_COLUMN_WITHIN_M / NEAREST_COLUMN_STEP_M) as i32;
     let mut offsets: Vec<(i32, i32)> =
         (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))).collect();
@@ -141,11 +158,14 @@ pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: 
     // Only what two decimals can say, so that what is printed is what was tried.
     let round = |x: f32| (f64::from(x) * 100.0).round() as f32 / 100.0;
     let across = 2.0 * required_m / map.shape.resolution_m + 3.0;
-    let layers =
-        (map.shape.dims[2] as f32).min(across + (point.z - map.shape.min.z) / map.shape.resolution_m);
+    let layers = (map.shape.dims[2] as f32)
+        .min(across + (point.z - map.shape.min.z) / map.shape.resolution_m);
     let most = (NEAREST_COLUMN_CELLS / (across * across * layers)) as usize;
     offsets.into_iter().take(most).find_map(|(i, j)| {
-        let (x, y) = (point.x + i as f32 * NEAREST_COLUMN_STEP_M, point.y + j as f32 * NEAREST_COLUMN_STEP_M);
+        let (x, y) = (
+            point.x + i as f32 * NEAREST_COLUMN_STEP_M,
+            point.y + j as f32 * NEAREST_COLUMN_STEP_M,
+        );
         let place = Point::new(round(x), round(y), point.z);
         ground_below_column(map, &place, radius_m, required_m).is_ok().then_some(place)
     })

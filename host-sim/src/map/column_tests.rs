@@ -17,8 +17,8 @@ fn random_map(rng: &mut Pcg32) -> OccupancyMap {
     let shape = GridShape { dims, min: Point::new(-1.3, 0.4, -0.7), resolution_m: 0.2 };
     let mut map = OccupancyMap::all_unknown(shape, "random").unwrap();
     let sparse = uniform(rng) * 0.08;
-    for (i, j, k) in
-        (0..dims[0]).flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
+    for (i, j, k) in (0..dims[0])
+        .flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
     {
         let state = match uniform(rng) {
             x if k == 0 && x < 0.9 => Occupancy::Occupied,
@@ -109,7 +109,11 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                 let required_m = radius_m + 0.3 * uniform(&mut rng);
                 let ours = ground_below_column(&voxels, &p, radius_m, required_m);
                 let expected = brute_force(&map, unknown, &p, radius_m, required_m);
-                assert_eq!(ours.is_ok(), expected.is_some(), "{p} {radius_m} {required_m}: {ours:?}");
+                assert_eq!(
+                    ours.is_ok(),
+                    expected.is_some(),
+                    "{p} {radius_m} {required_m}: {ours:?}"
+                );
                 match (ours, expected) {
                     (Ok(ground_m), Some(expected)) => {
                         assert!((f64::from(ground_m) - expected).abs() < 1e-5);
@@ -118,11 +122,14 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                     (Err(ColumnError::TooNear { place, distance_m, .. }), _) => {
                         // The place named is as far from the segment as it says.
                         let along = place.z.min(p.z);
-                        let away = ((place.x - p.x).hypot(place.y - p.y)).hypot((place.z - along).max(0.0));
+                        let away = ((place.x - p.x).hypot(place.y - p.y))
+                            .hypot((place.z - along).max(0.0));
                         assert!(distance_m <= required_m && away <= distance_m + 1e-5 + radius_m);
                         if let Some(other) = nearest_column(&voxels, &p, radius_m, required_m) {
                             hinted += 1;
-                            assert!(brute_force(&map, unknown, &other, radius_m, required_m).is_some());
+                            assert!(
+                                brute_force(&map, unknown, &other, radius_m, required_m).is_some()
+                            );
                         }
                     }
                     _ => {}
@@ -137,7 +144,9 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
 fn what_is_wrong_with_a_column_is_named() {
     let shape = GridShape { dims: [40, 40, 40], min: Point::zeros(), resolution_m: 0.25 };
     let mut map = OccupancyMap::all_unknown(shape, "room").unwrap();
-    for (i, j, k) in (0..40).flat_map(|i| (0..40).flat_map(move |j| (0..40).map(move |k| (i, j, k)))) {
+    for (i, j, k) in
+        (0..40).flat_map(|i| (0..40).flat_map(move |j| (0..40).map(move |k| (i, j, k))))
+    {
         map.set([i, j, k], if k == 0 { Occupancy::Occupied } else { Occupancy::Free });
     }
     // A bar beside one column, unknown ground below another, none below a third.
@@ -145,16 +154,19 @@ fn what_is_wrong_with_a_column_is_named() {
     map.set([8, 8, 0], Occupancy::Unknown);
     map.set([30, 30, 0], Occupancy::Free);
     let voxels = map.voxel_map(Unknown::Blocked);
-    let look = |x: f32, y: f32, z: f32| ground_below_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
+    let look =
+        |x: f32, y: f32, z: f32| ground_below_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
     assert_eq!(look(5.0, 2.0, 4.0), Ok(0.25));
-    let bar = ColumnError::TooNear { place: Point::new(5.5, 5.1, 2.25), distance_m: 0.5, unknown: false };
+    let bar =
+        ColumnError::TooNear { place: Point::new(5.5, 5.1, 2.25), distance_m: 0.5, unknown: false };
     assert_eq!(look(5.0, 5.1, 4.0), Err(bar));
     assert_eq!(look(2.1, 2.1, 4.0), Err(ColumnError::UnknownBelow { top_m: 0.25 }));
     assert_eq!(look(7.6, 7.6, 4.0), Err(ColumnError::NoGround));
     assert_eq!(look(5.0, 2.0, 0.5), Err(ColumnError::TooLow { ground_m: 0.25 }));
     assert_eq!(look(5.5, 5.1, 2.1), Err(ColumnError::NotFree));
     assert_eq!(look(11.0, 5.1, 2.1), Err(ColumnError::NotFree));
-    let face = ColumnError::TooNear { place: Point::new(0.0, 5.0, 4.0), distance_m: 0.7, unknown: true };
+    let face =
+        ColumnError::TooNear { place: Point::new(0.0, 5.0, 4.0), distance_m: 0.7, unknown: true };
     assert_eq!(look(0.7, 5.0, 4.0), Err(face));
     let place = nearest_column(&voxels, &Point::new(5.0, 5.1, 4.0), 0.3, 0.85).unwrap();
     assert_eq!(place, Point::new(4.6, 5.1, 4.0));

@@ -129,7 +129,9 @@ pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         Action::Convert { file, out, resolution } => {
             if !matches!(Source::parse(&out.to_string_lossy()), Ok(Source::Bt(_))) {
                 let expected = "a file to write that ends in `.bt`";
-                return Err(MapError::UnknownKind { file: out.display().to_string(), expected }.into());
+                return Err(
+                    MapError::UnknownKind { file: out.display().to_string(), expected }.into()
+                );
             }
             let mut results = ResultFiles::single_file(out)?;
             let tree = match read(file, *resolution)?.1 {
@@ -157,9 +159,10 @@ fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), Ma
             Ok(("builtin", Map::Grid(map)))
         }
         (Source::Bt(path), None) => Ok(("octomap", Map::Tree(bt::read(path)?))),
-        (Source::Bt(path), Some(resolution_m)) => {
-            Ok(("octomap", Map::Grid(OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file)?)))
-        }
+        (Source::Bt(path), Some(resolution_m)) => Ok((
+            "octomap",
+            Map::Grid(OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file)?),
+        )),
     }
 }
 
@@ -201,8 +204,14 @@ mod tests {
             assert_eq!(info.dims, grid.shape().dims, "{resolution_m}");
             for axis in 0..3 {
                 let (from_m, to_m) = (grid.shape().min[axis], grid.shape().max()[axis]);
-                assert!((info.min_m[axis] - f64::from(from_m)).abs() < 1e-4, "{resolution_m}: {info:?}");
-                assert!((info.max_m[axis] - f64::from(to_m)).abs() < 1e-4, "{resolution_m}: {info:?}");
+                assert!(
+                    (info.min_m[axis] - f64::from(from_m)).abs() < 1e-4,
+                    "{resolution_m}: {info:?}"
+                );
+                assert!(
+                    (info.max_m[axis] - f64::from(to_m)).abs() < 1e-4,
+                    "{resolution_m}: {info:?}"
+                );
             }
         }
     }

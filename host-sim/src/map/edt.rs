@@ -1,10 +1,12 @@
-//! A clearance that is never too large: squared distances between cells' cubes, from an exact distance transform.
+//! A clearance that is never too large: squared distances between cells' cubes, from an exact
+//! distance transform.
 //!
-//! Two cells whose indices differ by `d` are at least `√Σ max(|dᵢ| − 1, 0)²` cells apart, wherever in them two points
-//! lie. As `max(|d| − 1, 0)² = min over e of (d − e)²` for e in −1, 0, 1, that is the ordinary squared distance to the
-//! obstacles grown by one cell along every axis, which separates by axis (Felzenszwalb & Huttenlocher 2012). Squares
-//! are kept in 16 bits and end at 255 cells. The simulator asks this first at every step and the exact distance only
-//! where it is small. Cost: O(cells) once, two bytes a cell; one load a query.
+//! Two cells whose indices differ by `d` are at least `√Σ max(|dᵢ| − 1, 0)²` cells apart, wherever
+//! in them two points lie. As `max(|d| − 1, 0)² = min over e of (d − e)²` for e in −1, 0, 1, that
+//! is the ordinary squared distance to the obstacles grown by one cell along every axis, which
+//! separates by axis (Felzenszwalb & Huttenlocher 2012). Squares are kept in 16 bits and end at 255
+//! cells. The simulator asks this first at every step and the exact distance only where it is
+//! small. Cost: O(cells) once, two bytes a cell; one load a query.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
@@ -86,7 +88,8 @@ struct Scratch {
     envelope: Vec<Parabola>,
 }
 
-/// Squared distance from a site: `height + (x − site)²`. A side has at most 2¹⁵ cells, so squares fit.
+/// Squared distance from a site: `height + (x − site)²`. A side has at most 2¹⁵ cells, so squares
+/// fit.
 #[derive(Clone, Copy, Debug)]
 struct Parabola {
     site: i32,
@@ -113,7 +116,8 @@ impl Scratch {
         Self { out: line.clone(), line, envelope: Vec::with_capacity(length) }
     }
 
-    /// `out[x] = min over q of line[q] + max(|x − q| − 1, 0)²`, ending at the largest u16. Cost: O(length).
+    /// `out[x] = min over q of line[q] + max(|x − q| − 1, 0)²`, ending at the largest u16. Cost:
+    /// O(length).
     fn transform(&mut self) {
         let n = self.line.len();
         self.envelope.clear();

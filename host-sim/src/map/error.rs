@@ -18,7 +18,10 @@ pub enum MapError {
         source: std::io::Error,
     },
     /// The bytes are not what the format asks for.
-    #[error("malformed map: {}: byte {offset}: expected {expected}, found {found}", quoted_path(file))]
+    #[error(
+        "malformed map: {}: byte {offset}: expected {expected}, found {found}",
+        quoted_path(file)
+    )]
     Malformed {
         /// The file.
         file: PathBuf,

@@ -10,7 +10,8 @@ use super::octree::Occupancy;
 /// Most cells of a ground; larger grounds have larger cells.
 const MAX_GROUND_CELLS: f32 = 4e6;
 
-/// The ground, whose top is as high as `low`, with the air over it to `high`, in cells of `cell_m` or larger ones.
+/// The ground, whose top is as high as `low`, with the air over it to `high`, in cells of `cell_m`
+/// or larger ones.
 ///
 /// # Errors
 /// It is larger than a map can be.

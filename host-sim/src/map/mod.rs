@@ -23,7 +23,8 @@ pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 
 /// Description of the maps that can be given.
-pub const ACCEPTED_MAPS: &str = "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
+pub const ACCEPTED_MAPS: &str =
+    "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
 
 /// Range of the planning resolution, metres.
 pub const RESOLUTION_RANGE_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
@@ -56,7 +57,8 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Loads a map at the planning resolution. `file` is a builtin's name, or a path (relative to the working directory).
+/// Loads a map at the planning resolution. `file` is a builtin's name, or a path (relative to the
+/// working directory).
 pub fn load(file: &str, resolution_m: f32) -> Result<OccupancyMap, MapError> {
     match Source::parse(file)? {
         Source::Building(seed) => building::building_map(seed, resolution_m),
@@ -70,7 +72,10 @@ mod tests {
 
     #[test]
     fn names_tell_the_source() {
-        assert_eq!(Source::parse("builtin:building").unwrap(), Source::Building(building::DEFAULT_SEED));
+        assert_eq!(
+            Source::parse("builtin:building").unwrap(),
+            Source::Building(building::DEFAULT_SEED)
+        );
         assert_eq!(Source::parse("builtin:building?seed=7").unwrap(), Source::Building(7));
         assert_eq!(Source::parse("a/b.BT").unwrap(), Source::Bt(Path::new("a/b.BT")));
         for wrong in ["builtin:castle", "builtin:building?seed=x", "hall.obj", "hall", ""] {

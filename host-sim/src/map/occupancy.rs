@@ -1,9 +1,10 @@
 //! Dense occupancy at the planning resolution, and the bit grids that planner-core queries.
 //!
-//! A map's leaves are laid on the planning grid so that nothing known is lost on the unsafe side: a planning cell is
-//! occupied if any occupied leaf reaches into it, else unknown if any part of it is unknown, else free. Leaves that
-//! reach in by less than [`NEGLIGIBLE_CELL_SHARE`] of a cell (rounding of the resolution) do not count. With the map's own resolution,
-//! or a multiple of it, the grid begins at a cell boundary of the map, and the map's own resolution is kept exactly.
+//! A map's leaves are laid on the planning grid so that nothing known is lost on the unsafe side: a
+//! planning cell is occupied if any occupied leaf reaches into it, else unknown if any part of it
+//! is unknown, else free. Leaves that reach in by less than [`NEGLIGIBLE_CELL_SHARE`] of a cell
+//! (rounding of the resolution) do not count. With the map's own resolution, or a multiple of it,
+//! the grid begins at a cell boundary of the map, and the map's own resolution is kept exactly.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
@@ -64,14 +65,16 @@ impl OccupancyMap {
         Ok(Self { shape, occupied: words.clone(), free: words })
     }
 
-    /// Lays an octree on a grid of `resolution_m`, conservatively. Cost: the leaves and the cells they cover.
+    /// Lays an octree on a grid of `resolution_m`, conservatively. Cost: the leaves and the cells
+    /// they cover.
     pub fn from_octree(tree: &Octree, resolution_m: f32, name: &str) -> Result<Self, MapError> {
         let refuse = |why: &str| MapError::Grid { file: name.into(), why: why.into() };
         if !(resolution_m.is_finite() && resolution_m > 0.0) {
             return Err(refuse("resolution_m must be positive"));
         }
         let (lo, hi) = tree.key_bounds().ok_or_else(|| refuse("it holds no known space"))?;
-        // Planning cells to one smallest cell. A ratio that is whole but for f32 rounding is meant to be whole.
+        // Planning cells to one smallest cell. A ratio that is whole but for f32 rounding is meant
+        // to be whole.
         let cells_per_metre = 1.0 / f64::from(resolution_m);
         let exact = tree.resolution_m() * cells_per_metre;
         let (multiple, fraction) = ((1.0 / exact).round(), exact.round());
@@ -82,10 +85,11 @@ impl OccupancyMap {
         } else {
             exact
         };
-        let span =
-            [0, 1, 2].map(|a| (f64::from(hi[a] - lo[a]) * scale - NEGLIGIBLE_CELL_SHARE).ceil().max(1.0));
+        let span = [0, 1, 2]
+            .map(|a| (f64::from(hi[a] - lo[a]) * scale - NEGLIGIBLE_CELL_SHARE).ceil().max(1.0));
         let dims = span.map(|s| s.min(f64::from(u32::MAX)) as u32);
-        let corner = lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
+        let corner =
+            lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
         let shape = GridShape { dims, min: Point::from(corner), resolution_m };
         let mut map = Self::all_unknown(shape, name)?;
         // Share of each cell that is known to be free, by volume.
@@ -93,10 +97,12 @@ impl OccupancyMap {
         tree.for_each_leaf(|leaf| {
             let from = [0, 1, 2].map(|a| f64::from(leaf.min[a] - lo[a]) * scale);
             let to = from.map(|f| f + f64::from(leaf.size) * scale);
-            // An obstacle reaching in by a hair is rounding; free space is summed to the last sliver.
+            // An obstacle reaching in by a hair is rounding; free space is summed to the last
+            // sliver.
             let hair = if leaf.occupied { NEGLIGIBLE_CELL_SHARE } else { 0.0 };
             let first = from.map(|f| (f + hair).floor() as u32);
-            let last = [0, 1, 2].map(|a| ((to[a] - hair).ceil() as u32).max(first[a] + 1).min(dims[a]));
+            let last =
+                [0, 1, 2].map(|a| ((to[a] - hair).ceil() as u32).max(first[a] + 1).min(dims[a]));
             let overlap = |axis: usize, c: u32| {
                 (to[axis].min(f64::from(c) + 1.0) - from[axis].max(f64::from(c))).max(0.0)
             };
@@ -106,9 +112,11 @@ impl OccupancyMap {
                         if leaf.occupied {
                             map.set([i, j, k], Occupancy::Occupied);
                         } else {
-                            let at =
-                                (k as usize * dims[1] as usize + j as usize) * dims[0] as usize + i as usize;
-                            free_share[at] += (overlap(0, i) * overlap(1, j) * overlap(2, k)) as f32;
+                            let at = (k as usize * dims[1] as usize + j as usize)
+                                * dims[0] as usize
+                                + i as usize;
+                            free_share[at] +=
+                                (overlap(0, i) * overlap(1, j) * overlap(2, k)) as f32;
                         }
                     }
                 }
@@ -118,10 +126,12 @@ impl OccupancyMap {
         Ok(map)
     }
 
-    /// Unknown cells that are free in their whole volume are free; shares are in the order of the cells, x first.
+    /// Unknown cells that are free in their whole volume are free; shares are in the order of the
+    /// cells, x first.
     fn settle_free(&mut self, free_share: &[f32]) {
         let dims = self.shape.dims;
-        // Far above the rounding of the sum, and an unknown cube of a twentieth of the cell's edge still counts.
+        // Far above the rounding of the sum, and an unknown cube of a twentieth of the cell's edge
+        // still counts.
         let whole = 1.0 - 1e-4;
         let mut at = 0;
         for k in 0..dims[2] {
@@ -142,7 +152,10 @@ impl OccupancyMap {
         let refuse = |why: String| MapError::Grid { file: name.into(), why };
         let corner = self.shape.min;
         let (tree, shift) = self.to_shifted_octree();
-        if shift.iter().any(|s| s.abs() > NEGLIGIBLE_CELL_SHARE * f64::from(self.shape.resolution_m)) {
+        if shift
+            .iter()
+            .any(|s| s.abs() > NEGLIGIBLE_CELL_SHARE * f64::from(self.shape.resolution_m))
+        {
             let why = format!(
                 "its corner [{}, {}, {}] does not lie on a multiple of {} m, as OctoMap's cells do",
                 corner.x, corner.y, corner.z, self.shape.resolution_m
@@ -157,7 +170,8 @@ impl OccupancyMap {
     /// [`Octree::from_cells`].
     pub fn to_shifted_octree(&self) -> (Option<Octree>, [f64; 3]) {
         // The shortest decimal that reads as this f32: 0.1, not 0.10000000149.
-        let resolution: f64 = self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
+        let resolution: f64 =
+            self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
         let (mut min, mut shift) = ([0; 3], [0.0; 3]);
         for axis in 0..3 {
             let cells = f64::from(self.shape.min[axis]) / resolution;
@@ -226,7 +240,8 @@ impl OccupancyMap {
     /// The bit grids to plan on.
     pub fn voxel_map(&self, unknown: Unknown) -> VoxelMap {
         let inside = self.inside_mask();
-        let not_free: Vec<u64> = self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();
+        let not_free: Vec<u64> =
+            self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();
         let occupied = self.occupied.clone();
         let (words, seen, never_sample, outside) = match unknown {
             Unknown::Blocked => (not_free, Some(occupied), None, Outside::Blocked),
@@ -281,13 +296,15 @@ pub struct VoxelMap {
 impl VoxelMap {
     /// The obstacles.
     pub fn grid(&self) -> VoxelGrid<'_> {
-        VoxelGrid::new(self.shape, self.outside, &self.words).expect("the words were made for the shape")
+        VoxelGrid::new(self.shape, self.outside, &self.words)
+            .expect("the words were made for the shape")
     }
 
     /// Cells where no sample may lie; beyond the grid's faces none lies either.
     pub fn never_sample(&self) -> VoxelGrid<'_> {
         let words = self.never_sample.as_deref().unwrap_or(&self.words);
-        VoxelGrid::new(self.shape, Outside::Blocked, words).expect("the words were made for the shape")
+        VoxelGrid::new(self.shape, Outside::Blocked, words)
+            .expect("the words were made for the shape")
     }
 
     /// Whether a cell is an obstacle only because nobody has seen it. Panics outside the grid.
@@ -296,12 +313,14 @@ impl VoxelMap {
         self.seen.as_ref().is_some_and(|seen| self.words[word] & !seen[word] & mask != 0)
     }
 
-    /// Height of the top of the first obstacle below `point`, metres: where a vehicle sinking from there comes to
-    /// stand. An obstacle around the point itself counts up to the point. Without one it is the bottom of a map
-    /// beyond which all is blocked. `None` beside the map, or over nothing.
+    /// Height of the top of the first obstacle below `point`, metres: where a vehicle sinking from
+    /// there comes to stand. An obstacle around the point itself counts up to the point. Without
+    /// one it is the bottom of a map beyond which all is blocked. `None` beside the map, or over
+    /// nothing.
     pub fn ground_below(&self, point: &Point) -> Option<f32> {
         let mut inside = *point;
-        inside.z = inside.z.clamp(self.shape.min.z, self.shape.max().z - self.shape.resolution_m / 2.0);
+        inside.z =
+            inside.z.clamp(self.shape.min.z, self.shape.max().z - self.shape.resolution_m / 2.0);
         let [i, j, top] = self.shape.cell_of(&inside)?;
         if point.z < self.shape.min.z {
             return None;
@@ -336,7 +355,8 @@ mod tests {
         .unwrap()
     }
 
-    /// The definition, cell by cell over all leaves: occupied if one reaches in, free if free leaves fill it.
+    /// The definition, cell by cell over all leaves: occupied if one reaches in, free if free
+    /// leaves fill it.
     fn expected(tree: &Octree, shape: &GridShape, cell: [u32; 3]) -> Occupancy {
         let (r, res) = (f64::from(shape.resolution_m), tree.resolution_m());
         let lo = [0, 1, 2].map(|a| f64::from(shape.min[a]) + f64::from(cell[a]) * r);
@@ -345,7 +365,8 @@ mod tests {
             let volume = (0..3)
                 .map(|a| {
                     let from = (f64::from(min[a]) - f64::from(KEY_ORIGIN)) * res;
-                    let share = ((from + f64::from(size) * res).min(lo[a] + r) - from.max(lo[a])) / r;
+                    let share =
+                        ((from + f64::from(size) * res).min(lo[a] + r) - from.max(lo[a])) / r;
                     if share > 1e-4 { share } else { 0.0 }
                 })
                 .product::<f64>();
@@ -364,10 +385,16 @@ mod tests {
         for resolution in [0.3, 0.6, 0.15, 0.1, 0.25, 0.43, 1.0] {
             let map = OccupancyMap::from_octree(&tree, resolution, "sample").unwrap();
             let [nx, ny, nz] = map.shape().dims;
-            for (i, j, k) in (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))
+            for (i, j, k) in
+                (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))
             {
                 let want = expected(&tree, map.shape(), [i, j, k]);
-                assert_eq!(map.state_at([i, j, k]), want, "resolution {resolution}, cell {:?}", (i, j, k));
+                assert_eq!(
+                    map.state_at([i, j, k]),
+                    want,
+                    "resolution {resolution}, cell {:?}",
+                    (i, j, k)
+                );
             }
         }
     }
@@ -380,7 +407,8 @@ mod tests {
         let tree_counts = tree.counts();
         assert!((counts.occupied as f64 * 0.027 - tree_counts.occupied_m3).abs() < 1e-9);
         assert!((counts.free as f64 * 0.027 - tree_counts.free_m3).abs() < 1e-9);
-        let again = OccupancyMap::from_octree(&map.to_octree("sample").unwrap(), 0.3, "sample").unwrap();
+        let again =
+            OccupancyMap::from_octree(&map.to_octree("sample").unwrap(), 0.3, "sample").unwrap();
         assert_eq!(map, again);
     }
 
@@ -388,7 +416,9 @@ mod tests {
     fn unknown_is_what_the_user_chose() {
         let map = OccupancyMap::from_octree(&sample_tree(), 0.3, "sample").unwrap();
         let counts = map.counts();
-        let ones = |grid: &VoxelGrid<'_>| grid.words().iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
+        let ones = |grid: &VoxelGrid<'_>| {
+            grid.words().iter().map(|w| u64::from(w.count_ones())).sum::<u64>()
+        };
         let blocked = map.voxel_map(Unknown::Blocked);
         assert_eq!(ones(&blocked.grid()), counts.occupied + counts.unknown);
         assert_eq!(ones(&blocked.never_sample()), counts.occupied + counts.unknown);
@@ -400,14 +430,16 @@ mod tests {
 
     #[test]
     fn a_grid_too_large_is_refused_before_it_is_made() {
-        let error = OccupancyMap::from_octree(&sample_tree(), 1e-4, "sample").unwrap_err().to_string();
+        let error =
+            OccupancyMap::from_octree(&sample_tree(), 1e-4, "sample").unwrap_err().to_string();
         assert!(error.contains("choose another resolution_m"), "{error}");
         assert!(OccupancyMap::from_octree(&sample_tree(), f32::NAN, "sample").is_err());
     }
 
     #[test]
     fn the_ground_is_the_first_obstacle_below() {
-        let shape = GridShape { dims: [3, 1, 8], min: Point::new(0.0, 0.0, -1.0), resolution_m: 0.5 };
+        let shape =
+            GridShape { dims: [3, 1, 8], min: Point::new(0.0, 0.0, -1.0), resolution_m: 0.5 };
         let mut map = OccupancyMap::all_unknown(shape, "column").unwrap();
         for (i, k) in (0..3).flat_map(|i| (0..8).map(move |k| (i, k))) {
             let solid = (i == 0 && (k == 0 || k == 4)) || (i == 1 && k == 7);
@@ -416,7 +448,11 @@ mod tests {
         let blocked = map.voxel_map(Unknown::Blocked);
         assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 2.4)), Some(1.5));
         assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 0.9)), Some(-0.5));
-        assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 1.2)), Some(1.2), "inside an obstacle");
+        assert_eq!(
+            blocked.ground_below(&Point::new(0.2, 0.2, 1.2)),
+            Some(1.2),
+            "inside an obstacle"
+        );
         assert_eq!(blocked.ground_below(&Point::new(0.7, 0.2, 9.0)), Some(3.0), "above the map");
         assert_eq!(blocked.ground_below(&Point::new(1.2, 0.2, 2.0)), Some(-1.0), "the map's floor");
         assert_eq!(blocked.ground_below(&Point::new(9.0, 0.2, 2.0)), None);

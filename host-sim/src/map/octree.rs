@@ -1,8 +1,10 @@
-//! Occupancy octree with OctoMap's shape: depth 16, every leaf free or occupied, a missing leaf unknown.
+//! Occupancy octree with OctoMap's shape: depth 16, every leaf free or occupied, a missing leaf
+//! unknown.
 //!
-//! OctoMap (Hornung et al. 2013) addresses the smallest cells by 16-bit keys, key 32768 beginning at coordinate 0.
-//! Only inner nodes are stored, eight bytes each: two bits a child as in the `.bt` file, and where the inner
-//! children of that node begin. A lookup walks at most 16 nodes; a walk over all leaves touches each inner node once.
+//! OctoMap (Hornung et al. 2013) addresses the smallest cells by 16-bit keys, key 32768 beginning
+//! at coordinate 0. Only inner nodes are stored, eight bytes each: two bits a child as in the `.bt`
+//! file, and where the inner children of that node begin. A lookup walks at most 16 nodes; a walk
+//! over all leaves touches each inner node once.
 
 /// Levels below the root; the smallest cell has this depth.
 pub const TREE_DEPTH: u32 = 16;
@@ -87,8 +89,9 @@ impl Octree {
         Self { resolution_m, inner }
     }
 
-    /// Builds the pruned tree of a box of smallest cells: `dims` cells from the key `min` on, `cell` giving each by its
-    /// index in the box. Cost: one call a cell. `None` if the box leaves the key space.
+    /// Builds the pruned tree of a box of smallest cells: `dims` cells from the key `min` on,
+    /// `cell` giving each by its index in the box. Cost: one call a cell. `None` if the box leaves
+    /// the key space.
     pub fn from_cells(
         resolution_m: f64,
         min: [u32; 3],
@@ -99,10 +102,12 @@ impl Octree {
         if end.iter().any(|&e| e > u64::from(KEYS_PER_AXIS)) {
             return None;
         }
-        let mut builder = Builder { inner: Vec::new(), min, end: end.map(|e| e as u32), cell: &mut cell };
+        let mut builder =
+            Builder { inner: Vec::new(), min, end: end.map(|e| e as u32), cell: &mut cell };
         match builder.build([0; 3], KEYS_PER_AXIS) {
             Child::Leaf(UNKNOWN) => {}
-            // A root without children has no code in the file; only a box of all 65536³ cells comes here.
+            // A root without children has no code in the file; only a box of all 65536³ cells comes
+            // here.
             Child::Leaf(_) => return None,
             Child::Inner(root) => builder.inner.push(root),
         }
@@ -183,7 +188,8 @@ impl Octree {
         counts
     }
 
-    /// Lowest and highest key (exclusive) of the known space along each axis, or `None` for an empty tree.
+    /// Lowest and highest key (exclusive) of the known space along each axis, or `None` for an
+    /// empty tree.
     pub fn key_bounds(&self) -> Option<([u32; 3], [u32; 3])> {
         let (mut lo, mut hi) = ([KEYS_PER_AXIS; 3], [0; 3]);
         self.for_each_leaf(|leaf| {
@@ -197,7 +203,8 @@ impl Octree {
 
     /// Corners of the known space, metres, or `None` for an empty tree.
     pub fn metric_bounds(&self) -> Option<([f64; 3], [f64; 3])> {
-        let metres = |key: [u32; 3]| key.map(|k| (f64::from(k) - f64::from(KEY_ORIGIN)) * self.resolution_m);
+        let metres =
+            |key: [u32; 3]| key.map(|k| (f64::from(k) - f64::from(KEY_ORIGIN)) * self.resolution_m);
         self.key_bounds().map(|(lo, hi)| (metres(lo), metres(hi)))
     }
 }
@@ -265,7 +272,8 @@ mod tests {
 
     #[test]
     fn a_box_is_pruned_and_found_again() {
-        // 4³ free cells aligned to a power of two prune to one leaf; one occupied cell beside them stays alone.
+        // 4³ free cells aligned to a power of two prune to one leaf; one occupied cell beside them
+        // stays alone.
         let min = [KEY_ORIGIN; 3];
         let tree = Octree::from_cells(0.5, min, [5, 4, 4], |[x, y, z]| match x {
             4 if (y, z) == (0, 0) => Occupancy::Occupied,
@@ -286,6 +294,9 @@ mod tests {
 
     #[test]
     fn a_box_beyond_the_key_space_is_refused() {
-        assert!(Octree::from_cells(1.0, [KEYS_PER_AXIS - 1, 0, 0], [2, 1, 1], |_| Occupancy::Free).is_none());
+        assert!(
+            Octree::from_cells(1.0, [KEYS_PER_AXIS - 1, 0, 0], [2, 1, 1], |_| Occupancy::Free)
+                .is_none()
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The reader against OctoMap's own counts and queries of real maps, where the shared data is present.
+//! The reader against OctoMap's own counts and queries of real maps, where the shared data is
+//! present.
 
 use std::path::Path;
 
@@ -12,7 +13,8 @@ fn real_maps_read_as_octomap_reads_them() {
         println!("skipped: no {}/octomap_reference.json", folder.display());
         return;
     };
-    let reference: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&text).unwrap();
+    let reference: serde_json::Map<String, serde_json::Value> =
+        serde_json::from_str(&text).unwrap();
     assert_eq!(reference.len(), 5);
     for (name, want) in &reference {
         let bytes = std::fs::read(folder.join(format!("{name}.bt"))).unwrap();
@@ -24,7 +26,11 @@ fn real_maps_read_as_octomap_reads_them() {
         assert_eq!(counts.free_leaves as f64, number("free_leaves"), "{name}");
         assert_eq!(tree.resolution_m(), number("res"), "{name}");
         // Printed to four decimals.
-        assert!((counts.occupied_m3 - number("occ_m3")).abs() <= 5.1e-5, "{name}: {}", counts.occupied_m3);
+        assert!(
+            (counts.occupied_m3 - number("occ_m3")).abs() <= 5.1e-5,
+            "{name}: {}",
+            counts.occupied_m3
+        );
         assert!((counts.free_m3 - number("free_m3")).abs() <= 5.1e-5, "{name}: {}", counts.free_m3);
         let (min, max) = tree.metric_bounds().unwrap();
         for axis in 0..3 {

@@ -1,4 +1,5 @@
-//! A coverage mission as it is flown: the ground, the mission file, and what all companions plan from it.
+//! A coverage mission as it is flown: the ground, the mission file, and what all companions plan
+//! from it.
 
 use std::iter;
 
@@ -58,7 +59,11 @@ pub(super) fn prepare(
         .vehicles
         .iter()
         .zip(&shares)
-        .map(|(v, &weight)| VehicleShare { weight, climb_mps: v.climb_mps, descend_mps: v.descend_mps })
+        .map(|(v, &weight)| VehicleShare {
+            weight,
+            climb_mps: v.climb_mps,
+            descend_mps: v.descend_mps,
+        })
         .collect();
     check_batteries(&planned)?;
     check_height(&planned)?;
@@ -67,7 +72,8 @@ pub(super) fn prepare(
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
     }
-    // Over fields there is nothing but the others to keep clear of: each may deviate half of what lies between.
+    // Over fields there is nothing but the others to keep clear of: each may deviate half of what
+    // lies between.
     let stray_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
@@ -80,8 +86,10 @@ pub(super) fn prepare(
         })
         .collect();
     let mut schedule = schedule_config(&scenario);
-    schedule.vertical_mps = climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
-    let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
+    schedule.vertical_mps =
+        climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
+    let mut mission =
+        Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
         mission.roadmap_file = terrain.field.to_vec();
     }
@@ -106,11 +114,14 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
         let vehicle = &planned.scenario.vehicles[index];
         let cruise_mps = planned.vehicles[index].cruise_mps;
         let beyond_hover = sim_autopilot::power_ratio_at_speed(cruise_mps) - 1.0;
-        let takes_s = sorties::route_duration_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
+        let takes_s =
+            sorties::route_duration_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
         let lasts_s = sorties::battery_duration_s(vehicle);
         if takes_s > USABLE_CHARGE * lasts_s {
             let hint = match planned.wanted.batteries {
-                true => "`cover` writes a plan for each sortie, which autopilots fly without a companion",
+                true => {
+                    "`cover` writes a plan for each sortie, which autopilots fly without a companion"
+                }
                 false => {
                     "endurance_s says how long a battery lasts, area.batteries = true has `cover` plan sorties"
                 }
@@ -132,7 +143,8 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = above_ground_m(planned.wanted);
     for vehicle in &planned.scenario.vehicles {
-        let lower_m = margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.personality);
+        let lower_m =
+            margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.personality);
         let least_m = lower_m + vehicle.radius_m + TRACKING_M;
         if height_m < least_m {
             bail!(
@@ -169,7 +181,8 @@ fn ground_height_range_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
     Ok([low_m, high_m.min(field.highest_m())])
 }
 
-/// Level ground below area and pads, as low as it is anywhere: the map of a flight over terrain has that beside.
+/// Level ground below area and pads, as low as it is anywhere: the map of a flight over terrain has
+/// that beside.
 fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
     let places = planned.wanted.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
     let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
@@ -228,10 +241,19 @@ impl Mission {
         ws: &mut DeskWorkspace,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         let mission = self.mission_view();
-        let MissionKind::Coverage(view) = mission.kind() else { bail!("no area: {}", self.scenario.path) };
+        let MissionKind::Coverage(view) = mission.kind() else {
+            bail!("no area: {}", self.scenario.path)
+        };
         let mut schedule = on_heap(ScheduleWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
-        coverage::plan_flights::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, VEHICLES, WAYPOINTS>(
+        coverage::plan_flights::<
+            MAX_VERTICES,
+            MAX_LANES,
+            COVERAGE_VEHICLES,
+            MAX_CORNERS,
+            VEHICLES,
+            WAYPOINTS,
+        >(
             &Request {
                 mission: &mission,
                 view,
@@ -279,21 +301,27 @@ impl Mission {
         let mission = self.mission_view();
         let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
         let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
-        coverage::plan_detour::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, WAYPOINTS, GATES>(
-            view,
-            self.height_field(),
-            request,
-            obstacles,
-            &mut ws,
-            &mut own,
-        )?;
+        coverage::plan_detour::<
+            MAX_VERTICES,
+            MAX_LANES,
+            COVERAGE_VEHICLES,
+            MAX_CORNERS,
+            WAYPOINTS,
+            GATES,
+        >(view, self.height_field(), request, obstacles, &mut ws, &mut own)?;
         Ok(own)
     }
 
     /// The first of a board's limits that the area exceeds.
-    pub(super) fn area_excess(&self, view: &CoverageView<'_>, board: &BoardCapacity) -> Option<String> {
-        let (vertices, rings): (Vec<_>, Vec<_>) = (view.vertices().collect(), view.rings().collect());
-        let zones = Area::new(&vertices, &rings).map(|area| Transit::<BOARD_CORNERS>::empty().set_area(area));
+    pub(super) fn area_excess(
+        &self,
+        view: &CoverageView<'_>,
+        board: &BoardCapacity,
+    ) -> Option<String> {
+        let (vertices, rings): (Vec<_>, Vec<_>) =
+            (view.vertices().collect(), view.rings().collect());
+        let zones = Area::new(&vertices, &rings)
+            .map(|area| Transit::<BOARD_CORNERS>::empty().set_area(area));
         if matches!(zones, Ok(Err(_))) {
             return Some(format!(
                 "more outward corners of no-fly zones, {} holds {BOARD_CORNERS}",
@@ -313,7 +341,11 @@ impl Mission {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
                 "the route of vehicle {id} has too many corners: {path}: not one lane fits into a path of {WAYPOINTS} \
                  waypoints\nhint: no-fly zones with fewer corners{}",
-                if self.roadmap_file.is_empty() { "" } else { ", or a larger area.terrain_tolerance_m" }
+                if self.roadmap_file.is_empty() {
+                    ""
+                } else {
+                    ", or a larger area.terrain_tolerance_m"
+                }
             ),
             Error::Plan(PlanError::Path(id, PathError::TooLong)) => anyhow!(
                 "the route of vehicle {id} is too long: {path}: a flight there, along one lane and home takes more than \
@@ -324,7 +356,9 @@ impl Mission {
                  apart, or a smaller deconfliction.separation_m"
             ),
             Error::Plan(PlanError::Schedule(id, ScheduleError::GatesFull)) => {
-                anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {GATES} gates")
+                anyhow!(
+                    "vehicle {id} meets too many others: {path}: its plan holds at most {GATES} gates"
+                )
             }
             other => anyhow!("no plan: {path}: {other}"),
         }

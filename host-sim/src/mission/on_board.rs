@@ -1,5 +1,5 @@
-//! Whether a board that gets the files plans what the desk planned: it searches with less memory, so it may find no plan, or
-//! another one, with which it would take off with nobody.
+//! Whether a board that gets the files plans what the desk planned: it searches with less memory,
+//! so it may find no plan, or another one, with which it would take off with nobody.
 
 use companion::planner;
 use companion::storage::mission_file::MissionKind;
@@ -23,7 +23,9 @@ impl Mission {
             MissionKind::Coverage(area) => {
                 let gates = |i| self.own_plan(plan, i).map_or(usize::MAX, |own| own.gates.len());
                 let most = (0..self.tasks.len()).map(gates).max().unwrap_or(0);
-                self.area_excess(area, board).or_else(of_mission).or_else(|| board.gates_excess(most))
+                self.area_excess(area, board)
+                    .or_else(of_mission)
+                    .or_else(|| board.gates_excess(most))
             }
         }
     }
@@ -51,9 +53,9 @@ impl Mission {
                     board.pieces
                 ))
             }
-            Err(PlanError::Path(id, PathError::PathFull)) => {
-                Some(format!("the flight of vehicle {id} is too long, {name} holds {WAYPOINTS} waypoints"))
-            }
+            Err(PlanError::Path(id, PathError::PathFull)) => Some(format!(
+                "the flight of vehicle {id} is too long, {name} holds {WAYPOINTS} waypoints"
+            )),
             Err(other) => Some(format!("{name} finds no plan: {other:?}")),
         }
     }

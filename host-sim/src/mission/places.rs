@@ -19,7 +19,8 @@ use crate::scenario::{self, Scenario, Terminals};
 /// Spacing of the places tried as slots around a single goal, metres.
 const SLOT_GRID_M: f32 = 0.25;
 
-/// Height of a start or goal over where a vehicle of this radius stands below it; its column has the required clearance.
+/// Height of a start or goal over where a vehicle of this radius stands below it; its column has
+/// the required clearance.
 pub(super) fn height_over_ground(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -33,10 +34,13 @@ pub(super) fn height_over_ground(
         Ok(ground_m) => return Ok(point.z - ground_m - radius_m),
         Err(error) => error,
     };
-    let at = format!("{}: [{}, {}, {}]", place.unwrap_or(&scenario.path), point.x, point.y, point.z);
+    let at =
+        format!("{}: [{}, {}, {}]", place.unwrap_or(&scenario.path), point.x, point.y, point.z);
     let why = match error {
         ColumnError::NotFree => {
-            format!("{what} is not free: {at} lies in an obstacle, in unknown space or outside the map")
+            format!(
+                "{what} is not free: {at} lies in an obstacle, in unknown space or outside the map"
+            )
         }
         ColumnError::NoGround => format!("{what} has no ground below it: {at} is over nothing"),
         ColumnError::UnknownBelow { top_m } => {
@@ -61,29 +65,47 @@ pub(super) fn height_over_ground(
     };
     match nearest_column(map, point, radius_m, required_m) {
         Some(place) => {
-            bail!("{why}\nhint: the nearest place that would do is [{}, {}, {}]", place.x, place.y, place.z)
+            bail!(
+                "{why}\nhint: the nearest place that would do is [{}, {}, {}]",
+                place.x,
+                place.y,
+                place.z
+            )
         }
         None => {
-            bail!("{why}\nhint: no place near it would do; `host-sim map info` shows the map's extent")
+            bail!(
+                "{why}\nhint: no place near it would do; `host-sim map info` shows the map's extent"
+            )
         }
     }
 }
 
-pub(super) fn vehicle_tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
+pub(super) fn vehicle_tasks(
+    scenario: &Scenario,
+    map: &VoxelMap,
+) -> anyhow::Result<Vec<VehicleTask>> {
     let task = |(i, vehicle): (usize, &scenario::Vehicle)| {
         let place = scenario.vehicle_places.get(i);
         let what = format!("start of vehicle {}", vehicle.id);
         Ok(VehicleTask {
             id: vehicle.id,
             required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
-            climb_m: height_over_ground(scenario, map, &what, place, &vehicle.start, vehicle.radius_m)?,
+            climb_m: height_over_ground(
+                scenario,
+                map,
+                &what,
+                place,
+                &vehicle.start,
+                vehicle.radius_m,
+            )?,
             goal: vehicle.goal.map(|goal| goal as u16),
         })
     };
     scenario.vehicles.iter().enumerate().map(task).collect()
 }
 
-/// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough apart to land in.
+/// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough
+/// apart to land in.
 pub(super) fn goal_points(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -144,13 +166,18 @@ fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32
     Ok((min_m, max_m))
 }
 
-/// Which starts and goals are to be joined: a vehicle and its own goal, or else each of them with each.
+/// Which starts and goals are to be joined: a vehicle and its own goal, or else each of them with
+/// each.
 fn wanted_connections(scenario: &Scenario, goals: usize) -> Vec<WantedConnection> {
     let vehicles = scenario.vehicles.len();
     let pairs = scenario.vehicles.iter().enumerate().flat_map(|(start, vehicle)| {
         let required_m = vehicle.radius_m + scenario.roadmap.safety_margin_m;
         let own = move |goal: &usize| vehicle.goal.is_none_or(|own| own == *goal);
-        (0..goals).filter(own).map(move |goal| WantedConnection { start, goal: vehicles + goal, required_m })
+        (0..goals).filter(own).map(move |goal| WantedConnection {
+            start,
+            goal: vehicles + goal,
+            required_m,
+        })
     });
     pairs.collect()
 }
@@ -163,7 +190,8 @@ pub(super) fn build_roadmap(
     let starts = scenario.vehicles.iter().map(|v| v.start);
     let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
     let settings = &scenario.roadmap;
-    // Tested for the smallest vehicle; a larger one leaves out the edges whose clearance is too small for it.
+    // Tested for the smallest vehicle; a larger one leaves out the edges whose clearance is too
+    // small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
     let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
     let config = Config {
@@ -184,11 +212,20 @@ pub(super) fn build_roadmap(
     keep_apart(&mut roadmap);
     if settings.passages {
         let searching = Instant::now();
-        roadmap::add_passages(map, &mut roadmap, &config, &wanted_connections(scenario, goals.len()))?;
+        roadmap::add_passages(
+            map,
+            &mut roadmap,
+            &config,
+            &wanted_connections(scenario, goals.len()),
+        )?;
         keep_apart(&mut roadmap);
         parts.passages_s = searching.elapsed().as_secs_f64();
     }
-    let header =
-        roadmap::header(&config, scenario.map.origin, scenario.vehicles.len() as u16, goals.len() as u16);
+    let header = roadmap::header(
+        &config,
+        scenario.map.origin,
+        scenario.vehicles.len() as u16,
+        goals.len() as u16,
+    );
     Ok((roadmap, header, parts))
 }

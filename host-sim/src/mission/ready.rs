@@ -1,9 +1,12 @@
-//! A mission ready to be planned and flown: what all kinds have in common, and the file that boards get.
+//! A mission ready to be planned and flown: what all kinds have in common, and the file that boards
+//! get.
 
 use std::sync::OnceLock;
 
 use anyhow::anyhow;
-use companion::storage::mission_file::{self, MissionBlock, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::mission_file::{
+    self, MissionBlock, MissionHeader, MissionVehicle, MissionView,
+};
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
@@ -100,7 +103,8 @@ impl Mission {
         self.clearance_field.get_or_init(|| ClearanceField::new(&self.map.grid()))
     }
 
-    /// Separation and nominal speeds that the mission file carries; [`Mission::set_separation`] changes them.
+    /// Separation and nominal speeds that the mission file carries; [`Mission::set_separation`]
+    /// changes them.
     pub fn schedule(&self) -> &ScheduleConfig {
         &self.schedule
     }
@@ -118,7 +122,8 @@ impl Mission {
         parse_roadmap(&self.roadmap_file)
     }
 
-    /// Height of what a vehicle comes to stand on that sinks from a place, metres; none beside the map.
+    /// Height of what a vehicle comes to stand on that sinks from a place, metres; none beside the
+    /// map.
     pub fn ground_below(&self, place: &Point) -> Option<f32> {
         let below_m = self.map.ground_below(place)?;
         let terrain = self.scenario.area.as_ref().and_then(|area| area.terrain.as_ref());

@@ -10,7 +10,8 @@ use crate::capacity::WAYPOINTS;
 /// Number of divisions, out of `MAX_DIVISIONS`, that are reserved for losses of vehicles.
 const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 
-/// Time at which a flight will ask for a division by its plan, seconds after the plan began; none if its route ends with its path.
+/// Time at which a flight will ask for a division by its plan, seconds after the plan began; none
+/// if its route ends with its path.
 fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.goes_on)?;
@@ -41,9 +42,11 @@ fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
     DivisionInput { alive: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
 }
 
-/// Lots when the first vehicle of a plan requests a division, by rank; none where no route continues.
+/// Lots when the first vehicle of a plan requests a division, by rank; none where no route
+/// continues.
 pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
-    let hold_s = plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
+    let hold_s =
+        plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
     flights.sort_by_key(|flight| flight.id);
     Some(flights.into_iter().map(|flight| division_input_at(flight, hold_s)).collect())
@@ -64,7 +67,8 @@ impl Mission {
                     MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES
                 );
             }
-            next = next_division_inputs(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);
+            next =
+                next_division_inputs(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);
         }
         Ok(())
     }

@@ -1,14 +1,18 @@
-//! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs; Figs. 8 to 10, 12 and 13 in the report.
+//! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs; Figs. 8 to 10, 12 and 13 in
+//! the report.
 //!
-//! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in [`SHORT_TRACK`],
-//! [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`SMALL`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to
-//! A12 were flown in Gazebo; ours are the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
+//! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in
+//! [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`SMALL`]; V_a 3 m/s, V_d 1
+//! m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to A12 were flown in Gazebo; ours are
+//! the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
 
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use super::cpp_data::{COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT_COLUMNS};
+use super::cpp_data::{
+    COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT_COLUMNS,
+};
 use super::cpp_figures;
 use super::cpp_rows::{Row, Summary};
 use crate::commands::cover;
@@ -29,8 +33,10 @@ const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
 /// Area of Table 2: convex, five vertices.
 const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
 /// Areas of Fig. 9: two more that are convex.
-const COMPARED_AREAS: [&str; 2] =
-    ["[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]", "[[0, 0], [200, -15], [260, 120], [90, 200]]"];
+const COMPARED_AREAS: [&str; 2] = [
+    "[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]",
+    "[[0, 0], [200, -15], [260, 120], [90, 200]]",
+];
 /// Area of Table 4: small, so that the distance to the area counts.
 const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
 /// Starts of the UAVs of Table 4: one is far away.
@@ -73,12 +79,18 @@ struct Tables {
 
 impl Tables {
     /// Plans, checks, and gives each vehicle's cost: 0 for one that stays on the ground.
-    fn plan_costs(&mut self, scenario: &Scenario, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
+    fn plan_costs(
+        &mut self,
+        scenario: &Scenario,
+        method: Method,
+        unit: &str,
+    ) -> anyhow::Result<Vec<f64>> {
         let planned = CoveragePlan::new(scenario, method)?;
         let findings = check_plan(&planned);
         let result = cover::cover_result(&planned, &findings);
         self.complete &= findings.is_clean();
-        let rank = f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
+        let rank =
+            f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
         if self.worst.as_ref().is_none_or(|(worst, _)| rank > *worst) {
             self.worst = Some((rank, serde_json::to_value(&result)?));
         }
@@ -121,7 +133,8 @@ impl Tables {
 /// Results that cannot be written.
 pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let mut results = ResultFiles::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
+    let mut results =
+        ResultFiles::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
     let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
     table_2(&mut tables)?;
     let planning = table_3()?;
@@ -148,7 +161,10 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
     results.commit()?;
     say!();
-    say!("{}", if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" });
+    say!(
+        "{}",
+        if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" }
+    );
     Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -205,19 +221,22 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
     for table in &FLOWN {
         let method = Method::named(table.method).map_err(anyhow::Error::msg)?;
-        let (polygon, columns) = if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT_COLUMNS) };
+        let (polygon, columns) =
+            if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT_COLUMNS) };
         for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
             let scenario = paper_scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
             let ours = tables.plan_costs(&scenario, method, "s")?;
             let index = METHODS.iter().position(|m| *m == method).unwrap_or(0);
-            mean_max[usize::from(table.long)][index] += ours.iter().copied().fold(0.0, f64::max) / 12.0;
+            mean_max[usize::from(table.long)][index] +=
+                ours.iter().copied().fold(0.0, f64::max) / 12.0;
             tables.add(table.name, method, spacing, "s", [ours, theirs.to_vec()]);
             if let Some(row) = tables.rows.last_mut() {
                 row.track = Some(if table.long { "long" } else { "short" });
             }
         }
     }
-    for ((track, ours), theirs) in ["5, short", "5, long"].into_iter().zip(mean_max).zip(MEAN_MAX_S) {
+    for ((track, ours), theirs) in ["5, short", "5, long"].into_iter().zip(mean_max).zip(MEAN_MAX_S)
+    {
         for (i, method) in METHODS.into_iter().enumerate() {
             let both = [vec![rounded(ours[i] as f32)], vec![theirs[i]]];
             tables.add(track, method, (0.0, 0.0), "s", both);
@@ -242,8 +261,9 @@ fn print(tables: &Tables) {
     say!("table     method         lanes  height  ours: max    CV %  theirs: max    CV %");
     for row in &tables.rows {
         let max = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
-        let cv =
-            |summary: &Option<Summary>| summary.map_or("-".to_owned(), |s| format!("{:.2}", s.cv_percent));
+        let cv = |summary: &Option<Summary>| {
+            summary.map_or("-".to_owned(), |s| format!("{:.2}", s.cv_percent))
+        };
         say!(
             "{:<8}  {:<13}  {:>5}  {:>6}  {:>7.1} {}  {:>6}  {:>10.1} {}  {:>6}",
             row.table,
@@ -262,7 +282,9 @@ fn print(tables: &Tables) {
 
 fn print_planning(ours: &[[f64; 6]; 3]) {
     say!();
-    say!("Table 3, planning time in ms for 2 to 7 UAVs: ours (this machine), theirs (Ryzen 7 3750H, Python)");
+    say!(
+        "Table 3, planning time in ms for 2 to 7 UAVs: ours (this machine), theirs (Ryzen 7 3750H, Python)"
+    );
     let line = |times: &[f64; 6]| times.map(|s| format!("{:>9.3}", s * 1e3)).join(" ");
     for ((method, ours), theirs) in METHODS.into_iter().zip(ours).zip(PLANNING_S) {
         say!("{:<13}  ours   {}", method.name(), line(ours));
@@ -295,7 +317,10 @@ mod tests {
         table_4(&mut tables).expect("a plan");
         let [binpat, powell] = [&tables.rows[0].ours, &tables.rows[1].ours];
         let max = |costs: &[f64]| costs.iter().copied().fold(0.0, f64::max);
-        assert!(tables.complete && !binpat.contains(&0.0) && powell.contains(&0.0), "{binpat:?} {powell:?}");
+        assert!(
+            tables.complete && !binpat.contains(&0.0) && powell.contains(&0.0),
+            "{binpat:?} {powell:?}"
+        );
         assert!(max(powell) < max(binpat));
     }
 }

@@ -1,6 +1,7 @@
 //! What CPP (Luna 2022) printed: numbers only.
 
-/// One of Tables A1 to A12: flight times of each vehicle in Gazebo, seconds, for six pairs of lane spacing and height.
+/// One of Tables A1 to A12: flight times of each vehicle in Gazebo, seconds, for six pairs of lane
+/// spacing and height.
 pub(super) struct Flown {
     /// Number of the table.
     pub(super) name: &'static str,
@@ -190,7 +191,8 @@ pub(super) const PLANNING_S: [[f64; 6]; 3] = [
     [0.296894, 0.301134, 0.512768, 1.419654, 1.853162, 1.96757],
 ];
 
-/// Table 4: distance costs, metres: BINPAT, then POWELL, which leaves the first vehicle on the ground.
+/// Table 4: distance costs, metres: BINPAT, then POWELL, which leaves the first vehicle on the
+/// ground.
 pub(super) const FEWER_M: [[f64; 3]; 2] = [[390.72, 401.93, 394.62], [0.0, 370.73, 383.99]];
 
 /// Table 5: mean of the largest times, seconds: short and long track, by method.

@@ -1,5 +1,6 @@
-//! CPP's Figs. 8, 9, 10, 12 and 13 with our plans. Theirs are pictures: the figures 12 and 13 beside ours are drawn from
-//! the times in their Tables A1 to A12. The areas of Figs. 8 to 10 are not stated; ours are in `cpp.rs`.
+//! CPP's Figs. 8, 9, 10, 12 and 13 with our plans. Theirs are pictures: the figures 12 and 13
+//! beside ours are drawn from the times in their Tables A1 to A12. The areas of Figs. 8 to 10 are
+//! not stated; ours are in `cpp.rs`.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -16,8 +17,8 @@ const FLEETS: [usize; 2] = [3, 5];
 /// Tracks, a part of Fig. 13 each.
 const TRACKS: [&str; 2] = ["short", "long"];
 
-/// Fig. 8: an area with its UAVs, and the routes of three methods; Fig. 9 without the works of others, one area after the
-/// other; Fig. 10: fewer UAVs finish sooner.
+/// Fig. 8: an area with its UAVs, and the routes of three methods; Fig. 9 without the works of
+/// others, one area after the other; Fig. 10: fewer UAVs finish sooner.
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].
@@ -31,20 +32,35 @@ pub(super) fn route_figures(
         (Method::Binpat, "BINPAT"),
         (Method::PowellBinpat, "POWELL-BINPAT"),
     ];
-    let mut fig_8 =
-        vec![route_map("(a) area and UAVs".to_owned(), &CoveragePlan::new(convex, Method::Binpat)?, false)];
+    let mut fig_8 = vec![route_map(
+        "(a) area and UAVs".to_owned(),
+        &CoveragePlan::new(convex, Method::Binpat)?,
+        false,
+    )];
     for ((method, name), letter) in three.iter().zip('b'..) {
-        fig_8.push(route_map(format!("({letter}) {name}"), &CoveragePlan::new(convex, *method)?, true));
+        fig_8.push(route_map(
+            format!("({letter}) {name}"),
+            &CoveragePlan::new(convex, *method)?,
+            true,
+        ));
     }
     let mut fig_9 = Vec::new();
     for ((method, name), letters) in three.iter().zip([['c', 'd'], ['e', 'f'], ['g', 'h']]) {
         for (scenario, letter) in others.iter().zip(letters) {
-            fig_9.push(route_map(format!("({letter}) {name}"), &CoveragePlan::new(scenario, *method)?, true));
+            fig_9.push(route_map(
+                format!("({letter}) {name}"),
+                &CoveragePlan::new(scenario, *method)?,
+                true,
+            ));
         }
     }
     let mut fig_10 = Vec::new();
     for ((method, name), letter) in three[1..].iter().zip('a'..) {
-        fig_10.push(route_map(format!("({letter}) {name}"), &CoveragePlan::new(small, *method)?, true));
+        fig_10.push(route_map(
+            format!("({letter}) {name}"),
+            &CoveragePlan::new(small, *method)?,
+            true,
+        ));
     }
     let figure = |name: &str, caption: &str, panels| Figure {
         name: name.to_owned(),
@@ -83,7 +99,8 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
             own.map_or((0.0, 0.0), |(sortie, _, _)| (sortie.route.cost_m, sortie.route.cost_s));
         costs.push(cost_m);
         most_s = most_s.max(cost_s);
-        let path = own.map_or(Vec::new(), |(_, stops, _)| stops.iter().map(|stop| stop.position).collect());
+        let path = own
+            .map_or(Vec::new(), |(_, stops, _)| stops.iter().map(|stop| stop.position).collect());
         MapRoute { vehicle: vehicle.id, start: vehicle.start, path }
     };
     let routes = vehicles.map(route).collect();
@@ -120,7 +137,8 @@ impl Figures {
     }
 }
 
-/// Fig. 12: average times by case, for three and five UAVs; Fig. 13: CV by case, on the short and the long track.
+/// Fig. 12: average times by case, for three and five UAVs; Fig. 13: CV by case, on the short and
+/// the long track.
 pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.track.is_some()).collect();
     let (mut times, mut spreads) = (Vec::new(), Vec::new());
@@ -136,7 +154,8 @@ pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     for (track, letter) in TRACKS.into_iter().zip('a'..) {
         for (whose, name) in Figures::BOTH {
             let title = format!("({letter}) {track} track: {name}");
-            let own: Vec<&Row> = rows.iter().filter(|row| row.track == Some(track)).copied().collect();
+            let own: Vec<&Row> =
+                rows.iter().filter(|row| row.track == Some(track)).copied().collect();
             let value = |row: &Row| whose.of(row).map(|summary| summary.cv_percent);
             spreads.push(Panel::Lines(chart(title, ("CV, %", "spread"), &own, value)));
         }
@@ -159,7 +178,8 @@ pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     ]
 }
 
-/// Rows as a chart: a series for each method, and number of UAVs where it differs; a case for each track, spacing and height.
+/// Rows as a chart: a series for each method, and number of UAVs where it differs; a case for each
+/// track, spacing and height.
 fn chart(
     title: String,
     (unit, scale): (&str, &'static str),
@@ -181,7 +201,9 @@ fn chart(
             series.push(Series { name: name.clone(), values: Vec::new() });
         }
         // Rows of a series come in the order of the cases.
-        if let (Some(own), Some(value)) = (series.iter_mut().find(|own| own.name == name), value(row)) {
+        if let (Some(own), Some(value)) =
+            (series.iter_mut().find(|own| own.name == name), value(row))
+        {
             own.values.push(rounded(value as f32));
         }
     }

@@ -1,4 +1,5 @@
-//! What the page shows of a coverage mission: which vehicle photographs what, from when on, and what pictures show.
+//! What the page shows of a coverage mission: which vehicle photographs what, from when on, and
+//! what pictures show.
 
 use planner_core::Point;
 use serde::Serialize;

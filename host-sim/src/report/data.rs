@@ -179,7 +179,8 @@ pub struct Curve {
     pub values: Vec<f32>,
 }
 
-/// The colour of the `index`-th vehicle, sRGB: ten that stay apart on a dark ground, then ever darker rounds of them.
+/// The colour of the `index`-th vehicle, sRGB: ten that stay apart on a dark ground, then ever
+/// darker rounds of them.
 pub fn vehicle_color(index: usize) -> [u8; 3] {
     const ROUND: [[u8; 3]; 10] = [
         [77, 163, 255],

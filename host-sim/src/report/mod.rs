@@ -1,9 +1,10 @@
 //! `report.html`: one self-contained page with the scene in 3D, a time slider, and plots.
 //!
-//! A command fills [`ReportData`] and calls [`write`]. The page needs no network: its libraries are inlined from
-//! `assets/vendor`, its own scripts from `assets/report`, and the data is JSON in a `<script>` element, in which every
-//! long array is base64 of little-endian numbers (see [`pack`]). Positions are ENU metres of the mission frame, times
-//! are seconds since the start of the simulation.
+//! A command fills [`ReportData`] and calls [`write`]. The page needs no network: its libraries are
+//! inlined from `assets/vendor`, its own scripts from `assets/report`, and the data is JSON in a
+//! `<script>` element, in which every long array is base64 of little-endian numbers (see [`pack`]).
+//! Positions are ENU metres of the mission frame, times are seconds since the start of the
+//! simulation.
 
 mod coverage;
 mod data;
@@ -17,8 +18,8 @@ use anyhow::Context;
 
 pub use coverage::{CoverageLayers, Division, Part, Taken};
 pub use data::{
-    Curve, Event, Level, Limit, Outline, OutlineKind, Plot, ReportData, RoadmapLines, SphereObstacle,
-    VehicleTrack, vehicle_color,
+    Curve, Event, Level, Limit, Outline, OutlineKind, Plot, ReportData, RoadmapLines,
+    SphereObstacle, VehicleTrack, vehicle_color,
 };
 pub use figures::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 pub use surface::{FACE_LIMIT, MapSurface};
@@ -41,13 +42,22 @@ fn check(data: &ReportData) -> anyhow::Result<()> {
     }
     for curve in data.plots.iter().flat_map(|plot| &plot.curves) {
         let (times, values) = (curve.t_s.len(), curve.values.len());
-        anyhow::ensure!(times == values, "plot curve {:?}: {times} times but {values} values", curve.name);
+        anyhow::ensure!(
+            times == values,
+            "plot curve {:?}: {times} times but {values} values",
+            curve.name
+        );
     }
     for figure in &data.figures {
         for panel in &figure.panels {
             let (Panel::Bars(chart) | Panel::Lines(chart)) = panel else { continue };
             let odd = chart.series.iter().find(|series| series.values.len() != chart.cases.len());
-            anyhow::ensure!(odd.is_none(), "{}: {odd:?} beside {} cases", figure.name, chart.cases.len());
+            anyhow::ensure!(
+                odd.is_none(),
+                "{}: {odd:?} beside {} cases",
+                figure.name,
+                chart.cases.len()
+            );
         }
     }
     Ok(())

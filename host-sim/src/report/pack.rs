@@ -1,7 +1,8 @@
-//! Long arrays as base64 of little-endian numbers: a third of the size of decimal text, and a typed array in the page.
+//! Long arrays as base64 of little-endian numbers: a third of the size of decimal text, and a typed
+//! array in the page.
 //!
-//! Points are `x y z` as f32, track points `t x y z` as f32, footprints `t vehicle` and four `x y` as f32, edges two u16. The page's `decode` in `data.js` is the
-//! other end.
+//! Points are `x y z` as f32, track points `t x y z` as f32, footprints `t vehicle` and four `x y`
+//! as f32, edges two u16. The page's `decode` in `data.js` is the other end.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -10,7 +11,10 @@ use serde::{Serialize, Serializer};
 
 use super::track::{Footprint, TrackPoint};
 
-fn base64<S: Serializer>(bytes: impl Iterator<Item = u8>, serializer: S) -> Result<S::Ok, S::Error> {
+fn base64<S: Serializer>(
+    bytes: impl Iterator<Item = u8>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&STANDARD.encode(bytes.collect::<Vec<u8>>()))
 }
 
@@ -35,7 +39,10 @@ pub(super) fn track<S: Serializer>(track: &[TrackPoint], serializer: S) -> Resul
     base64(floats.flat_map(f32::to_le_bytes), serializer)
 }
 
-pub(super) fn footprints<S: Serializer>(all: &[Footprint], serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn footprints<S: Serializer>(
+    all: &[Footprint],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     let floats = all.iter().flat_map(|f| {
         let corners = f.corners.as_flattened().iter().copied();
         [f.t_s, f32::from(f.vehicle)].into_iter().chain(corners)
@@ -47,7 +54,10 @@ pub(super) fn point<S: Serializer>(p: &Point, serializer: S) -> Result<S::Ok, S:
     [p.x, p.y, p.z].serialize(serializer)
 }
 
-pub(super) fn maybe_point<S: Serializer>(p: &Option<Point>, serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn maybe_point<S: Serializer>(
+    p: &Option<Point>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     p.map(|p| [p.x, p.y, p.z]).serialize(serializer)
 }
 
@@ -63,6 +73,9 @@ mod tests {
         let back: Vec<f32> =
             bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         assert_eq!(back, [1.0, 2.0, 3.0, -4.0]);
-        assert_eq!(super::pairs(&[[1, 258]], serde_json::value::Serializer).expect("a string"), "AQACAQ==");
+        assert_eq!(
+            super::pairs(&[[1, 258]], serde_json::value::Serializer).expect("a string"),
+            "AQACAQ=="
+        );
     }
 }

@@ -5,8 +5,10 @@ use serde::Serialize;
 use super::data::{ReportData, vehicle_color};
 
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
-const STYLE: &str =
-    concat!(include_str!("../../assets/vendor/uPlot.min.css"), include_str!("../../assets/report/style.css"));
+const STYLE: &str = concat!(
+    include_str!("../../assets/vendor/uPlot.min.css"),
+    include_str!("../../assets/report/style.css")
+);
 const LIBRARIES: &str = concat!(
     include_str!("../../assets/vendor/three.iife.min.js"),
     "\n",
@@ -69,7 +71,8 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// JSON that no HTML parser can leave: these characters stand only inside its strings, where an escape means the same.
+/// JSON that no HTML parser can leave: these characters stand only inside its strings, where an
+/// escape means the same.
 fn script_safe(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }

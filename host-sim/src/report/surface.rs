@@ -1,8 +1,10 @@
-//! The surface of a voxel map for drawing: exposed faces merged into rectangles, and the creases between them.
+//! The surface of a voxel map for drawing: exposed faces merged into rectangles, and the creases
+//! between them.
 //!
-//! Greedy meshing (M. Lysenko, "Meshing in a Minecraft Game", 2012): layer by layer, each exposed face grows along the
-//! first axis, then along the second. A crease is a lattice edge where the four cells around it are not flat: one or
-//! three of them filled, or two that touch by that edge only. Linear in the number of cells.
+//! Greedy meshing (M. Lysenko, "Meshing in a Minecraft Game", 2012): layer by layer, each exposed
+//! face grows along the first axis, then along the second. A crease is a lattice edge where the
+//! four cells around it are not flat: one or three of them filled, or two that touch by that edge
+//! only. Linear in the number of cells.
 
 use planner_core::Point;
 use planner_core::voxel::VoxelGrid;
@@ -10,8 +12,8 @@ use serde::Serialize;
 
 use super::pack;
 
-/// Most rectangles a page carries: 12 bytes each, so 2.4 MB of base64. A map that has more is drawn from cells twice as
-/// large, again and again, until it fits; the page says so.
+/// Most rectangles a page carries: 12 bytes each, so 2.4 MB of base64. A map that has more is drawn
+/// from cells twice as large, again and again, until it fits; the page says so.
 pub const FACE_LIMIT: usize = 150_000;
 /// Most cells that are compared: time and memory of writing a page stay bounded.
 const CELL_LIMIT: usize = 1 << 25;
@@ -29,18 +31,20 @@ pub struct MapSurface {
     pub resolution_m: f32,
     /// Edge of a cell as drawn, metres: the resolution times a power of two.
     pub drawn_m: f32,
-    /// Six numbers a rectangle: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and `v`, extent along `u` and
-    /// `v`; in drawn cells, with `u` and `v` the two axes after `axis` in the cycle east, north, up.
+    /// Six numbers a rectangle: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and `v`,
+    /// extent along `u` and `v`; in drawn cells, with `u` and `v` the two axes after `axis` in the
+    /// cycle east, north, up.
     #[serde(serialize_with = "pack::words")]
     pub faces: Vec<u16>,
-    /// Five numbers a line: axis it runs along, `u`, `v`, start, length. Empty where there are more than [`FACE_LIMIT`].
+    /// Five numbers a line: axis it runs along, `u`, `v`, start, length. Empty where there are more
+    /// than [`FACE_LIMIT`].
     #[serde(serialize_with = "pack::words")]
     pub creases: Vec<u16>,
 }
 
 impl MapSurface {
-    /// The surface of what is filled in `grid`. Beyond its faces nothing is drawn, whatever [`VoxelGrid::outside`] says,
-    /// so that an open map stays open to the eye.
+    /// The surface of what is filled in `grid`. Beyond its faces nothing is drawn, whatever
+    /// [`VoxelGrid::outside`] says, so that an open map stays open to the eye.
     pub fn of(grid: &VoxelGrid<'_>) -> Self {
         let shape = grid.shape();
         let mut scale = 1;
@@ -58,7 +62,14 @@ impl MapSurface {
                     }
                     let drawn_m = shape.resolution_m * scale as f32;
                     let resolution_m = shape.resolution_m;
-                    return Self { min: shape.min, max: shape.max(), resolution_m, drawn_m, faces, creases };
+                    return Self {
+                        min: shape.min,
+                        max: shape.max(),
+                        resolution_m,
+                        drawn_m,
+                        faces,
+                        creases,
+                    };
                 }
             }
             scale *= 2;
@@ -66,7 +77,8 @@ impl MapSurface {
     }
 }
 
-/// Occupancy one byte a cell, with one empty layer around it, so that neighbours need no range check.
+/// Occupancy one byte a cell, with one empty layer around it, so that neighbours need no range
+/// check.
 struct Cells {
     dims: [usize; 3],
     stride: [usize; 3],
@@ -82,7 +94,8 @@ impl Cells {
         let [nx, ny, nz] = grid.shape().dims;
         for k in 0..nz {
             for j in 0..ny {
-                let row = ((k / scale) as usize + 1) * stride[2] + ((j / scale) as usize + 1) * stride[1];
+                let row =
+                    ((k / scale) as usize + 1) * stride[2] + ((j / scale) as usize + 1) * stride[1];
                 for i in 0..nx {
                     if grid.is_occupied([i, j, k]) {
                         cells.filled[row + (i / scale) as usize + 1] = true;
@@ -104,7 +117,8 @@ impl Cells {
                     let row = layer * self.stride[axis] + (b + 1) * self.stride[v];
                     for a in 0..nu {
                         let below = row + (a + 1) * self.stride[u];
-                        let (low, high) = (self.filled[below], self.filled[below + self.stride[axis]]);
+                        let (low, high) =
+                            (self.filled[below], self.filled[below + self.stride[axis]]);
                         mask[b * nu + a] = if low == high { 0 } else { 1 + u8::from(low) };
                     }
                 }
@@ -200,8 +214,9 @@ mod tests {
 
     #[test]
     fn a_block_has_six_faces_and_twelve_creases() {
-        let block =
-            surface([5, 6, 7], |[i, j, k]| (1..4).contains(&i) && (1..5).contains(&j) && (1..6).contains(&k));
+        let block = surface([5, 6, 7], |[i, j, k]| {
+            (1..4).contains(&i) && (1..5).contains(&j) && (1..6).contains(&k)
+        });
         assert_eq!(block.faces.len() / 6, 6);
         assert_eq!(block.creases.len() / 5, 12);
         assert_eq!(area(&block), 2 * (3 * 4 + 4 * 5 + 5 * 3));
@@ -225,13 +240,18 @@ mod tests {
             (i.wrapping_mul(0x9e37) ^ j.wrapping_mul(0x85eb) ^ k.wrapping_mul(0xc2b3)) % 7 < 3
         };
         let dims = [9, 10, 11];
-        let filled =
-            |p: [i64; 3]| (0..3).all(|a| p[a] >= 0 && p[a] < i64::from(dims[a])) && hash(p.map(|c| c as u32));
+        let filled = |p: [i64; 3]| {
+            (0..3).all(|a| p[a] >= 0 && p[a] < i64::from(dims[a])) && hash(p.map(|c| c as u32))
+        };
         let mut exposed = 0;
-        for (i, j, k) in (-1..12).flat_map(|i| (-1..12).flat_map(move |j| (-1..12).map(move |k| (i, j, k)))) {
+        for (i, j, k) in
+            (-1..12).flat_map(|i| (-1..12).flat_map(move |j| (-1..12).map(move |k| (i, j, k))))
+        {
             let here = filled([i, j, k]);
-            exposed +=
-                [[i + 1, j, k], [i, j + 1, k], [i, j, k + 1]].iter().filter(|&&n| filled(n) != here).count();
+            exposed += [[i + 1, j, k], [i, j + 1, k], [i, j, k + 1]]
+                .iter()
+                .filter(|&&n| filled(n) != here)
+                .count();
         }
         let noise = surface(dims, hash);
         assert_eq!(area(&noise), exposed);

@@ -1,17 +1,22 @@
-//! Fewer edges, so that a roadmap fits a board: every two nodes that were connected stay so, and paths lengthen little.
+//! Fewer edges, so that a roadmap fits a board: every two nodes that were connected stay so, and
+//! paths lengthen little.
 //!
-//! 1. *Connected.* The edges of a spanning forest of greatest clearances are kept (Kruskal 1956): between two nodes it has a
-//!    way whose narrowest edge is as wide as that of the widest way there is (Hu 1961). So whatever clearance is
-//!    required, a node that could reach another one before still can.
-//! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the room.
-//! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`PATH_SOURCES`] nodes lose most by: the number of
-//!    paths over an edge, times how much longer the way around it is over the edges kept so far. Half of them are chosen
-//!    first, since what is around the others is shorter then.
+//! 1. *Connected.* The edges of a spanning forest of greatest clearances are kept (Kruskal 1956):
+//!    between two nodes it has a way whose narrowest edge is as wide as that of the widest way
+//!    there is (Hu 1961). So whatever clearance is required, a node that could reach another one
+//!    before still can.
+//! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the
+//!    room.
+//! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`PATH_SOURCES`]
+//!    nodes lose most by: the number of paths over an edge, times how much longer the way around it
+//!    is over the edges kept so far. Half of them are chosen first, since what is around the others
+//!    is shorter then.
 //!
-//! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those of each class of
-//! required clearances ([`CLEARANCE_CLASSES_M`]).
+//! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those
+//! of each class of required clearances ([`CLEARANCE_CLASSES_M`]).
 //!
-//! Cost: edges · log edges, a search a source and class, and a short one a node, class and round, on all cores.
+//! Cost: edges · log edges, a search a source and class, and a short one a node, class and round,
+//! on all cores.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -33,13 +38,16 @@ const FAR_EDGE_ROUNDS: usize = 2;
 /// this long.
 const MAX_DETOUR_RATIO: f32 = 1.5;
 
-/// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes connected.
+/// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes
+/// connected.
 pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
     if edges.len() <= most {
         return Some(edges.to_vec());
     }
-    let lengths: Vec<f32> =
-        edges.iter().map(|edge| (nodes[usize::from(edge.b)] - nodes[usize::from(edge.a)]).norm()).collect();
+    let lengths: Vec<f32> = edges
+        .iter()
+        .map(|edge| (nodes[usize::from(edge.b)] - nodes[usize::from(edge.a)]).norm())
+        .collect();
     let mut kept = widest_forest(nodes.len(), edges);
     let room = most.checked_sub(kept.iter().filter(|&&kept| kept).count())?;
     let near = (room as f32 * NEAREST_EDGE_SHARE) as usize;
@@ -73,7 +81,8 @@ fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out
     let mut rows = vec![Vec::new(); nodes];
     for (i, (edge, &length_m)) in edges.iter().zip(lengths).enumerate() {
         let class =
-            CLEARANCE_CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count() as u8;
+            CLEARANCE_CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count()
+                as u8;
         for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
             rows[usize::from(from)].push(OutgoingEdge { to, class, length_m, edge: i as u32 });
         }
@@ -84,8 +93,8 @@ fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out
     rows
 }
 
-/// For each edge how many shorter ones its nodes have, wide enough for a vehicle of some class that it is wide enough for: the
-/// fewest of either node and any class.
+/// For each edge how many shorter ones its nodes have, wide enough for a vehicle of some class that
+/// it is wide enough for: the fewest of either node and any class.
 fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     let mut ranks = vec![u32::MAX; edges];
     for row in rows {
@@ -129,9 +138,16 @@ fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
 }
 
 /// Keeps `count` more edges, first by the given order, then the shortest.
-fn keep_first<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn(usize) -> O) {
+fn keep_first<O: Ord>(
+    kept: &mut [bool],
+    count: usize,
+    lengths: &[f32],
+    order: impl Fn(usize) -> O,
+) {
     let mut others: Vec<usize> = (0..kept.len()).filter(|&i| !kept[i]).collect();
-    others.sort_by(|&a, &b| order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b)));
+    others.sort_by(|&a, &b| {
+        order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b))
+    });
     for i in others.into_iter().take(count) {
         kept[i] = true;
     }
@@ -142,8 +158,9 @@ fn clearance_classes() -> impl Iterator<Item = u8> {
     1..=CLEARANCE_CLASSES_M.len() as u8
 }
 
-/// For each edge that is not kept how much longer the shortest paths over it become, metres, in the mean over all paths of a
-/// class; the sum over the classes. `usages` are the paths over each edge, of each class.
+/// For each edge that is not kept how much longer the shortest paths over it become, metres, in the
+/// mean over all paths of a class; the sum over the classes. `usages` are the paths over each edge,
+/// of each class.
 fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
     let is_kept = |out: &&OutgoingEdge| kept[out.edge as usize];
     let kept_rows: Vec<Vec<OutgoingEdge>> =
@@ -155,12 +172,18 @@ fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[b
             .into_par_iter()
             .map(|node| {
                 let is_wanted = |out: &&OutgoingEdge| {
-                    usize::from(out.to) > node && usage[out.edge as usize] > 0 && !kept[out.edge as usize]
+                    usize::from(out.to) > node
+                        && usage[out.edge as usize] > 0
+                        && !kept[out.edge as usize]
                 };
                 let wanted: Vec<&OutgoingEdge> = rows[node].iter().filter(is_wanted).collect();
                 let Some(longest) = wanted.last() else { return Vec::new() };
-                let ways_m =
-                    shortest_distances_within(node, &kept_rows, class, MAX_DETOUR_RATIO * longest.length_m);
+                let ways_m = shortest_distances_within(
+                    node,
+                    &kept_rows,
+                    class,
+                    MAX_DETOUR_RATIO * longest.length_m,
+                );
                 let loss = |out: &&OutgoingEdge| {
                     let around_m = ways_m[usize::from(out.to)].min(MAX_DETOUR_RATIO * out.length_m);
                     // Rounding alone can make it less than nothing.
@@ -177,8 +200,14 @@ fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[b
     losses
 }
 
-/// Lengths of the shortest ways from a node over edges of at least a class, as far as they are no longer than `most_m`.
-fn shortest_distances_within(source: usize, rows: &[Vec<OutgoingEdge>], class: u8, most_m: f32) -> Vec<f32> {
+/// Lengths of the shortest ways from a node over edges of at least a class, as far as they are no
+/// longer than `most_m`.
+fn shortest_distances_within(
+    source: usize,
+    rows: &[Vec<OutgoingEdge>],
+    class: u8,
+    most_m: f32,
+) -> Vec<f32> {
     let mut way_m = vec![f32::INFINITY; rows.len()];
     let mut waiting = BinaryHeap::from([(Reverse(0_u32), source)]);
     way_m[source] = 0.0;
@@ -198,8 +227,8 @@ fn shortest_distances_within(source: usize, rows: &[Vec<OutgoingEdge>], class: u
     way_m
 }
 
-/// For each edge the number of shortest paths that lead over it, of those from [`PATH_SOURCES`] nodes to all others, of vehicles
-/// of a class.
+/// For each edge the number of shortest paths that lead over it, of those from [`PATH_SOURCES`]
+/// nodes to all others, of vehicles of a class.
 fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     let sources = PATH_SOURCES.min(rows.len());
     let searches: Vec<Vec<(u32, u32)>> = (0..sources)
@@ -213,8 +242,8 @@ fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     usage
 }
 
-/// The edges of the shortest paths from a node over edges of at least a class, each with how many of them lead over it
-/// (Dijkstra 1959).
+/// The edges of the shortest paths from a node over edges of at least a class, each with how many
+/// of them lead over it (Dijkstra 1959).
 fn paths_from(source: usize, rows: &[Vec<OutgoingEdge>], class: u8) -> Vec<(u32, u32)> {
     let mut way_m = vec![f32::INFINITY; rows.len()];
     let mut last_edge = vec![None; rows.len()];

@@ -1,12 +1,13 @@
-//! Nodes in passages that random nodes miss: where the roadmap does not join a start to a goal and the map does, the corners
-//! of a way over the map's cells become nodes.
+//! Nodes in passages that random nodes miss: where the roadmap does not join a start to a goal and
+//! the map does, the corners of a way over the map's cells become nodes.
 //!
-//! A passage hardly wider than a vehicle and its margin takes up next to nothing of the space that nodes are drawn from, so
-//! no number of random nodes is sure to find it. A cell's centre is what nodes lie on here, and every step between two of them keeps the
-//! clearance, so what is joined is as clear as any edge.
+//! A passage hardly wider than a vehicle and its margin takes up next to nothing of the space that
+//! nodes are drawn from, so no number of random nodes is sure to find it. A cell's centre is what
+//! nodes lie on here, and every step between two of them keeps the clearance, so what is joined is
+//! as clear as any edge.
 //!
-//! Cost: a search over the map's cells (A*) for each pair of parts that are not joined; missions whose roadmap joins all of
-//! their starts and goals pay a tree of boxes and the look.
+//! Cost: a search over the map's cells (A*) for each pair of parts that are not joined; missions
+//! whose roadmap joins all of their starts and goals pay a tree of boxes and the look.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -18,12 +19,14 @@ use planner_core::voxel::GridShape;
 
 use crate::map::{BoxTree, VoxelMap};
 
-/// What a way keeps beyond the clearance, metres: more than rounding, and than the millimetre that the file rounds down to.
+/// What a way keeps beyond the clearance, metres: more than rounding, and than the millimetre that
+/// the file rounds down to.
 const CLEARANCE_SLACK_M: f32 = 1.2e-3;
 /// Most cells of a grid that is searched: the search keeps nine bytes a cell.
 const MAX_SEARCHED_CELLS: usize = 1 << 25;
 
-/// A start and a goal, by their nodes, and the clearance that the vehicle between them needs, metres.
+/// A start and a goal, by their nodes, and the clearance that the vehicle between them needs,
+/// metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WantedConnection {
     /// The start's node.
@@ -117,7 +120,8 @@ struct CellSearch<'a> {
 impl<'a> CellSearch<'a> {
     /// The search; none where the map is too large.
     fn new(map: &'a VoxelMap, tree: &'a BoxTree, required_m: f32) -> Option<Self> {
-        let cells = map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
+        let cells =
+            map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
         (cells <= MAX_SEARCHED_CELLS).then_some(Self { shape: &map.shape, map, tree, required_m })
     }
 
@@ -143,7 +147,8 @@ impl<'a> CellSearch<'a> {
             let step = [n % 3, n / 3 % 3, n / 9];
             let mut next = [0; 3];
             for axis in 0..3 {
-                next[axis] = (cell[axis] + step[axis]).checked_sub(1).filter(|&c| c < dims[axis])?;
+                next[axis] =
+                    (cell[axis] + step[axis]).checked_sub(1).filter(|&c| c < dims[axis])?;
             }
             Some(next)
         })
@@ -152,7 +157,8 @@ impl<'a> CellSearch<'a> {
     /// Cells from whose centres a place is seen.
     fn cells_seen_from(&self, place: &Point) -> Vec<usize> {
         let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
-        let sees = |next: &[u32; 3]| is_clear(self.tree, place, &self.centre(*next), self.required_m);
+        let sees =
+            |next: &[u32; 3]| is_clear(self.tree, place, &self.centre(*next), self.required_m);
         self.cell_and_neighbours(cell).filter(sees).map(|next| self.index(next)).collect()
     }
 
@@ -179,8 +185,9 @@ impl<'a> CellSearch<'a> {
             done[index / 64] |= 1 << (index % 64);
             let (cell, centre) = (self.cell(index), self.centre(self.cell(index)));
             if ends.contains(&index) {
-                let back =
-                    std::iter::successors(Some(index), |&i| Some(came[i] as usize).filter(|&i| i < cells));
+                let back = std::iter::successors(Some(index), |&i| {
+                    Some(came[i] as usize).filter(|&i| i < cells)
+                });
                 let mut way: Vec<Point> = back.map(|i| self.centre(self.cell(i))).collect();
                 way.reverse();
                 return Some(std::iter::once(*from).chain(way).chain([*to]).collect());
@@ -202,8 +209,14 @@ impl<'a> CellSearch<'a> {
     }
 }
 
-/// The places between the ends of a way that the fewest edges join: each is clear and as long as edges may be.
-fn fewest_corners(tree: &BoxTree, way: &[Point], config: &Config, required_m: f32) -> Option<Vec<Point>> {
+/// The places between the ends of a way that the fewest edges join: each is clear and as long as
+/// edges may be.
+fn fewest_corners(
+    tree: &BoxTree,
+    way: &[Point],
+    config: &Config,
+    required_m: f32,
+) -> Option<Vec<Point>> {
     let last = way.len() - 1;
     let mut hops = vec![u32::MAX; way.len()];
     let mut came = vec![0; way.len()];

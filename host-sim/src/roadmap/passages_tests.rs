@@ -24,7 +24,10 @@ fn rooms(rng: &mut Pcg32, count: u32) -> VoxelMap {
             for i in 0..dims[0] {
                 let door = doors[(i / 30) as usize];
                 let wall = i % 30 == 29 && i + 1 < dims[0] && !(door..door + 5).contains(&j);
-                map.set([i, j, k], if wall || k == 0 { Occupancy::Occupied } else { Occupancy::Free });
+                map.set(
+                    [i, j, k],
+                    if wall || k == 0 { Occupancy::Occupied } else { Occupancy::Free },
+                );
             }
         }
     }
@@ -50,7 +53,8 @@ fn rooms_behind_narrow_doors_are_joined() {
         let (mut roadmap, _) = build(&map, &ends, &config).unwrap();
         let before = roadmap.nodes.len();
         let joined = |roadmap: &Roadmap| {
-            let mut parts = ConnectedComponents::new(roadmap.nodes.len(), &roadmap.edges, REQUIRED_M);
+            let mut parts =
+                ConnectedComponents::new(roadmap.nodes.len(), &roadmap.edges, REQUIRED_M);
             parts.component_of(0) == parts.component_of(1)
         };
         missed += usize::from(!joined(&roadmap));

@@ -80,7 +80,8 @@ impl Terrain {
 }
 
 impl Area {
-    /// The ground at a place, metres above the origin: level ground where there is no terrain, and beyond its map.
+    /// The ground at a place, metres above the origin: level ground where there is no terrain, and
+    /// beyond its map.
     pub fn ground_m(&self, place: &Flat) -> f32 {
         self.terrain.as_ref().and_then(|terrain| terrain.grid.height_at(place)).unwrap_or(0.0)
     }

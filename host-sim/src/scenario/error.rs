@@ -13,7 +13,8 @@ const CONTEXT_CHARS: usize = 40;
 pub struct ScenarioError {
     /// The scenario's name, usually its path.
     pub file: String,
-    /// Line and column, counted from 1, and the line's text; none where the file itself could not be read.
+    /// Line and column, counted from 1, and the line's text; none where the file itself could not
+    /// be read.
     pub place: Option<Place>,
     /// Fault of the scenario.
     pub why: String,
@@ -37,10 +38,12 @@ pub struct Place {
 impl Place {
     /// The place of a span of bytes.
     pub(super) fn of(text: &str, span: &Range<usize>) -> Self {
-        let start = (0..=span.start.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0);
+        let start =
+            (0..=span.start.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0);
         let begin = text[..start].rfind('\n').map_or(0, |i| i + 1);
         let line = text[begin..].lines().next().unwrap_or("");
-        let end = (start..=span.end.min(begin + line.len())).rev().find(|&i| text.is_char_boundary(i));
+        let end =
+            (start..=span.end.min(begin + line.len())).rev().find(|&i| text.is_char_boundary(i));
         Self {
             line: text[..begin].matches('\n').count() + 1,
             column: text[begin..start].chars().count() + 1,
@@ -71,11 +74,14 @@ impl fmt::Display for ScenarioError {
     }
 }
 
-/// A line as it is shown, of which `marked` characters from `from` on are meant; then how many characters of it stand
-/// before those, and how many of those are shown. Of a long line that is the part around them.
+/// A line as it is shown, of which `marked` characters from `from` on are meant; then how many
+/// characters of it stand before those, and how many of those are shown. Of a long line that is the
+/// part around them.
 fn marked_line(text: &str, from: usize, marked: usize) -> (String, usize, usize) {
-    let begin = if from + marked > MAX_QUOTE_CHARS { from.saturating_sub(CONTEXT_CHARS) } else { 0 };
-    let plain = |c: char| if quoted(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
+    let begin =
+        if from + marked > MAX_QUOTE_CHARS { from.saturating_sub(CONTEXT_CHARS) } else { 0 };
+    let plain =
+        |c: char| if quoted(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
     let mut shown: String = text.chars().skip(begin).take(MAX_QUOTE_CHARS - 2).map(plain).collect();
     let length = shown.chars().count();
     if text.chars().nth(begin + length).is_some() {
@@ -97,9 +103,16 @@ mod tests {
         let text = format!("{}KEY = 1{}", "x".repeat(5000), "y".repeat(5000));
         let (shown, before, marked) = marked_line(&text, 5000, 3);
         assert_eq!(shown.chars().skip(before).take(marked).collect::<String>(), "KEY");
-        assert!(shown.chars().count() <= MAX_QUOTE_CHARS && shown.starts_with('…') && shown.ends_with('…'));
+        assert!(
+            shown.chars().count() <= MAX_QUOTE_CHARS
+                && shown.starts_with('…')
+                && shown.ends_with('…')
+        );
         assert_eq!(marked_line("a\tb\u{1b}c", 2, 1), ("a b c".to_owned(), 2, 1));
         let (shown, before, marked) = marked_line(&text, 0, 9000);
-        assert_eq!((before + marked, shown.chars().count()), (MAX_QUOTE_CHARS - 2, MAX_QUOTE_CHARS - 1));
+        assert_eq!(
+            (before + marked, shown.chars().count()),
+            (MAX_QUOTE_CHARS - 2, MAX_QUOTE_CHARS - 1)
+        );
     }
 }

@@ -1,8 +1,9 @@
 //! A scenario: everything a run depends on, in one TOML file.
 //!
-//! Every key has a default but the map, the vehicles and the goals. A key that nobody knows, a value out of range or
-//! two values that cannot both hold are errors that name file, line and column. Lengths are metres in the mission's
-//! ENU frame. Keys for what is not built yet are read and then refused by name: see [`Scenario::check_supported`].
+//! Every key has a default but the map, the vehicles and the goals. A key that nobody knows, a
+//! value out of range or two values that cannot both hold are errors that name file, line and
+//! column. Lengths are metres in the mission's ENU frame. Keys for what is not built yet are read
+//! and then refused by name: see [`Scenario::check_supported`].
 
 pub mod coverage;
 mod error;
@@ -22,8 +23,8 @@ pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
 pub use sim_autopilot::{AutopilotKind, Estimator};
 pub use types::{
-    Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode, Objective,
-    Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
+    Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode,
+    Objective, Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
 };
 
 /// Reads a scenario file; paths in it are relative to its folder.
@@ -38,15 +39,16 @@ fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
     let text = files::read_text(path).map_err(|e| {
         let toml = path.with_extension("toml");
-        let hint =
-            (!path.exists() && toml.is_file()).then(|| format!("did you mean `{}`?", quoted_path(&toml)));
+        let hint = (!path.exists() && toml.is_file())
+            .then(|| format!("did you mean `{}`?", quoted_path(&toml)));
         ScenarioError { hint, ..fail(format!("cannot read it: {e}")) }
     })?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
     Ok((text, name, folder))
 }
 
-/// Parses a scenario's text; `name` names it in errors, and paths in it are relative to the working directory.
+/// Parses a scenario's text; `name` names it in errors, and paths in it are relative to the working
+/// directory.
 pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
     read(text, name, Path::new(""))
 }

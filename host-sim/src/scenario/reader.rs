@@ -1,7 +1,7 @@
 //! A cursor over a TOML table that keeps where every value stands and which keys were asked for.
 //!
-//! Derived deserialising loses the place of a value once its range is checked, and cannot name the nearest key; here
-//! both are at hand where the value is read.
+//! Derived deserialising loses the place of a value once its range is checked, and cannot name the
+//! nearest key; here both are at hand where the value is read.
 
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -80,7 +80,11 @@ impl<'a> Value<'a> {
         };
         match number {
             Some(number) if number.is_finite() && range.contains(&number) => Ok(number),
-            _ => Err(self.error(&format!("must be a number from {} to {}", range.start(), range.end()))),
+            _ => Err(self.error(&format!(
+                "must be a number from {} to {}",
+                range.start(),
+                range.end()
+            ))),
         }
     }
 
@@ -96,9 +100,11 @@ impl<'a> Value<'a> {
         }
         match self.integer().and_then(|i| u64::try_from(i).ok()) {
             Some(number) if range.contains(&number) => Ok(number),
-            _ => {
-                Err(self.error(&format!("must be a whole number from {} to {}", range.start(), range.end())))
-            }
+            _ => Err(self.error(&format!(
+                "must be a whole number from {} to {}",
+                range.start(),
+                range.end()
+            ))),
         }
     }
 
@@ -118,7 +124,10 @@ impl<'a> Value<'a> {
         }
         let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
         let error = self.error(&format!("must be one of {}", all.join(", ")));
-        Err(ScenarioError { hint: nearest_word(given, words.iter().map(|(word, _)| *word)), ..error })
+        Err(ScenarioError {
+            hint: nearest_word(given, words.iter().map(|(word, _)| *word)),
+            ..error
+        })
     }
 
     pub(super) fn items(&self) -> Result<Vec<Value<'a>>> {
@@ -137,9 +146,10 @@ impl<'a> Value<'a> {
     pub(super) fn triple(&self) -> Result<[f64; 3]> {
         let items = self.items().map_err(|_| self.expected_error("[east, north, up] in metres"))?;
         let [x, y, z] = items.as_slice() else {
-            return Err(
-                self.error(&format!("must be three numbers, east, north, up in metres, not {}", items.len()))
-            );
+            return Err(self.error(&format!(
+                "must be three numbers, east, north, up in metres, not {}",
+                items.len()
+            )));
         };
         let range = -f64::from(MAX_COORDINATE_M)..=f64::from(MAX_COORDINATE_M);
         Ok([x.f64(&range)?, y.f64(&range)?, z.f64(&range)?])
@@ -151,7 +161,9 @@ impl<'a> Value<'a> {
 
     pub(super) fn table(&self) -> Result<Table<'a>> {
         match self.value {
-            DeValue::Table(table) => Ok(Table::new(self.text, &self.name, self.span.clone(), table)),
+            DeValue::Table(table) => {
+                Ok(Table::new(self.text, &self.name, self.span.clone(), table))
+            }
             _ => Err(self.expected_error("a table")),
         }
     }
@@ -183,20 +195,30 @@ impl<'a> Table<'a> {
     /// The value, or an error at the table.
     pub(super) fn required(&self, key: &'static str, hint: &str) -> Result<Value<'a>> {
         self.get(key).ok_or_else(|| {
-            // A misspelt key is what the user sees in the file; that it is missing is only what follows from it.
+            // A misspelt key is what the user sees in the file; that it is missing is only what
+            // follows from it.
             let misspelt = |(given, _): &(&Spanned<_>, _)| {
                 strsim::jaro_winkler(AsRef::<str>::as_ref(given.get_ref()), key) > 0.85
             };
             match self.table.iter().find(misspelt) {
-                Some((given, _)) => self.unknown_key_error(given, Some(format!("did you mean `{key}`?"))),
-                None => self.text.with_hint(&self.span, format!("{} is missing", self.path(key)), hint),
+                Some((given, _)) => {
+                    self.unknown_key_error(given, Some(format!("did you mean `{key}`?")))
+                }
+                None => {
+                    self.text.with_hint(&self.span, format!("{} is missing", self.path(key)), hint)
+                }
             }
         })
     }
 
-    fn unknown_key_error(&self, key: &Spanned<DeString<'_>>, hint: Option<String>) -> ScenarioError {
+    fn unknown_key_error(
+        &self,
+        key: &Spanned<DeString<'_>>,
+        hint: Option<String>,
+    ) -> ScenarioError {
         let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
-        let error = self.text.error(&key.span(), format!("unknown key `{}`{place}", quoted(key.get_ref())));
+        let error =
+            self.text.error(&key.span(), format!("unknown key `{}`{place}", quoted(key.get_ref())));
         ScenarioError { hint, ..error }
     }
 
@@ -205,11 +227,20 @@ impl<'a> Table<'a> {
         self.known.borrow_mut().extend(keys);
     }
 
-    pub(super) fn f32(&self, key: &'static str, default: f32, range: RangeInclusive<f64>) -> Result<f32> {
+    pub(super) fn f32(
+        &self,
+        key: &'static str,
+        default: f32,
+        range: RangeInclusive<f64>,
+    ) -> Result<f32> {
         self.get(key).map_or(Ok(default), |v| v.f64(&range).map(|n| n as f32))
     }
 
-    pub(super) fn optional_f32(&self, key: &'static str, range: RangeInclusive<f64>) -> Result<Option<f32>> {
+    pub(super) fn optional_f32(
+        &self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Result<Option<f32>> {
         self.get(key).map(|v| v.f64(&range).map(|n| n as f32)).transpose()
     }
 
@@ -226,7 +257,12 @@ impl<'a> Table<'a> {
         self.get(key).map_or(Ok(false), |v| v.boolean())
     }
 
-    pub(super) fn one_of<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
+    pub(super) fn one_of<T: Copy>(
+        &self,
+        key: &'static str,
+        default: T,
+        words: &[(&str, T)],
+    ) -> Result<T> {
         self.get(key).map_or(Ok(default), |v| v.one_of(words))
     }
 

@@ -16,14 +16,16 @@ use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use sim_autopilot::AutopilotKind;
 use toml::de::DeTable;
 
-use self::checks::{VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins};
+use self::checks::{
+    VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins,
+};
 use self::simulation::{read_deconfliction, read_fault, read_simulation};
 use self::values::{MAX_ID, read_point};
 use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::types::{
-    Companion, Deconfliction, Fault, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario, Simulation,
-    Terminals, UnsupportedTable, Vehicle,
+    Companion, Deconfliction, Fault, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario,
+    Simulation, Terminals, UnsupportedTable, Vehicle,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
@@ -40,7 +42,10 @@ const MAX_FAULTS: usize = 1000;
 const DEFAULT_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
 /// Content of a scenario's root table, if it is TOML and all its keys are known.
-pub(super) fn read_root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
+pub(super) fn read_root<T>(
+    text: Text<'_>,
+    read: impl FnOnce(&Table<'_>) -> Result<T>,
+) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
         let what = quoted(error.message().lines().next().unwrap_or_default());
@@ -70,7 +75,8 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_STRAY_M, DEFAULT_TIME_LIMIT_S))?;
-    let map_table = root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
+    let map_table =
+        root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = read_map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
@@ -94,7 +100,9 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
             let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
             return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
         }
-        (Mode::Formation, Some(span)) => unsupported.push(unsupported_error(text, span, "this mission.mode")),
+        (Mode::Formation, Some(span)) => {
+            unsupported.push(unsupported_error(text, span, "this mission.mode"))
+        }
         _ => {}
     }
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
@@ -102,7 +110,13 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
     check_inside(&mission_table, &vehicles, &mission)?;
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
-    check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m, &simulation, &vehicles)?;
+    check_goals_apart(
+        &mission_table,
+        &mission,
+        deconfliction.safety_distance_m,
+        &simulation,
+        &vehicles,
+    )?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, Some(&roadmap), &deconfliction, &simulation, &vehicles)?;
     }
@@ -159,7 +173,9 @@ fn read_faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result
 /// Usual cause of text that is no TOML.
 fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
     match rest.chars().next() {
-        Some('“' | '”' | '„' | '‘' | '’' | '«') => Some("quotes of TOML are straight: \""),
+        Some('“' | '”' | '„' | '‘' | '’' | '«') => {
+            Some("quotes of TOML are straight: \"")
+        }
         _ if what.contains("escape") => Some("a path is written with /, or between single quotes"),
         Some('[') if what.contains("duplicate") => {
             Some("each vehicle is a `[[vehicles]]`, each fault a `[[faults]]`")
@@ -204,13 +220,17 @@ fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
 
 /// The map, and whether its origin was given.
 fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
-    let file_value = table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
+    let file_value =
+        table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
     let name = file_value.str()?;
     if let Err(error) = Source::parse(name) {
         return Err(file_value.error(&format!("is not a map that can be read: {error}")));
     }
-    let file =
-        if name.starts_with("builtin:") { name.to_owned() } else { folder.join(name).display().to_string() };
+    let file = if name.starts_with("builtin:") {
+        name.to_owned()
+    } else {
+        folder.join(name).display().to_string()
+    };
     let origin = table.get("origin").map(|v| read_geodetic(&v)).transpose()?;
     let map = Map {
         file,
@@ -231,7 +251,9 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
     let shares = [("edge_min_share", "edge_min_m"), ("edge_max_share", "edge_max_m")];
     for (share, metres) in shares {
         if let (Some(value), true) = (table.get(share), table.get(metres).is_some()) {
-            return Err(value.error(&format!("cannot stand beside roadmap.{metres}: give one of them")));
+            return Err(
+                value.error(&format!("cannot stand beside roadmap.{metres}: give one of them"))
+            );
         }
     }
     let roadmap = Roadmap {
@@ -249,7 +271,11 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
         sampling: table.one_of(
             "sampling",
             Sampling::Uniform,
-            &[("uniform", Sampling::Uniform), ("halton", Sampling::Halton), ("bridge", Sampling::Bridge)],
+            &[
+                ("uniform", Sampling::Uniform),
+                ("halton", Sampling::Halton),
+                ("bridge", Sampling::Bridge),
+            ],
         )?,
         passages: table.boolean("passages")?,
     };
@@ -258,7 +284,8 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
     if in_metres && roadmap.edge_min_m >= roadmap.edge_max_m {
         let (min, max) = (roadmap.edge_min_m, roadmap.edge_max_m);
         let span = edge_max.map_or(table.span.clone(), |v| v.span);
-        let why = format!("roadmap.edge_max_m ({max} m) must be above roadmap.edge_min_m ({min} m)");
+        let why =
+            format!("roadmap.edge_max_m ({max} m) must be above roadmap.edge_min_m ({min} m)");
         return Err(table.text.error(&span, why));
     }
     Ok(roadmap)
@@ -321,7 +348,8 @@ fn read_mission(
     }
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
     table.finish()?;
-    let mission = Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
+    let mission =
+        Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
     Ok((mission, mode_span))
 }
 
@@ -331,7 +359,8 @@ fn fence_and_ground_stations(
     vehicles: &[(Vehicle, VehicleSpans)],
 ) -> Result<(Option<Geofence>, [u8; GROUND_STATIONS])> {
     let geofence = table.get("geofence").map(|v| read_geofence(&v)).transpose()?;
-    let ground_stations = table.get("ground_stations").map(|v| read_stations(&v, vehicles)).transpose()?;
+    let ground_stations =
+        table.get("ground_stations").map(|v| read_stations(&v, vehicles)).transpose()?;
     let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
     Ok((geofence, ground_stations))
 }
@@ -345,7 +374,10 @@ fn check_list_len(value: &Value<'_>, count: usize, most: usize, what: &str) -> R
 }
 
 /// System ids whose commands count.
-fn read_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<[u8; GROUND_STATIONS]> {
+fn read_stations(
+    value: &Value<'_>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+) -> Result<[u8; GROUND_STATIONS]> {
     let given = value.items()?;
     if !(1..=GROUND_STATIONS).contains(&given.len()) {
         return Err(value.error(&format!("takes 1 to {GROUND_STATIONS} MAVLink system ids")));
@@ -360,15 +392,18 @@ fn read_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Res
     Ok(ids)
 }
 
-/// A point of the mission frame, in metres or by latitude and longitude about the origin that was given.
+/// A point of the mission frame, in metres or by latitude and longitude about the origin that was
+/// given.
 fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     if !value.is_table() {
         return read_point(value);
     }
     let position = read_geodetic(value)?;
     let Some(origin) = origin else {
-        let hint = "add `origin = { lat_deg = …, lon_deg = …, alt_m = … }` to [map], or give metres";
-        let why = format!("{} is given by latitude and longitude, but map.origin is missing", value.name);
+        let hint =
+            "add `origin = { lat_deg = …, lon_deg = …, alt_m = … }` to [map], or give metres";
+        let why =
+            format!("{} is given by latitude and longitude, but map.origin is missing", value.name);
         return Err(value.text.with_hint(&value.span, why, hint));
     };
     Ok(geodetic_to_enu(origin, &position))
@@ -377,8 +412,9 @@ fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
 /// One `x y z` a line; empty lines and those that begin with `#` are passed over.
 fn read_goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
     let path = folder.join(value.str()?);
-    let text = files::read_text(&path)
-        .map_err(|error| value.error(&format!("cannot be read: {}: {error}", quoted_path(&path))))?;
+    let text = files::read_text(&path).map_err(|error| {
+        value.error(&format!("cannot be read: {}: {error}", quoted_path(&path)))
+    })?;
     let mut goals = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -410,7 +446,8 @@ fn read_goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, Strin
 fn read_geofence(value: &Value<'_>) -> Result<Geofence> {
     let table = value.table()?;
     let hint = "a geofence is { min = [x, y, z], max = [x, y, z] }";
-    let (min, max) = (read_point(&table.required("min", hint)?)?, read_point(&table.required("max", hint)?)?);
+    let (min, max) =
+        (read_point(&table.required("min", hint)?)?, read_point(&table.required("max", hint)?)?);
     table.finish()?;
     if (0..3).any(|axis| min[axis] >= max[axis]) {
         return Err(value.error("must have every coordinate of min below that of max"));
@@ -426,7 +463,8 @@ fn read_vehicles(
     let mut vehicles: Vec<(Vehicle, VehicleSpans)> = Vec::new();
     for item in value.items()? {
         let table = item.table()?;
-        let id_value = table.required("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
+        let id_value =
+            table.required("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
         let id = id_value.integer_in_range(1..=MAX_ID)? as u8;
         if vehicles.iter().any(|(v, _)| v.id == id) {
             return Err(id_value.error(&format!("is {id}, which another vehicle already has")));
@@ -468,7 +506,10 @@ fn read_vehicle(
     let vehicle = Vehicle {
         id,
         start: read_place(&start, origin)?,
-        goal: goal.as_ref().map(|v| v.integer_in_range(0..=1_000_000).map(|g| g as usize)).transpose()?,
+        goal: goal
+            .as_ref()
+            .map(|v| v.integer_in_range(0..=1_000_000).map(|g| g as usize))
+            .transpose()?,
         radius_m: table.f32("radius_m", 0.3, 0.001..=100.0)?,
         altitude_m: table.optional_f32("altitude_m", -1000.0..=20_000.0)?,
         speed_max_mps: table.f32("speed_max_mps", 5.0, 0.01..=100.0)?,
@@ -488,7 +529,8 @@ fn read_vehicle(
         }
     }
     table.finish()?;
-    let spans = VehicleSpans { start: start.span, goal: goal.map(|v| v.span), table: table.span.clone() };
+    let spans =
+        VehicleSpans { start: start.span, goal: goal.map(|v| v.span), table: table.span.clone() };
     Ok((vehicle, spans))
 }
 

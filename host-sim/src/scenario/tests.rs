@@ -20,7 +20,10 @@ start = [8.0, 15.0, 1.5]
 fn a_short_scenario_has_the_defaults() {
     let scenario = parse(GOOD, "good.toml").unwrap();
     scenario.check_supported().unwrap();
-    assert_eq!((scenario.seed, scenario.map.resolution_m, scenario.map.unknown), (1, 0.25, Unknown::Blocked));
+    assert_eq!(
+        (scenario.seed, scenario.map.resolution_m, scenario.map.unknown),
+        (1, 0.25, Unknown::Blocked)
+    );
     let roadmap = &scenario.roadmap;
     assert_eq!((roadmap.nodes, roadmap.edge_min_m, roadmap.edge_max_m), (2300, 0.5, 8.0));
     assert_eq!((scenario.mission.mode, scenario.mission.cruise_mps), (Mode::Unlabelled, 2.0));
@@ -34,7 +37,10 @@ fn a_short_scenario_has_the_defaults() {
         scenario.deconfliction,
         Deconfliction { method: Method::Priority, safety_distance_m: 1.5, separation_m: 2.0 }
     );
-    assert_eq!((scenario.simulation.serial_baud, scenario.simulation.time_limit_s), (921_600, 600.0));
+    assert_eq!(
+        (scenario.simulation.serial_baud, scenario.simulation.time_limit_s),
+        (921_600, 600.0)
+    );
     assert!((scenario.required_clearance_m() - 0.8).abs() < 1e-6);
 }
 
@@ -90,7 +96,13 @@ fn wrong_scenarios_are_told_where_and_why() {
             "unknown key `strat` in vehicles[1]",
             Some("did you mean `start`?"),
         ),
-        ("id = 2", "id = 1", "10:6", "vehicles[1].id is 1, which another vehicle already has", None),
+        (
+            "id = 2",
+            "id = 1",
+            "10:6",
+            "vehicles[1].id is 1, which another vehicle already has",
+            None,
+        ),
         ("id = 2", "id = 251", "10:6", "vehicles[1].id must be a whole number from 1 to 250", None),
         (
             "id = 2",
@@ -135,7 +147,13 @@ fn wrong_scenarios_are_told_where_and_why() {
             "vehicles[1].personality must be one of \"px4\", \"ardupilot\"",
             Some("did you mean `px4`?"),
         ),
-        ("[mission]", "[mission]\nmode = \"labbeled\"", "5:8", words, Some("did you mean `labeled`?")),
+        (
+            "[mission]",
+            "[mission]\nmode = \"labbeled\"",
+            "5:8",
+            words,
+            Some("did you mean `labeled`?"),
+        ),
         (
             "[mission]",
             labelled,
@@ -155,7 +173,9 @@ fn wrong_scenarios_are_told_where_and_why() {
             "[]",
             "5:9",
             "mission.goals is missing or empty",
-            Some("add `goals = [[east, north, up], …]` in metres, or `goals_file = \"FILE\"`, to [mission]"),
+            Some(
+                "add `goals = [[east, north, up], …]` in metres, or `goals_file = \"FILE\"`, to [mission]",
+            ),
         ),
         (
             "[38.5, 19.0, 7.3]",
@@ -232,7 +252,10 @@ fn what_is_missing_altogether_is_said() {
     let error = parse("[map\n", "broken.toml").unwrap_err();
     assert!(error.why.starts_with("not TOML: "), "{error}");
     let error = load(Path::new("no/such.toml")).unwrap_err();
-    assert!(error.to_string().starts_with("bad scenario: no/such.toml: cannot read it: "), "{error}");
+    assert!(
+        error.to_string().starts_with("bad scenario: no/such.toml: cannot read it: "),
+        "{error}"
+    );
 }
 
 #[test]
@@ -286,7 +309,8 @@ fn geodetic_goals_and_starts_are_metres_about_the_origin() {
 fn paths_are_relative_to_the_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let text = changed("builtin:building", "maps/hall.bt");
-    let text = text.replace("goals = [[38.5, 19.0, 7.3], [3.0, 4.0, 12.5]]", "goals_file = \"goals.txt\"");
+    let text =
+        text.replace("goals = [[38.5, 19.0, 7.3], [3.0, 4.0, 12.5]]", "goals_file = \"goals.txt\"");
     std::fs::write(folder.path().join("s.toml"), text).unwrap();
     std::fs::write(folder.path().join("goals.txt"), "# two\n1 2 3\n\n4.5 5 6\n").unwrap();
     let scenario = load(&folder.path().join("s.toml")).unwrap();
@@ -294,10 +318,14 @@ fn paths_are_relative_to_the_scenario() {
     assert_eq!(scenario.mission.goals, [Point::new(1.0, 2.0, 3.0), Point::new(4.5, 5.0, 6.0)]);
     std::fs::write(folder.path().join("goals.txt"), "1 2 3\n1 x 3\n").unwrap();
     let error = load(&folder.path().join("s.toml")).unwrap_err();
-    assert!(error.why.ends_with("goals.txt:2: expected `x y z` in metres, found `1 x 3`"), "{error}");
+    assert!(
+        error.why.ends_with("goals.txt:2: expected `x y z` in metres, found `1 x 3`"),
+        "{error}"
+    );
 }
 
-/// Starts and goals clear of everything by more than the required clearance, on a map that can be loaded.
+/// Starts and goals clear of everything by more than the required clearance, on a map that can be
+/// loaded.
 fn check_places(scenario: &Scenario) {
     let map = crate::map::load(&scenario.map.file, scenario.map.resolution_m).unwrap();
     let voxels = map.voxel_map(scenario.map.unknown);
@@ -315,8 +343,13 @@ fn check_places(scenario: &Scenario) {
             for j in range(1) {
                 for i in range(0).filter(|&i| grid.is_occupied([i, j, k])) {
                     let half = Point::repeat(shape.resolution_m / 2.0);
-                    let away = ((shape.center([i, j, k]) - point).abs() - half).sup(&Point::zeros()).norm();
-                    assert!(away > clearance, "{point} is {away} m from an obstacle, {clearance} m required");
+                    let away = ((shape.center([i, j, k]) - point).abs() - half)
+                        .sup(&Point::zeros())
+                        .norm();
+                    assert!(
+                        away > clearance,
+                        "{point} is {away} m from an obstacle, {clearance} m required"
+                    );
                 }
             }
         }
@@ -349,7 +382,8 @@ fn the_scanned_buildings_have_room() {
 
 #[test]
 fn edges_are_given_in_metres_or_as_shares() {
-    let text = changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nterminals = \"apart\"\n[mission]");
+    let text =
+        changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nterminals = \"apart\"\n[mission]");
     let roadmap = parse(&text, "p2d.toml").unwrap().roadmap;
     assert_eq!((roadmap.edge_max_share, roadmap.terminals), (Some(0.2), Terminals::Apart));
     let text = changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nedge_max_m = 8\n[mission]");
@@ -363,16 +397,21 @@ fn goals_know_their_lines_and_how_far_apart_they_have_to_be() {
     let scenario = parse(&text, "lines.toml").unwrap();
     assert_eq!(scenario.mission.goal_places, ["lines.toml:5", "lines.toml:6"]);
     assert_eq!(scenario.vehicle_places, ["lines.toml:9", "lines.toml:12"]);
-    let error = parse(&text.replace("3.0, 4.0, 12.5", "38.5, 19.0, 8.3"), "lines.toml").unwrap_err();
+    let error =
+        parse(&text.replace("3.0, 4.0, 12.5", "38.5, 19.0, 8.3"), "lines.toml").unwrap_err();
     assert_eq!(error.place.as_ref().map(|place| place.line), Some(6), "{error}");
     assert_eq!(error.hint.as_deref(), Some("vehicles that land at both need 1.75 m between them"));
 }
 
 #[test]
 fn usual_mistakes_get_a_hint() {
-    let hint =
-        |from: &str, to: &str| parse(&changed(from, to), "usual.toml").unwrap_err().hint.unwrap_or_default();
-    assert_eq!(hint("\"builtin:building\"", "“builtin:building”"), "quotes of TOML are straight: \"");
+    let hint = |from: &str, to: &str| {
+        parse(&changed(from, to), "usual.toml").unwrap_err().hint.unwrap_or_default()
+    };
+    assert_eq!(
+        hint("\"builtin:building\"", "“builtin:building”"),
+        "quotes of TOML are straight: \""
+    );
     assert_eq!(
         hint("builtin:building", "C:\\maps\\hall.bt"),
         "a path is written with /, or between single quotes"

@@ -57,8 +57,8 @@ pub struct UnsupportedTable {
 /// `[map]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// A builtin's name, or a path that is relative to the working directory (resolved against the scenario's folder). Empty where
-    /// a coverage mission has no map: level ground at height 0.
+    /// A builtin's name, or a path that is relative to the working directory (resolved against the
+    /// scenario's folder). Empty where a coverage mission has no map: level ground at height 0.
     pub file: String,
     /// Edge of a planning cell.
     pub resolution_m: f32,
@@ -202,7 +202,10 @@ const DEFAULT_DESCEND_MPS: f32 = 1.0;
 impl Vehicle {
     /// V_a and V_d, m/s.
     pub fn climbs_mps(&self) -> [f32; 2] {
-        [self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS), self.descend_mps.unwrap_or(DEFAULT_DESCEND_MPS)]
+        [
+            self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS),
+            self.descend_mps.unwrap_or(DEFAULT_DESCEND_MPS),
+        ]
     }
 }
 
@@ -289,7 +292,8 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether the fault strikes this vehicle: a fault without a vehicle strikes all, an obstacle strikes none.
+    /// Whether the fault strikes this vehicle: a fault without a vehicle strikes all, an obstacle
+    /// strikes none.
     pub fn strikes(&self, vehicle: &Vehicle) -> bool {
         self.kind != FAULT_OBSTACLE && self.vehicle.is_none_or(|id| id == vehicle.id)
     }

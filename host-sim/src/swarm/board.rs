@@ -1,10 +1,12 @@
-//! A companion on a board or in another process: the far ends of its two serial ports, and what it reports of itself.
+//! A companion on a board or in another process: the far ends of its two serial ports, and what it
+//! reports of itself.
 //!
-//! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
-//! heard on its radio's port. A board whose radio is not ours is heard on the port for the autopilot, which carries no TUNNEL.
+//! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL,
+//! its words from STATUSTEXT, all heard on its radio's port. A board whose radio is not ours is
+//! heard on the port for the autopilot, which carries no TUNNEL.
 //!
-//! A board in QEMU is in lock step with the simulation ([`crate::boards`]): it runs through a step while the desk computes
-//! the others', and its bytes are taken at the step's end.
+//! A board in QEMU is in lock step with the simulation ([`crate::boards`]): it runs through a step
+//! while the desk computes the others', and its bytes are taken at the step's end.
 
 use std::path::Path;
 
@@ -67,7 +69,12 @@ impl Board {
     ///
     /// # Errors
     /// QEMU or the program does not start; the board does not hold the files.
-    pub fn emulate(program: &Path, log: &Path, roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Self> {
+    pub fn emulate(
+        program: &Path,
+        log: &Path,
+        roadmap: &[u8],
+        mission: &[u8],
+    ) -> anyhow::Result<Self> {
         let mut board = EmulatedBoard::start(program, log)?;
         board.load_flash(&boards::flash_bank_image(roadmap, mission)?)?;
         Ok(Self::new(BoardConnection::LockStep(LockStep { board, started_us: 0, runs: false })))
@@ -77,7 +84,8 @@ impl Board {
         Self { ends, framer: Framer::new(), state: State::default(), progress_m: None }
     }
 
-    /// Connects to the board's port for the autopilot and, if its radio is ours, the one for the radio.
+    /// Connects to the board's port for the autopilot and, if its radio is ours, the one for the
+    /// radio.
     ///
     /// # Errors
     /// A link cannot be opened.
@@ -107,15 +115,17 @@ impl Board {
     /// # Errors
     /// The board is gone.
     pub fn stack_used(&mut self) -> anyhow::Result<Option<usize>> {
-        let BoardConnection::LockStep(LockStep { board, runs, .. }) = &mut self.ends else { return Ok(None) };
+        let BoardConnection::LockStep(LockStep { board, runs, .. }) = &mut self.ends else {
+            return Ok(None);
+        };
         if core::mem::take(runs) {
             board.finish_grant()?;
         }
         board.stack_used().map(Some)
     }
 
-    /// Carries bytes between the board, its autopilot and the radio, up to the end of a step; one in lock step is granted
-    /// the next one.
+    /// Carries bytes between the board, its autopilot and the radio, up to the end of a step; one
+    /// in lock step is granted the next one.
     ///
     /// # Errors
     /// A board in lock step hangs or is gone.
@@ -229,7 +239,11 @@ impl LockStep {
         let board_us = |us: u64| us.max(now_us) - self.started_us;
         let mut pieces = Vec::new();
         while let Some(packet) = lines.radio.receive(now_us, lines.station) {
-            pieces.push(PortBytes { port: Port::Swarm, at_us: board_us(now_us), bytes: packet.to_vec() });
+            pieces.push(PortBytes {
+                port: Port::Swarm,
+                at_us: board_us(now_us),
+                bytes: packet.to_vec(),
+            });
         }
         while let Some((arrives_us, bytes)) = lines.up.next_by(until_us) {
             pieces.push(PortBytes { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });

@@ -1,5 +1,6 @@
-//! Divisions that companions of a coverage mission make in flight, from their radio messages: the plans that they fly
-//! after it, and what each division follows from. Whoever has the mission file can plan the same again.
+//! Divisions that companions of a coverage mission make in flight, from their radio messages: the
+//! plans that they fly after it, and what each division follows from. Whoever has the mission file
+//! can plan the same again.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -21,7 +22,8 @@ pub struct Division {
     pub vehicle: u8,
     /// Divisions that count, this one among them.
     pub number: u8,
-    /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody reported them.
+    /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody
+    /// reported them.
     pub lots: Vec<DivisionInput>,
     /// The CRC of the plan that the vehicle flies.
     pub plan_crc: u32,
@@ -53,7 +55,9 @@ impl DivisionLog {
         for packet in packets {
             let mut input = &packet[..];
             let frame = Framer::new().next(Instant::ZERO, &mut input);
-            let Some(frame) = frame.filter(|frame| frame.message_id == TUNNEL_DATA::ID) else { continue };
+            let Some(frame) = frame.filter(|frame| frame.message_id == TUNNEL_DATA::ID) else {
+                continue;
+            };
             if let Some(roster) = RosterReport::decode(frame.padded(), frame.system) {
                 self.take_roster(t_s, &roster);
             } else if let Some(intent) = Intent::decode(frame.padded(), frame.system) {

@@ -1,4 +1,5 @@
-//! The script player: strikes vehicles with the scenario's `[[faults]]` at their times and takes back what ends.
+//! The script player: strikes vehicles with the scenario's `[[faults]]` at their times and takes
+//! back what ends.
 //!
 //! | kind | strikes | ends after `duration_s` |
 //! |---|---|---|
@@ -43,7 +44,8 @@ const ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Length of a stall or a boot where the script states none, seconds.
 const DEFAULT_FAULT_S: f32 = 3.0;
 
-/// Refuses what cannot be done to a vehicle: what strikes a companion or its radio needs them in this process.
+/// Refuses what cannot be done to a vehicle: what strikes a companion or its radio needs them in
+/// this process.
 ///
 /// # Errors
 /// Names the fault and the vehicle.
@@ -113,7 +115,9 @@ impl<'a> FaultScript<'a> {
     pub fn is_over(&self) -> bool {
         let ends = |fault: &Fault| fault.duration_s.is_some();
         let mut pairs = self.scenario.faults.iter().zip(&self.stages);
-        pairs.all(|(fault, stage)| *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault)))
+        pairs.all(|(fault, stage)| {
+            *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault))
+        })
     }
 
     /// Begins and ends the faults that are due, and logs each.
@@ -157,7 +161,13 @@ impl<'a> FaultScript<'a> {
                     begin_fault(fault, i, now_us, world)?;
                     "begins"
                 } else {
-                    end_fault(fault, i, now_us, world, f64::from(self.scenario.simulation.serial_corruption));
+                    end_fault(
+                        fault,
+                        i,
+                        now_us,
+                        world,
+                        f64::from(self.scenario.simulation.serial_corruption),
+                    );
                     "ends"
                 };
                 let text = format!("fault {done}: {}", fault.kind);
@@ -168,7 +178,12 @@ impl<'a> FaultScript<'a> {
     }
 }
 
-fn begin_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>) -> anyhow::Result<()> {
+fn begin_fault(
+    fault: &Fault,
+    i: usize,
+    now_us: u64,
+    world: &mut FaultTargets<'_>,
+) -> anyhow::Result<()> {
     let member = &mut world.members[i];
     let spell_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_FAULT_S) * 1e6) as u64;
     match fault.kind {
@@ -182,8 +197,12 @@ fn begin_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_
         }
         "serial-stall" => member.stall_serial(spell_us),
         "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
-        "position-jump" => member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M)),
-        "origin-change" => member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M)),
+        "position-jump" => {
+            member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M))
+        }
+        "origin-change" => {
+            member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M))
+        }
         "gps-loss" => member.autopilot.set_gps_ok(false),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
         "pilot-takeover" => member.autopilot.take_over_by_pilot(),
@@ -205,8 +224,12 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
     match fault.kind {
         "radio-cut" => world.radio.set_outage(i, RadioOutage::default()),
         "serial-corrupt" => member.set_serial_corruption(corruption),
-        "position-jump" => member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M)),
-        "origin-change" => member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M)),
+        "position-jump" => {
+            member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M))
+        }
+        "origin-change" => {
+            member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M))
+        }
         "gps-loss" => member.autopilot.set_gps_ok(true),
         "pilot-takeover" => return_from_pilot(i, now_us, world),
         "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,

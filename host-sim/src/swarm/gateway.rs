@@ -1,8 +1,9 @@
 //! The swarm seen from a ground station: `fly --qgc URL`.
 //!
-//! Each autopilot has one more port for it, with a ground station's rates ([`sim_autopilot::port::GROUND_STREAMS`]); of what
-//! companions send by radio their heartbeats, texts and answers go along. What comes back goes to every autopilot and by
-//! radio to every companion; each heeds what is addressed to it, as behind a real telemetry radio.
+//! Each autopilot has one more port for it, with a ground station's rates
+//! ([`sim_autopilot::port::GROUND_STREAMS`]); of what companions send by radio their heartbeats,
+//! texts and answers go along. What comes back goes to every autopilot and by radio to every
+//! companion; each heeds what is addressed to it, as behind a real telemetry radio.
 
 use std::io;
 use std::rc::Rc;

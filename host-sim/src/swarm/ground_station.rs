@@ -1,6 +1,7 @@
-//! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! commands a vehicle to continue that its pilot gave back, gives the orders of the script, and reports each obstacle
-//! it sees to all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
+//! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl
+//! or a script would, and commands a vehicle to continue that its pilot gave back, gives the orders
+//! of the script, and reports each obstacle it sees to all. A vehicle that cannot fly is not waited
+//! for, and one that is late not for ever.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -137,7 +138,8 @@ impl GroundStation {
                 self.ready_us.get_or_insert(now_us);
             }
             let settled = members.iter().all(|m| state(m) == State::Ready || is_finished(state(m)));
-            let waited = self.ready_us.is_some_and(|since_us| now_us >= since_us + START_WITHOUT_REST_US);
+            let waited =
+                self.ready_us.is_some_and(|since_us| now_us >= since_us + START_WITHOUT_REST_US);
             if !(self.ready_us.is_some() && (settled || waited)) {
                 return Vec::new();
             }

@@ -198,7 +198,8 @@ impl SimulatedVehicle {
         Instant::from_micros(now_us - self.companion_us)
     }
 
-    /// One physics step of the autopilot and all bytes that arrive by its end; what the companion reports goes to `log`.
+    /// One physics step of the autopilot and all bytes that arrive by its end; what the companion
+    /// reports goes to `log`.
     ///
     /// # Errors
     /// Its board hangs or is gone.
@@ -213,8 +214,9 @@ impl SimulatedVehicle {
     ) -> anyhow::Result<()> {
         let now_us = (step + 1) * STEP_US;
         if step % GROUND_CHECK_STEPS == station as u64 % GROUND_CHECK_STEPS {
-            self.ground_m =
-                mission.ground_below(&self.autopilot.true_state().position).unwrap_or(f32::NEG_INFINITY);
+            self.ground_m = mission
+                .ground_below(&self.autopilot.true_state().position)
+                .unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
         if self.killed {
@@ -265,7 +267,12 @@ impl SimulatedVehicle {
         let mut said = |text: &str| {
             say!("board {id}: {text}");
             let t_s = (now_us as f64 * 1e-6) as f32;
-            log.push(report::Event { t_s, vehicle: Some(id), level: Level::Info, text: text.to_owned() });
+            log.push(report::Event {
+                t_s,
+                vehicle: Some(id),
+                level: Level::Info,
+                text: text.to_owned(),
+            });
         };
         let (up, down) = (&mut self.up, &mut self.down);
         board
@@ -329,7 +336,8 @@ impl SimulatedVehicle {
         self.up.describe_fault(lasted_s).or_else(|| self.down.describe_fault(lasted_s))
     }
 
-    /// Passes on to a board without a radio what a ground station sends its companion: by the autopilot, as that forwards it.
+    /// Passes on to a board without a radio what a ground station sends its companion: by the
+    /// autopilot, as that forwards it.
     pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
             self.up.write(now_us, frame);
@@ -374,7 +382,12 @@ impl SimulatedVehicle {
         };
         let colon = if text.is_empty() { "" } else { ": " };
         let text = format!("{from:?} → {to:?}{colon}{text}");
-        report::Event { t_s: (now_us as f64 * 1e-6) as f32, vehicle: Some(self.system_id()), level, text }
+        report::Event {
+            t_s: (now_us as f64 * 1e-6) as f32,
+            vehicle: Some(self.system_id()),
+            level,
+            text,
+        }
     }
 
     /// How it ended: the state of its mission, and why where it left the usual course.
@@ -386,7 +399,8 @@ impl SimulatedVehicle {
         }
     }
 
-    /// The plan that the companion waits for, the most urgent one of several, if it is to be answered.
+    /// The plan that the companion waits for, the most urgent one of several, if it is to be
+    /// answered.
     pub fn next_plan_request(&self) -> Option<PlanKind> {
         if self.planner == Planner::Late { None } else { self.plan_requests.take() }
     }
@@ -402,7 +416,13 @@ impl SimulatedVehicle {
         self.companion.handle_plan(now, wanted, plan);
     }
 
-    fn drain_companion(&mut self, now_us: u64, station: usize, radio: &mut Radio, places: &[Point]) {
+    fn drain_companion(
+        &mut self,
+        now_us: u64,
+        station: usize,
+        radio: &mut Radio,
+        places: &[Point],
+    ) {
         let mut buffer = [0; 512];
         loop {
             let length = self.companion.poll_transmit(Link::Autopilot, &mut buffer);
@@ -452,8 +472,10 @@ impl SimulatedVehicle {
         };
         // A vehicle that stands by order of a person is in no deadlock.
         let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
-        let progress_m =
-            self.board.as_ref().map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
+        let progress_m = self
+            .board
+            .as_ref()
+            .map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
         Observation { position: truth.position, phase, ordered, progress_m }
     }
 }

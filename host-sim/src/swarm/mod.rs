@@ -1,8 +1,10 @@
-//! A whole swarm on the desk: companions and simulated autopilots joined by emulated serial links and a radio.
+//! A whole swarm on the desk: companions and simulated autopilots joined by emulated serial links
+//! and a radio.
 //!
-//! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario gives the same flight,
-//! bit for bit, in debug and release. Every byte between a companion and its autopilot passes a [`serial::SerialLink`],
-//! every byte between companions a [`radio::Radio`]; the [`referee::Referee`] sees the truth and gives it to nobody.
+//! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario
+//! gives the same flight, bit for bit, in debug and release. Every byte between a companion and its
+//! autopilot passes a [`serial::SerialLink`], every byte between companions a [`radio::Radio`]; the
+//! [`referee::Referee`] sees the truth and gives it to nobody.
 
 pub mod board;
 pub mod divisions;
@@ -78,7 +80,8 @@ pub struct Flight {
     pub took_s: f64,
 }
 
-/// Flies a planned mission. `plan` is what the companions will ask for; every one of them gets its part of it.
+/// Flies a planned mission. `plan` is what the companions will ask for; every one of them gets its
+/// part of it.
 pub fn fly(
     mission: &Mission,
     plan: &SwarmPlan,
@@ -136,7 +139,8 @@ fn simulate(
     let mut run = SimulationRun::new(mission, plan, gateway)?;
     let settings = &mission.scenario.simulation;
     // The time of a board behind links is the clock's.
-    let by_clock = mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
+    let by_clock =
+        mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
     let bar = progress.begin_counted_stage("flight", settings.time_limit_s as u64);
     let began = Clock::now();
@@ -179,7 +183,11 @@ fn simulate(
 }
 
 impl<'a> SimulationRun<'a> {
-    fn new(mission: &'a Mission, plan: &'a SwarmPlan, gateway: Option<Gateway>) -> anyhow::Result<Self> {
+    fn new(
+        mission: &'a Mission,
+        plan: &'a SwarmPlan,
+        gateway: Option<Gateway>,
+    ) -> anyhow::Result<Self> {
         let scenario = &mission.scenario;
         let settings = &scenario.simulation;
         let mut members = vehicles_on_pads(mission)?;
@@ -198,12 +206,19 @@ impl<'a> SimulationRun<'a> {
         if gateway.is_some() || scenario.area.is_some() {
             radio.start_recording();
         }
-        let vehicles: Vec<(u8, f32)> = scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
+        let vehicles: Vec<(u8, f32)> =
+            scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
-        let mut referee =
-            Referee::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &vehicles);
-        referee.terrain = scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
-        // Lanes of two vehicles may lie side by side: one waits for as long as the other is on them.
+        let mut referee = Referee::new(
+            mission.map.grid(),
+            mission.clearance_field(),
+            safety_distance_m,
+            &vehicles,
+        );
+        referee.terrain =
+            scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
+        // Lanes of two vehicles may lie side by side: one waits for as long as the other is on
+        // them.
         referee.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {
             mission,
@@ -278,7 +293,9 @@ impl<'a> SimulationRun<'a> {
         let started = self.ground_station.is_started();
         let done = |i: usize| {
             let at_rest = is_finished(members[i].state()) || members[i].is_powerless();
-            at_rest || (!plan.flights[i].task.leaves_pad() && started) || is_left_to_pilot(&members[i])
+            at_rest
+                || (!plan.flights[i].task.leaves_pad() && started)
+                || is_left_to_pilot(&members[i])
         };
         let still = |m: &SimulatedVehicle| !m.autopilot.true_state().armed || is_left_to_pilot(m);
         if !(self.script.is_over() && started && members.iter().all(still)) {
@@ -323,7 +340,10 @@ impl<'a> SimulationRun<'a> {
                 deadlocks: referee.deadlocks,
             },
             roadmap: mission.roadmap_size(),
-            left: Left { reasons: shortage::shortage_lines(mission, plan), ..mission.unserved(plan) },
+            left: Left {
+                reasons: shortage::shortage_lines(mission, plan),
+                ..mission.unserved(plan)
+            },
             coverage: None,
         }
     }
@@ -331,8 +351,10 @@ impl<'a> SimulationRun<'a> {
     fn vehicle_result(&self, i: usize) -> VehicleResult {
         let scenario = &self.mission.scenario;
         // The vehicle cannot know of an error of its estimate.
-        let error_m =
-            margins::max_estimate_error_m(scenario.simulation.estimator, scenario.vehicles[i].personality);
+        let error_m = margins::max_estimate_error_m(
+            scenario.simulation.estimator,
+            scenario.vehicles[i].personality,
+        );
         let nearest_goal_m = self.nearest_goal_m[i] - error_m;
         let flown_m = self.referee.flown_m(i);
         vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
@@ -343,7 +365,8 @@ impl<'a> SimulationRun<'a> {
         !self.plan.flights[i].task.leaves_pad() || (vehicle.reached && vehicle.landed)
     }
 
-    /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row of the table.
+    /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row
+    /// of the table.
     fn is_disabled_by_fault(&self, i: usize) -> bool {
         let member = &self.members[i];
         self.script.is_struck(i)
@@ -357,7 +380,8 @@ impl<'a> SimulationRun<'a> {
     fn log_losses(&mut self, result: &MissionResult) {
         let scenario = &self.mission.scenario;
         for (i, (member, vehicle)) in self.members.iter().zip(&result.vehicles).enumerate() {
-            if let (false, Some(text)) = (self.has_completed_task(i, vehicle), member.link_trouble(self.t_s))
+            if let (false, Some(text)) =
+                (self.has_completed_task(i, vehicle), member.link_trouble(self.t_s))
             {
                 let (t_s, level) = (self.t_s as f32, Level::Error);
                 self.log.push(report::Event { t_s, vehicle: Some(vehicle.id), level, text });
@@ -403,7 +427,8 @@ fn vehicle_result(
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
         _ => member.describe_end(),
     };
-    let flight_time_s = member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
+    let flight_time_s =
+        member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
     VehicleResult {
         id: flight.id,
         goal: flight.task.goal(),

@@ -44,7 +44,13 @@ impl Radio {
     pub fn new(config: RadioConfig, stations: usize, seed: u64) -> Self {
         let under_way = (0..stations).map(|_| VecDeque::new()).collect();
         let cuts = vec![RadioOutage::default(); stations];
-        Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way, overheard: None }
+        Self {
+            config,
+            rng: Pcg32::new(seed, u64::from(u32::MAX)),
+            cuts,
+            under_way,
+            overheard: None,
+        }
     }
 
     /// Keeps the packets that stations send from now on, for [`Self::take_recorded`].
@@ -62,7 +68,8 @@ impl Radio {
         self.cuts[station] = cut;
     }
 
-    /// Sends a packet from a place to every other station; `from` is `None` for one that only sends (the ground).
+    /// Sends a packet from a place to every other station; `from` is `None` for one that only sends
+    /// (the ground).
     pub fn broadcast(&mut self, now_us: u64, from: Option<usize>, places: &[Point], packet: &[u8]) {
         if from.is_some_and(|from| self.cuts[from].tx) {
             return;

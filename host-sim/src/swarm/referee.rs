@@ -1,8 +1,10 @@
-//! The referee: looks at the true motion at every physics step and knows nothing of what companions believe.
+//! The referee: looks at the true motion at every physics step and knows nothing of what companions
+//! believe.
 //!
-//! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the exact map; one that lasts
-//! counts once. While a vehicle takes off or lands, what lies below its centre is the floor it stands on and no wall. A
-//! wreck is an obstacle too: to touch it is a contact, to pass near it no violation.
+//! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the
+//! exact map; one that lasts counts once. While a vehicle takes off or lands, what lies below its
+//! centre is the floor it stands on and no wall. A wreck is an obstacle too: to touch it is a
+//! contact, to pass near it no violation.
 
 use planner_core::Point;
 use planner_core::segment::point_clearance;
@@ -92,8 +94,8 @@ pub struct Referee<'a> {
     touching: Vec<bool>,
     recorded_s: f64,
     window: Sample,
-    /// Whether a standstill that ends was none: where faults strike, vehicles wait until it is known what became of the one
-    /// struck, and for their turn to fly around it.
+    /// Whether a standstill that ends was none: where faults strike, vehicles wait until it is
+    /// known what became of the one struck, and for their turn to fly around it.
     pub waits_end: bool,
     /// Spheres that are on no map: centre and radius, metres.
     pub obstacles: Vec<(Point, f32)>,
@@ -230,14 +232,19 @@ impl<'a> Referee<'a> {
             false
         };
         let touches = touches || (flying && self.reaches_ground(&now.position, radius_m));
-        let inside =
-            |&(centre, extent_m): &(Point, f32)| (now.position - centre).norm() < radius_m + extent_m;
+        let inside = |&(centre, extent_m): &(Point, f32)| {
+            (now.position - centre).norm() < radius_m + extent_m
+        };
         let touches = touches || self.obstacles.iter().any(inside);
         let was_touching = std::mem::replace(&mut self.vehicles[i].in_contact, touches);
         if touches && !was_touching {
             self.wall_contacts += 1;
             let [x, y, z] = now.position.into();
-            self.incidents.push((t_s, i, format!("touches an obstacle at [{x:.2}, {y:.2}, {z:.2}]")));
+            self.incidents.push((
+                t_s,
+                i,
+                format!("touches an obstacle at [{x:.2}, {y:.2}, {z:.2}]"),
+            ));
         }
     }
 
@@ -245,7 +252,9 @@ impl<'a> Referee<'a> {
     fn touches_beside(&self, position: &Point, radius_m: f32) -> bool {
         let shape = self.grid.shape();
         let reach = Point::repeat(radius_m);
-        let cell = |p: Point| [0, 1, 2].map(|a| ((p[a] - shape.min[a]) / shape.resolution_m).floor() as i64);
+        let cell = |p: Point| {
+            [0, 1, 2].map(|a| ((p[a] - shape.min[a]) / shape.resolution_m).floor() as i64)
+        };
         let (low, high) = (cell(position - reach), cell(position + reach));
         let dims = shape.dims.map(i64::from);
         let inside = |c: [i64; 3]| (0..3).all(|a| c[a] >= 0 && c[a] < dims[a]);
@@ -255,9 +264,11 @@ impl<'a> Referee<'a> {
                     if !inside([i, j, k]) || !self.grid.is_occupied([i, j, k].map(|c| c as u32)) {
                         return false;
                     }
-                    let corner = shape.min + Point::new(i as f32, j as f32, k as f32) * shape.resolution_m;
+                    let corner =
+                        shape.min + Point::new(i as f32, j as f32, k as f32) * shape.resolution_m;
                     let top = corner.z + shape.resolution_m;
-                    let nearest = position.sup(&corner).inf(&(corner + Point::repeat(shape.resolution_m)));
+                    let nearest =
+                        position.sup(&corner).inf(&(corner + Point::repeat(shape.resolution_m)));
                     top > position.z && (nearest - position).norm() < radius_m - CONTACT_ROUNDING_M
                 })
             })
@@ -285,13 +296,20 @@ impl<'a> Referee<'a> {
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
                 if near && !was_near {
                     self.violations += 1;
-                    let text = format!("nearer than the safety distance to vehicle {}", self.vehicles[j].id);
+                    let text = format!(
+                        "nearer than the safety distance to vehicle {}",
+                        self.vehicles[j].id
+                    );
                     self.incidents.push((t_s, i, text));
                 }
                 let touches = apart < self.vehicles[i].radius_m + self.vehicles[j].radius_m;
                 let was_touching = std::mem::replace(&mut self.touching[i * n + j], touches);
                 if touches && !was_touching {
-                    self.incidents.push((t_s, i, format!("touches vehicle {}", self.vehicles[j].id)));
+                    self.incidents.push((
+                        t_s,
+                        i,
+                        format!("touches vehicle {}", self.vehicles[j].id),
+                    ));
                 }
             }
         }
@@ -306,14 +324,16 @@ impl<'a> Referee<'a> {
             return;
         }
         self.wall_contacts += 1;
-        let what = if phase == Phase::Falling { "is hit by falling" } else { "touches the wreck of" };
+        let what =
+            if phase == Phase::Falling { "is hit by falling" } else { "touches the wreck of" };
         self.incidents.push((t_s, flier, format!("{what} vehicle {}", self.vehicles[wreck].id)));
     }
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
         // Progress does not fall: it is that along another path.
-        let anew = now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
+        let anew =
+            now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
         if let Some(progress_m) = anew {
             vehicle.best_progress_m = progress_m - OFF_HOVER_M;
         }
@@ -330,7 +350,8 @@ impl<'a> Referee<'a> {
             if std::mem::take(&mut vehicle.stuck) && ends && self.waits_end {
                 self.deadlocks -= 1;
                 let text = no_progress();
-                if let Some(at) = self.incidents.iter().rposition(|(_, who, what)| *who == i && *what == text)
+                if let Some(at) =
+                    self.incidents.iter().rposition(|(_, who, what)| *who == i && *what == text)
                 {
                     self.incidents.remove(at);
                 }
@@ -349,7 +370,8 @@ fn no_progress() -> String {
 
 /// Greatest clearance that is measured, metres.
 const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
-const NOTHING: Sample = Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
+const NOTHING: Sample =
+    Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
 
 #[cfg(test)]
 mod tests {
@@ -408,8 +430,9 @@ mod tests {
     #[test]
     fn a_near_pair_is_one_violation_unless_both_stand() {
         with_monitor(|mut referee| {
-            let pair =
-                |apart: f32, phase| [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)];
+            let pair = |apart: f32, phase| {
+                [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)]
+            };
             referee.observe(0.0, &pair(1.0, Phase::Grounded));
             assert_eq!(referee.violations, 0);
             referee.observe(0.1, &pair(1.4, Phase::Flying));
@@ -478,7 +501,8 @@ mod tests {
                 referee.observe(f64::from(step) * 0.1, &on_path(2.5));
             }
             assert_eq!(referee.deadlocks, 1);
-            let lands = [at(2.5, 2.0, 5.0, Phase::TakeOffOrLanding), at(5.0, 5.0, 5.0, Phase::Grounded)];
+            let lands =
+                [at(2.5, 2.0, 5.0, Phase::TakeOffOrLanding), at(5.0, 5.0, 5.0, Phase::Grounded)];
             referee.observe(60.0, &lands);
             assert_eq!(referee.deadlocks, 0);
         });

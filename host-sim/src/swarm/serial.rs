@@ -1,6 +1,7 @@
 //! An emulated serial link, one direction: baud rate, latency, corruption and stalls.
 //!
-//! A byte takes ten bit times (8N1). What does not fit the transmit buffer is lost, as on a UART without flow control.
+//! A byte takes ten bit times (8N1). What does not fit the transmit buffer is lost, as on a UART
+//! without flow control.
 
 use std::collections::VecDeque;
 
@@ -68,7 +69,8 @@ impl SerialLink {
         let lost = share(self.overrun, self.offered);
         if lost > EXPLAINING_SHARE {
             let offered = (self.offered as f64 / lasted_s.max(1e-3)) as u64;
-            let enough = BAUDS.iter().find(|baud| *baud / 10 > offered).unwrap_or(&BAUDS[BAUDS.len() - 1]);
+            let enough =
+                BAUDS.iter().find(|baud| *baud / 10 > offered).unwrap_or(&BAUDS[BAUDS.len() - 1]);
             return Some(format!(
                 "its serial link lost {:.0} % of the bytes: {} baud carry {} bytes a second, {offered} were to be sent; \
                  simulation.serial_baud of {enough} would do",
@@ -124,7 +126,8 @@ impl SerialLink {
         }
     }
 
-    /// Takes the next write whose last byte arrives by `until_us`: its time of arrival, which may be in the future, and its bytes.
+    /// Takes the next write whose last byte arrives by `until_us`: its time of arrival, which may
+    /// be in the future, and its bytes.
     pub fn next_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
         let &(arrives_us, length) = self.writes.front()?;
         if arrives_us > until_us || until_us < self.stalled_until_us {

@@ -1,4 +1,5 @@
-//! The vehicles of a simulation: what the scenario says of each becomes a simulated autopilot and a companion's settings.
+//! The vehicles of a simulation: what the scenario says of each becomes a simulated autopilot and a
+//! companion's settings.
 
 use companion::Config;
 use companion::config::REACHES_ALL_M;
@@ -41,7 +42,9 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
             let limits = autopilot::VehicleLimits {
                 radius_m: vehicle.radius_m,
                 speed_max_mps: vehicle.speed_max_mps,
-                endurance_s: vehicle.endurance_s.unwrap_or(autopilot::VehicleLimits::default().endurance_s),
+                endurance_s: vehicle
+                    .endurance_s
+                    .unwrap_or(autopilot::VehicleLimits::default().endurance_s),
                 ..autopilot::VehicleLimits::default()
             };
             let mut config = autopilot::Config {
@@ -50,7 +53,9 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
                 world_origin: scenario.map.origin,
                 // EKF origin where the autopilot was switched on, unless the scenario says
                 // otherwise: no two vehicles share it.
-                ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
+                ekf_origin: vehicle
+                    .ekf_origin
+                    .unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
                 home: vehicle.home,
                 start: pad,
                 vehicle: limits,
@@ -86,12 +91,13 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
         .collect()
 }
 
-/// The settings of the companion of one vehicle: the mission file's, with the scenario's fence, method and radio range; the same
-/// whether it runs in a swarm simulation or alone.
+/// The settings of the companion of one vehicle: the mission file's, with the scenario's fence,
+/// method and radio range; the same whether it runs in a swarm simulation or alone.
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().companion_config(id);
-    let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
+    let config =
+        config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
     // One plan may be flown by other rules and inside another fence than its mission file says.
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));

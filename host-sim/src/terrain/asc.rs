@@ -1,5 +1,5 @@
-//! ESRI ASCII grids: six lines of a header, then heights row by row from the north. The format has no place for units:
-//! metres. A `.prj` beside the file says where its numbers are.
+//! ESRI ASCII grids: six lines of a header, then heights row by row from the north. The format has
+//! no place for units: metres. A `.prj` beside the file says where its numbers are.
 
 use std::path::Path;
 
@@ -60,7 +60,8 @@ pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
             other => return Err(bad(&format!("its header has a {other}"))),
         }
     }
-    let need = |value: Option<f64>, name: &str| value.ok_or_else(|| bad(&format!("{name} is missing")));
+    let need =
+        |value: Option<f64>, name: &str| value.ok_or_else(|| bad(&format!("{name} is missing")));
     let [columns, rows] = [need(size[0], "ncols")?, need(size[1], "nrows")?];
     let whole = |n: f64| n >= 1.0 && n.fract() == 0.0;
     if !whole(columns) || !whole(rows) {
@@ -71,7 +72,9 @@ pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     }
     let cell = [need(cell[0], "cellsize")?, need(cell[1], "cellsize")?];
     let mut low = [need(corner[0], "xllcorner")?, need(corner[1], "yllcorner")?];
-    if !cell.iter().all(|side| *side > 0.0 && side.is_finite()) || !low.iter().all(|at| at.is_finite()) {
+    if !cell.iter().all(|side| *side > 0.0 && side.is_finite())
+        || !low.iter().all(|at| at.is_finite())
+    {
         return Err(bad("its cells have no size or place"));
     }
     for axis in 0..2 {
@@ -81,10 +84,25 @@ pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     let mut heights_m = Vec::with_capacity((columns * rows).min(text.len() / 2 + 1));
     for word in words {
         let value: f64 = word.parse().map_err(|_| bad(&format!("{word} is no height")))?;
-        heights_m.push(if value == missing || !value.is_finite() { f32::NAN } else { value as f32 });
+        heights_m.push(if value == missing || !value.is_finite() {
+            f32::NAN
+        } else {
+            value as f32
+        });
     }
     if heights_m.len() != columns * rows {
-        return Err(bad(&format!("it has {} heights, its header says {}", heights_m.len(), columns * rows)));
+        return Err(bad(&format!(
+            "it has {} heights, its header says {}",
+            heights_m.len(),
+            columns * rows
+        )));
     }
-    Ok(Raster { crs, columns, rows, corner: [low[0], low[1] + rows as f64 * cell[1]], cell, heights_m })
+    Ok(Raster {
+        crs,
+        columns,
+        rows,
+        corner: [low[0], low[1] + rows as f64 * cell[1]],
+        cell,
+        heights_m,
+    })
 }

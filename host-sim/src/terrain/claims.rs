@@ -1,7 +1,8 @@
 //! What a point cloud says of its own sizes, before its readers believe it: they take memory by it.
 //!
-//! LAS 1.4 specification, R15: the header, and records behind it of 54 bytes and behind the returns of 60; LAZ: a table of
-//! chunks, whose place stands before the returns or, where it could not, at the end of the file, and layers in each chunk.
+//! LAS 1.4 specification, R15: the header, and records behind it of 54 bytes and behind the returns
+//! of 60; LAZ: a table of chunks, whose place stands before the returns or, where it could not, at
+//! the end of the file, and layers in each chunk.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -10,8 +11,11 @@ const MAX_CHUNKS: u32 = 1 << 22;
 /// Number of the record that names the compressor.
 const COMPRESSOR_RECORD: u64 = 22204;
 
-/// Whether no size that a reader would take memory for is beyond the file. It reads from the beginning again.
-pub(super) fn check_declared_sizes<R: Read + Seek>(file: &mut R) -> io::Result<Result<(), &'static str>> {
+/// Whether no size that a reader would take memory for is beyond the file. It reads from the
+/// beginning again.
+pub(super) fn check_declared_sizes<R: Read + Seek>(
+    file: &mut R,
+) -> io::Result<Result<(), &'static str>> {
     let length = file.seek(SeekFrom::End(0))?;
     let outcome = check_sizes(file, length)?;
     file.seek(SeekFrom::Start(0))?;
@@ -36,8 +40,8 @@ impl<R: Read + Seek> Numbers<'_, R> {
         Ok(u64::from_le_bytes(number))
     }
 
-    /// The bytes of a chunk's first return, and its layers, as the record of the compressor has them: none where chunks have
-    /// no layers.
+    /// The bytes of a chunk's first return, and its layers, as the record of the compressor has
+    /// them: none where chunks have no layers.
     fn read_layers(&mut self) -> io::Result<Option<(u64, u64)>> {
         let (mut at, count) = (self.read_number(94, 2)?, self.read_number(100, 4)?);
         for _ in 0..count.min(self.length / 54) {
@@ -47,7 +51,8 @@ impl<R: Read + Seek> Numbers<'_, R> {
                 let (mut first, mut layers) = (0, 0);
                 for item in 0..items {
                     let item_at = at + 54 + 34 + 6 * item;
-                    let (kind, bytes) = (self.read_number(item_at, 2)?, self.read_number(item_at + 2, 2)?);
+                    let (kind, bytes) =
+                        (self.read_number(item_at, 2)?, self.read_number(item_at + 2, 2)?);
                     first += bytes;
                     layers += match kind {
                         10 => 9,
@@ -79,7 +84,11 @@ fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(
         }
         for _ in 0..count {
             let size = numbers.read_number(at.saturating_add(20), 8)?;
-            match at.checked_add(60).and_then(|at| at.checked_add(size)).filter(|end| *end <= length) {
+            match at
+                .checked_add(60)
+                .and_then(|at| at.checked_add(size))
+                .filter(|end| *end <= length)
+            {
                 Some(end) => at = end,
                 None => return Ok(Err("a record behind its returns is longer than the file")),
             }

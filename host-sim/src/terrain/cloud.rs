@@ -1,7 +1,7 @@
 //! Point clouds: the highest return of a cell.
 //!
-//! Cells hold four returns on average, so that few have none; those between others take the highest near them. Returns
-//! that are marked as noise or withheld do not count.
+//! Cells hold four returns on average, so that few have none; those between others take the highest
+//! near them. Returns that are marked as noise or withheld do not count.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
@@ -89,11 +89,13 @@ where
 /// of their own are in that of the places.
 fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
     let record = |id: u16| {
-        let found =
-            header.all_vlrs().find(|vlr| vlr.user_id.starts_with("LASF_Projection") && vlr.record_id == id);
+        let found = header
+            .all_vlrs()
+            .find(|vlr| vlr.user_id.starts_with("LASF_Projection") && vlr.record_id == id);
         found.map(|vlr| &vlr.data[..])
     };
-    let text = record(2112).map(|bytes| String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned());
+    let text =
+        record(2112).map(|bytes| String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned());
     let directory =
         record(34735).unwrap_or_default().chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]));
     let keys = GeoKeys::new(&directory.collect::<Vec<_>>());
@@ -118,17 +120,20 @@ fn empty_grid(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGri
     let (low, high) = ([bounds.min.x, bounds.min.y], [bounds.max.x, bounds.max.y]);
     let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
     let corners = corners.iter().filter_map(|corner| crs.to_mission(frame.origin, *corner));
-    let whole = corners.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])]);
+    let whole =
+        corners.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])]);
     let count = header.number_of_points();
     let Some([low, high]) = whole.filter(|_| count > 0) else {
         return HeightGrid::new([Flat::zeros(); 2], 1.0);
     };
     let sides = high - low;
-    let cell_m =
-        (f64::from(sides.x) * f64::from(sides.y) * RETURNS_PER_CELL / count as f64).sqrt().max(MIN_CELL_M);
+    let cell_m = (f64::from(sides.x) * f64::from(sides.y) * RETURNS_PER_CELL / count as f64)
+        .sqrt()
+        .max(MIN_CELL_M);
     let cell_m = cell_m as f32;
     // The last return is in a cell too.
     let half = Flat::repeat(cell_m / 2.0);
-    let window = frame.window.map_or([low - half, high + half], |window| widened_window(window, cell_m));
+    let window =
+        frame.window.map_or([low - half, high + half], |window| widened_window(window, cell_m));
     HeightGrid::new(window, cell_m)
 }

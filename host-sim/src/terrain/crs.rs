@@ -35,7 +35,9 @@ impl System {
     /// The system by its number in the EPSG register.
     pub(super) fn epsg(code: u16) -> Result<Self, TerrainError> {
         let name = format!("EPSG:{code}");
-        let Some(found) = crs_definitions::from_code(code) else { return Err(TerrainError::system(&name)) };
+        let Some(found) = crs_definitions::from_code(code) else {
+            return Err(TerrainError::system(&name));
+        };
         Self::proj(found.proj4, &name)
     }
 
@@ -46,21 +48,24 @@ impl System {
         // The system of heights stands beside that of places: only the latter is parsed.
         let start = ["PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOGCS", "GEOGCRS", "GEODCRS"];
         let start = start.iter().find_map(|word| text.find(word)).ok_or_else(unusable)?;
-        let proj =
-            proj4wkt::wkt_to_projstring(up_to_closing_bracket(&text[start..])).map_err(|_| unusable())?;
+        let proj = proj4wkt::wkt_to_projstring(up_to_closing_bracket(&text[start..]))
+            .map_err(|_| unusable())?;
         Self::proj(&proj, &name)
     }
 
     fn proj(definition: &str, name: &str) -> Result<Self, TerrainError> {
         let unusable = || TerrainError::system(name);
         // A shift by a grid that is not here would be left out in silence.
-        if ["+datum=NAD27", "+nadgrids=@", "+geoidgrids"].iter().any(|shift| definition.contains(shift))
+        if ["+datum=NAD27", "+nadgrids=@", "+geoidgrids"]
+            .iter()
+            .any(|shift| definition.contains(shift))
             && !definition.contains("+nadgrids=@null")
         {
             return Err(unusable());
         }
         let own = Proj::from_proj_string(definition).map_err(|_| unusable())?;
-        let wgs84 = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").map_err(|_| unusable())?;
+        let wgs84 = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs")
+            .map_err(|_| unusable())?;
         if own.is_geocent() || !own.is_normalized_axis() || !own.has_inverse() {
             return Err(unusable());
         }
@@ -101,7 +106,8 @@ impl Crs {
         }
     }
 
-    /// Metres in a unit of height, where the file gives heights no unit of their own: the unit across, or metres beside degrees.
+    /// Metres in a unit of height, where the file gives heights no unit of their own: the unit
+    /// across, or metres beside degrees.
     pub(super) fn height_unit_m(&self) -> f64 {
         match self {
             Self::Unsaid => 1.0,
@@ -126,7 +132,8 @@ impl Crs {
         match self {
             Self::Unsaid => Some([f64::from(place.x), f64::from(place.y)]),
             Self::Said(system) => {
-                // At the origin's altitude there, not on the plane that touches the earth at the origin.
+                // At the origin's altitude there, not on the plane that touches the earth at the
+                // origin.
                 let mut up_m = 0.0;
                 let mut found = *origin;
                 for _ in 0..3 {
@@ -145,7 +152,9 @@ pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
         9001 => Ok(1.0),
         9002 => Ok(FOOT_M),
         9003 => Ok(US_FOOT_M),
-        other => Err(TerrainError::System { what: format!("units of EPSG:{other}"), hint: WARP_HINT }),
+        other => {
+            Err(TerrainError::System { what: format!("units of EPSG:{other}"), hint: WARP_HINT })
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! The field that vehicles follow, made of a height map: `field.bin`.
 //!
-//! A node is the highest ground within [`READ_AROUND_SAMPLE_CELLS`] of a cell and of what a vehicle may be beside its path; then nodes are
-//! raised until none is steeper than vehicles climb and descend at cruise speed. All of the box must have heights.
+//! A node is the highest ground within [`READ_AROUND_SAMPLE_CELLS`] of a cell and of what a vehicle
+//! may be beside its path; then nodes are raised until none is steeper than vehicles climb and
+//! descend at cruise speed. All of the box must have heights.
 
 use planner_core::coverage::Flat;
 use planner_core::field::{self, FieldShape, HEIGHT_STEP_M, MAX_NODES};
@@ -63,7 +64,8 @@ impl FieldConfig {
 
     /// The box of heights that a field needs, but for the map's cells that are read around any box.
     pub fn window(&self) -> [Flat; 2] {
-        let beyond = Flat::repeat((READ_AROUND_SAMPLE_CELLS + 1.0) * self.least_cell_m() + self.reach_m);
+        let beyond =
+            Flat::repeat((READ_AROUND_SAMPLE_CELLS + 1.0) * self.least_cell_m() + self.reach_m);
         [self.area[0] - beyond, self.area[1] + beyond]
     }
 }
@@ -76,7 +78,8 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
     let cell_m = config.least_cell_m().max(grid.cell_m());
     let [low, high] = config.area;
     let count = |side: f32| ((side / cell_m).ceil() + 1.0).max(2.0) as u16;
-    let shape = FieldShape { low, cell_m, columns: count(high.x - low.x), rows: count(high.y - low.y) };
+    let shape =
+        FieldShape { low, cell_m, columns: count(high.x - low.x), rows: count(high.y - low.y) };
     if shape.node_count() > MAX_NODES {
         return Err(FieldError::Shape);
     }
@@ -106,7 +109,8 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Raises nodes until no two beside each other differ by more than `most`: a distance transform, in two passes.
+/// Raises nodes until no two beside each other differ by more than `most`: a distance transform, in
+/// two passes.
 fn limit_slope(nodes_dm: &mut [i16], columns: usize, most: i32) {
     let raise = |nodes_dm: &mut [i16], own: usize, other: usize| {
         let least = (i32::from(nodes_dm[other]) - most).max(i32::from(i16::MIN)) as i16;

@@ -10,8 +10,8 @@ pub struct Frame<'a> {
     pub origin: &'a Geodetic,
     /// Whether numbers that name no coordinate system are metres about the origin.
     pub metres: bool,
-    /// The box that is wanted, metres: its least and its greatest corner; some cells around it are read too. All of the
-    /// file where absent.
+    /// The box that is wanted, metres: its least and its greatest corner; some cells around it are
+    /// read too. All of the file where absent.
     pub window: Option<[Flat; 2]>,
 }
 

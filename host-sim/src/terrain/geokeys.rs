@@ -14,8 +14,8 @@ const HEIGHT_UNIT: u16 = 4099;
 const OWN: u16 = 32767;
 /// Heights above sea level in metres, as countries and the earth have them.
 const METRES: [u16; 18] = [
-    3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647, 7837,
-    9274,
+    3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647,
+    7837, 9274,
 ];
 /// Heights above sea level in feet, international and of the US survey.
 const FEET: [u16; 1] = [8228];
@@ -48,7 +48,9 @@ impl GeoKeys {
         let system = match (self.get(MODEL), projected, geographic) {
             (Some(1), Some(code), _) if code != OWN => System::epsg(code)?,
             (Some(2), _, Some(code)) if code != OWN => System::epsg(code)?,
-            (Some(3), ..) => return Err(TerrainError::system("coordinates about the middle of the earth")),
+            (Some(3), ..) => {
+                return Err(TerrainError::system("coordinates about the middle of the earth"));
+            }
             _ => match wkt {
                 Some(wkt) => System::wkt(wkt)?,
                 None if self.0.is_empty() => return Ok(Crs::Unsaid),
@@ -75,7 +77,9 @@ impl GeoKeys {
             Some(code) if METRES.contains(&code) => Ok(Some(1.0)),
             Some(code) if FEET.contains(&code) => Ok(Some(super::crs::FOOT_M)),
             Some(code) if US_FEET.contains(&code) => Ok(Some(super::crs::US_FOOT_M)),
-            Some(code) => Err(TerrainError::system(&format!("heights of EPSG:{code} without their unit"))),
+            Some(code) => {
+                Err(TerrainError::system(&format!("heights of EPSG:{code} without their unit")))
+            }
         }
     }
 }

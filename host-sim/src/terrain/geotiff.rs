@@ -33,7 +33,9 @@ fn bad_file(why: &impl ToString) -> TerrainError {
 
 fn malformed(error: TiffError) -> TerrainError {
     match error {
-        TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => error.into(),
+        TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
+            error.into()
+        }
         other => bad_file(&other),
     }
 }
@@ -54,7 +56,9 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     }
     match decoder.colortype().map_err(malformed)? {
         ColorType::Gray(_) => {}
-        other => return Err(bad_file(&format!("it has colours ({other:?}), not one height a cell"))),
+        other => {
+            return Err(bad_file(&format!("it has colours ({other:?}), not one height a cell")));
+        }
     }
     let keys = decoder.find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag).map_err(malformed)?;
     let keys = GeoKeys::new(&keys.unwrap_or_default());
@@ -74,7 +78,8 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let missing = missing.and_then(|value| value.into_string().ok());
     let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
     let (corner, cell) = georeference(&mut decoder, keys.is_pixel_point())?;
-    let value_m = |value: f64| match missing.is_some_and(|m| is_missing_value(value, m)) || !value.is_finite()
+    let value_m = |value: f64| match missing.is_some_and(|m| is_missing_value(value, m))
+        || !value.is_finite()
     {
         true => f32::NAN,
         false => (value * unit_m) as f32,
@@ -133,7 +138,9 @@ fn georeference<R: Read + Seek>(
             }
         },
     };
-    if !cell.iter().all(|side| *side > 0.0 && side.is_finite()) || !corner.iter().all(|at| at.is_finite()) {
+    if !cell.iter().all(|side| *side > 0.0 && side.is_finite())
+        || !corner.iter().all(|at| at.is_finite())
+    {
         return Err(bad_file(&"its cells have no size or place"));
     }
     if points {

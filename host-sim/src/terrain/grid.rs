@@ -43,7 +43,13 @@ impl HeightGrid {
             return Err(TerrainError::TooManyCells((columns * rows) as u128));
         }
         let size = [columns as usize, rows as usize];
-        Ok(Self { low, cell_m, size, heights_m: vec![f32::NAN; size[0] * size[1]], middles_m: Vec::new() })
+        Ok(Self {
+            low,
+            cell_m,
+            size,
+            heights_m: vec![f32::NAN; size[0] * size[1]],
+            middles_m: Vec::new(),
+        })
     }
 
     /// Side of a cell, metres.
@@ -84,7 +90,8 @@ impl HeightGrid {
         Some([known().reduce(f32::min)?, known().reduce(f32::max)?])
     }
 
-    /// The height at a place, metres: what the file has at the middle of the cell it is in; none in holes and outside.
+    /// The height at a place, metres: what the file has at the middle of the cell it is in; none in
+    /// holes and outside.
     pub fn height_at(&self, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_of(place)?;
         match self.middles_m.get(row * self.size[0] + column) {
@@ -118,7 +125,8 @@ impl HeightGrid {
             for column in ranges[0].0..=ranges[0].1 {
                 match self.cell_height([column, row]) {
                     Some(height_m) => {
-                        let highest_m = found.highest_m.map_or(height_m, |other| other.max(height_m));
+                        let highest_m =
+                            found.highest_m.map_or(height_m, |other| other.max(height_m));
                         found.highest_m = Some(highest_m);
                     }
                     None => found.holes = true,
@@ -151,7 +159,8 @@ impl HeightGrid {
         true
     }
 
-    /// Gives holes that lie between cells with heights, at most `reach` away on both sides, the greatest height so near.
+    /// Gives holes that lie between cells with heights, at most `reach` away on both sides, the
+    /// greatest height so near.
     pub(super) fn fill_holes(&mut self, reach: usize) {
         let before = self.clone();
         let [columns, rows] = self.size;
@@ -161,11 +170,12 @@ impl HeightGrid {
                     continue;
                 }
                 let known = |range: std::ops::RangeInclusive<usize>, fixed: usize, across: bool| {
-                    range
-                        .into_iter()
-                        .any(|k| before.cell_height(if across { [k, fixed] } else { [fixed, k] }).is_some())
+                    range.into_iter().any(|k| {
+                        before.cell_height(if across { [k, fixed] } else { [fixed, k] }).is_some()
+                    })
                 };
-                let (left, right) = (column.saturating_sub(reach), (column + reach).min(columns - 1));
+                let (left, right) =
+                    (column.saturating_sub(reach), (column + reach).min(columns - 1));
                 let (down, up) = (row.saturating_sub(reach), (row + reach).min(rows - 1));
                 let across = known(left..=column, row, true) && known(column..=right, row, true);
                 let along = known(down..=row, column, false) && known(row..=up, column, false);

@@ -1,4 +1,5 @@
-//! The decoder of compressed point clouds panics on damaged bytes. Here that ends in an error, without a word of its own.
+//! The decoder of compressed point clouds panics on damaged bytes. Here that ends in an error,
+//! without a word of its own.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};

@@ -1,8 +1,8 @@
 //! Rows of cells in a file's own coordinates, laid out in the mission frame.
 //!
-//! A cell of the grid has the height of the file's cell at its middle, or a greater one of a file's cell whose middle is in
-//! it. So no height is lost where the grids are turned against each other, and the highest in a box that is a cell wider
-//! each way is never less than in the file.
+//! A cell of the grid has the height of the file's cell at its middle, or a greater one of a file's
+//! cell whose middle is in it. So no height is lost where the grids are turned against each other,
+//! and the highest in a box that is a cell wider each way is never less than in the file.
 
 use planner_core::coverage::Flat;
 use planner_core::frames::Geodetic;
@@ -43,11 +43,12 @@ impl Raster {
         let origin = frame.origin;
         let window = match frame.window {
             Some(window) => window,
-            None => {
-                self.bounds(origin).ok_or_else(|| TerrainError::system("a system that ends before it"))?
-            }
+            None => self
+                .bounds(origin)
+                .ok_or_else(|| TerrainError::system("a system that ends before it"))?,
         };
-        let nothing = |window: [Flat; 2]| HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
+        let nothing =
+            |window: [Flat; 2]| HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
         let Some(touched) = self.touched_cells(origin, window) else { return nothing(window) };
         let middle = touched.map(|(from, to)| (from + to) as f64 / 2.0);
         let cell_m = self
@@ -57,7 +58,9 @@ impl Raster {
             Some(window) => self.align_box(origin, widened_window(window, cell_m), cell_m),
             None => window,
         };
-        let Some([columns, rows]) = self.touched_cells(origin, window) else { return nothing(window) };
+        let Some([columns, rows]) = self.touched_cells(origin, window) else {
+            return nothing(window);
+        };
         let mut grid = HeightGrid::new(window, cell_m)?;
         let [across, up] = grid.size();
         for row in 0..up {
@@ -73,7 +76,9 @@ impl Raster {
             for column in columns.0..columns.1 {
                 let height_m = self.heights_m[row * self.columns + column];
                 let place = self.file_coordinates(column as f64 + 0.5, row as f64 + 0.5);
-                if let Some(place) = self.crs.to_mission(origin, place).filter(|_| !height_m.is_nan()) {
+                if let Some(place) =
+                    self.crs.to_mission(origin, place).filter(|_| !height_m.is_nan())
+                {
                     grid.raise_cell(&place, height_m);
                 }
             }
@@ -84,17 +89,21 @@ impl Raster {
     /// The height of the file's cell that a place is in.
     pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_coordinates(self.crs.of_mission(origin, place)?);
-        let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
-        let height_m = inside.then(|| self.heights_m[row as usize * self.columns + column as usize])?;
+        let inside =
+            column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
+        let height_m =
+            inside.then(|| self.heights_m[row as usize * self.columns + column as usize])?;
         (!height_m.is_nan()).then_some(height_m)
     }
 
-    /// A box that begins at the corner of one of the file's cells: where both grids lie alike their cells are the same.
+    /// A box that begins at the corner of one of the file's cells: where both grids lie alike their
+    /// cells are the same.
     fn align_box(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
         let corner = self.crs.to_mission(origin, self.file_coordinates(0.0, self.rows as f64));
         let Some(corner) = corner.filter(|corner| corner.amax() < 1e6) else { return [low, high] };
         let down = |axis: usize| {
-            let cells = ((f64::from(low[axis]) - f64::from(corner[axis])) / f64::from(cell_m)).floor();
+            let cells =
+                ((f64::from(low[axis]) - f64::from(corner[axis])) / f64::from(cell_m)).floor();
             (f64::from(corner[axis]) + cells * f64::from(cell_m)) as f32
         };
         [Flat::new(down(0), down(1)), high]
@@ -105,20 +114,27 @@ impl Raster {
         let (columns, rows) = (self.columns as f64, self.rows as f64);
         let shares = || (0..=8).map(|k| f64::from(k) / 8.0);
         let border = shares().flat_map(|s| shares().map(move |t| (s, t)));
-        let places = border
-            .filter_map(|(s, t)| self.crs.to_mission(origin, self.file_coordinates(s * columns, t * rows)));
+        let places = border.filter_map(|(s, t)| {
+            self.crs.to_mission(origin, self.file_coordinates(s * columns, t * rows))
+        });
         places.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])
     }
 
     /// Columns and rows that a box may touch, from and to; none where it touches none.
-    fn touched_cells(&self, origin: &Geodetic, [low, high]: [Flat; 2]) -> Option<[(usize, usize); 2]> {
+    fn touched_cells(
+        &self,
+        origin: &Geodetic,
+        [low, high]: [Flat; 2],
+    ) -> Option<[(usize, usize); 2]> {
         let shares = || (0..=8).map(|k| k as f32 / 8.0);
-        let places =
-            shares().flat_map(|s| shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t))));
-        let cells =
-            places.filter_map(|place| Some(self.cell_coordinates(self.crs.of_mission(origin, &place)?)));
+        let places = shares().flat_map(|s| {
+            shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t)))
+        });
+        let cells = places
+            .filter_map(|place| Some(self.cell_coordinates(self.crs.of_mission(origin, &place)?)));
         let [from, to] = cells.map(|cell| [cell, cell]).reduce(|a, b| {
-            let pick = |f: fn(f64, f64) -> f64, i: usize| [f(a[i][0], b[i][0]), f(a[i][1], b[i][1])];
+            let pick =
+                |f: fn(f64, f64) -> f64, i: usize| [f(a[i][0], b[i][0]), f(a[i][1], b[i][1])];
             [pick(f64::min, 0), pick(f64::max, 1)]
         })?;
         let range = |axis: usize, most: usize| {
@@ -133,9 +149,11 @@ impl Raster {
 
     /// The shorter side of a cell, metres.
     fn cell_m(&self, origin: &Geodetic, [column, row]: [f64; 2]) -> Option<f32> {
-        let at = |column: f64, row: f64| self.crs.to_mission(origin, self.file_coordinates(column, row));
+        let at =
+            |column: f64, row: f64| self.crs.to_mission(origin, self.file_coordinates(column, row));
         let here = at(column, row)?;
-        let sides = [(at(column + 1.0, row)? - here).norm(), (at(column, row + 1.0)? - here).norm()];
+        let sides =
+            [(at(column + 1.0, row)? - here).norm(), (at(column, row + 1.0)? - here).norm()];
         Some(sides[0].min(sides[1]))
     }
 }

@@ -22,8 +22,15 @@ pub(super) fn anywhere(origin: &Geodetic) -> Frame<'_> {
     Frame { origin, metres: false, window: None }
 }
 
-/// A GeoTIFF of signed 16 bit numbers: in `system`, its first corner and cell size as given, 99 for no height.
-pub(super) fn tiff(size: [u32; 2], values: &[i16], system: &[u16], corner: [f64; 2], cell: f64) -> Vec<u8> {
+/// A GeoTIFF of signed 16 bit numbers: in `system`, its first corner and cell size as given, 99 for
+/// no height.
+pub(super) fn tiff(
+    size: [u32; 2],
+    values: &[i16],
+    system: &[u16],
+    corner: [f64; 2],
+    cell: f64,
+) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
     let mut image = encoder.new_image::<colortype::GrayI16>(size[0], size[1]).unwrap();
@@ -193,8 +200,8 @@ fn geotiff_of(values: &[i16], model: u16, code: u16, corner: [f64; 2], cell: f64
 fn what_cannot_be_honoured_is_refused_by_name() {
     let refused = |keys: &[u16]| {
         let bytes = tiff([2, 2], &[1, 2, 3, 4], keys, [500_000.0, 4_800_000.0], 10.0);
-        let read =
-            geotiff::decode(Cursor::new(bytes)).and_then(|raster| raster.resampled(&anywhere(&ORIGIN)));
+        let read = geotiff::decode(Cursor::new(bytes))
+            .and_then(|raster| raster.resampled(&anywhere(&ORIGIN)));
         read.map(|grid| grid.count()).unwrap_err().to_string()
     };
     for (keys, text) in [
@@ -207,7 +214,10 @@ fn what_cannot_be_honoured_is_refused_by_name() {
         (keys(3, 4978), "middle of the earth"),
         (vec![1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 32630, 3076, 0, 1, 9002], "units of 0.3048 m"),
         (vec![1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 32630, 4096, 0, 1, 9999], "EPSG:9999"),
-        (vec![1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 32630, 4099, 0, 1, 9095], "units of EPSG:9095"),
+        (
+            vec![1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 32630, 4099, 0, 1, 9095],
+            "units of EPSG:9095",
+        ),
     ] {
         let error = refused(&keys);
         assert!(error.contains(text), "{error}");
@@ -221,7 +231,12 @@ fn what_cannot_be_honoured_is_refused_by_name() {
 fn a_prj_says_where_an_esri_grid_is() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hill.asc");
-    let text = asc(2, [500_000.0, 4_794_000.0], 10.0, &[vec![Some(1.0), Some(2.0)], vec![Some(3.0), None]]);
+    let text = asc(
+        2,
+        [500_000.0, 4_794_000.0],
+        10.0,
+        &[vec![Some(1.0), Some(2.0)], vec![Some(3.0), None]],
+    );
     std::fs::write(&path, text).unwrap();
     let error = super::read(&path, &anywhere(&ORIGIN)).unwrap_err().to_string();
     assert!(error.contains("does not say where it is"), "{error}");

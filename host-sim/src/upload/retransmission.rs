@@ -1,9 +1,12 @@
-//! How long to wait for an answer before asking again, and how many pieces to have under way at once.
+//! How long to wait for an answer before asking again, and how many pieces to have under way at
+//! once.
 //!
-//! Source: RFC 6298 (retransmission timeout) and RFC 5681 (congestion window). A radio in the air gives files 250 bytes a second:
-//! four answers take it longer than any fixed time that suits a cable, and each request repeated too early is answered too, which
-//! makes the next answer later still. So the wait follows the round trips of this link, taken of requests that were sent once
-//! (Karn), and doubles where nothing comes; then half as many pieces are under way, until answers come in time.
+//! Source: RFC 6298 (retransmission timeout) and RFC 5681 (congestion window). A radio in the air
+//! gives files 250 bytes a second: four answers take it longer than any fixed time that suits a
+//! cable, and each request repeated too early is answered too, which makes the next answer later
+//! still. So the wait follows the round trips of this link, taken of requests that were sent once
+//! (Karn), and doubles where nothing comes; then half as many pieces are under way, until answers
+//! come in time.
 
 use std::time::{Duration, Instant as Clock};
 
@@ -46,7 +49,8 @@ impl Retransmission {
         self.window
     }
 
-    /// Whether what was sent then is to be sent again now. If so the wait doubles, once for all that was sent before.
+    /// Whether what was sent then is to be sent again now. If so the wait doubles, once for all
+    /// that was sent before.
     pub fn is_over(&mut self, sent_at: Clock, now: Clock) -> bool {
         let over = now.saturating_duration_since(sent_at) > self.wait;
         if over && sent_at >= self.doubled_at {
@@ -80,8 +84,8 @@ mod tests {
 
     use super::*;
 
-    /// 200 pieces on a link whose answers come one each `every_ms`, and every `loses`th of what is sent is lost: how many were sent,
-    /// and seconds it took.
+    /// 200 pieces on a link whose answers come one each `every_ms`, and every `loses`th of what is
+    /// sent is lost: how many were sent, and seconds it took.
     fn upload(every_ms: u64, loses: usize) -> (usize, f32) {
         const PIECES: usize = 200;
         let began = Clock::now();
@@ -124,7 +128,8 @@ mod tests {
 
     #[test]
     fn a_slow_link_is_not_filled_with_repeats() {
-        // On a cable, of 30-byte answers in the air, and behind a machine that emulates at a third of its speed.
+        // On a cable, of 30-byte answers in the air, and behind a machine that emulates at a third
+        // of its speed.
         for every_ms in [10, 120, 360] {
             let (sent, took_s) = upload(every_ms, usize::MAX);
             assert!(sent < 220, "every {every_ms} ms an answer: {sent} sent for 200");

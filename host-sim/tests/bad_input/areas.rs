@@ -1,5 +1,5 @@
-//! Areas: every key with wrong values, and every kind of file that an area or its terrain is read from, missing, endless and
-//! damaged.
+//! Areas: every key with wrong values, and every kind of file that an area or its terrain is read
+//! from, missing, endless and damaged.
 
 use crate::{Cases, scenarios};
 
@@ -84,7 +84,8 @@ fn add_files(cases: &mut Cases) {
     let geojson = format!("{{\"type\":\"Polygon\",\"coordinates\":{border}}}");
     let kml = "<kml><Document><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>-3.7,40.3 -3.698,40.3 \
                -3.698,40.301</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></Document></kml>";
-    let asc = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9999\n1 2\n3 4\n";
+    let asc =
+        "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9999\n1 2\n3 4\n";
     let right: [(&str, &[u8]); 7] = [
         ("geojson", geojson.as_bytes()),
         ("wkt", b"POLYGON ((0 0, 100 0, 100 50, 0 50, 0 0))"),
@@ -100,7 +101,9 @@ fn add_files(cases: &mut Cases) {
             true => with("terrain", &format!("{path:?}")),
             false => scenario(&format!("file = {path:?}\nheight_m = 35.0")),
         };
-        for kind in ["missing", "dir", "fifo", "zero", "loop", "empty", "huge", "text", "random", "null"] {
+        for kind in
+            ["missing", "dir", "fifo", "zero", "loop", "empty", "huge", "text", "random", "null"]
+        {
             let path = cases.path(kind);
             // Its ending says what it should be.
             let link = cases.path(&format!("{kind}-area.{end}"));

@@ -1,8 +1,10 @@
-//! Command lines: arguments left out, doubled and garbled, links that are none, results that cannot be written.
+//! Command lines: arguments left out, doubled and garbled, links that are none, results that cannot
+//! be written.
 
 use crate::{Cases, Output, areas, scenarios};
 
-/// Every command with what it needs; `S` stands for a scenario, `A` for one with an area, `O` for results.
+/// Every command with what it needs; `S` stands for a scenario, `A` for one with an area, `O` for
+/// results.
 const COMMANDS: &[&[&str]] = &[
     &["demo", "--out", "O"],
     &["map", "info", "builtin:building"],

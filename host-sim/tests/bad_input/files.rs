@@ -21,12 +21,15 @@ pub fn add(cases: &mut Cases) {
     for end in ["toml", "bin", "bt", "txt"] {
         make(cases, end);
     }
-    let kinds = ["missing", "dir", "fifo", "zero", "loop", "empty", "huge", "text", "random", "null"];
+    let kinds =
+        ["missing", "dir", "fifo", "zero", "loop", "empty", "huge", "text", "random", "null"];
     for (command, args) in READERS {
         for kind in kinds {
             let out = cases.out();
-            let args: Vec<String> =
-                args.iter().map(|arg| arg.replace("FILE", &cases.path(kind)).replace("OUT", &out)).collect();
+            let args: Vec<String> = args
+                .iter()
+                .map(|arg| arg.replace("FILE", &cases.path(kind)).replace("OUT", &out))
+                .collect();
             let args: Vec<&str> = args.iter().map(String::as_str).collect();
             cases.push(format!("{command} of {kind}"), &args);
         }
@@ -41,7 +44,16 @@ pub fn add(cases: &mut Cases) {
         // An empty flash and one that is missing are made.
         if kind != "missing" && kind != "empty" {
             let flash = cases.path(&format!("{kind}.bin"));
-            let args = ["companion", &good, "--id", "1", "--autopilot", "udp:127.0.0.1:9", "--flash", &flash];
+            let args = [
+                "companion",
+                &good,
+                "--id",
+                "1",
+                "--autopilot",
+                "udp:127.0.0.1:9",
+                "--flash",
+                &flash,
+            ];
             cases.push(format!("flash in {kind}"), &args);
         }
     }
@@ -79,7 +91,10 @@ fn add_maps(cases: &mut Cases) {
         ("another id", &format!("{head}id CountingOcTree\nsize 2\nres 0.1\ndata\n")),
         ("no size", &format!("{head}id OcTree\nres 0.1\ndata\n")),
         ("a negative size", &format!("{head}id OcTree\nsize -2\nres 0.1\ndata\n")),
-        ("a size beyond all", &format!("{head}id OcTree\nsize 18446744073709551615\nres 0.1\ndata\n")),
+        (
+            "a size beyond all",
+            &format!("{head}id OcTree\nsize 18446744073709551615\nres 0.1\ndata\n"),
+        ),
         ("resolution 0", &format!("{head}id OcTree\nsize 2\nres 0\ndata\n")),
         ("resolution nan", &format!("{head}id OcTree\nsize 2\nres nan\ndata\n")),
         ("a resolution of a planet", &format!("{head}id OcTree\nsize 2\nres 1e9\ndata\n")),
@@ -102,13 +117,21 @@ fn add_maps(cases: &mut Cases) {
         let file = cases.file("bt", &[right.as_bytes(), &data].concat());
         cases.push(format!("map info, {name}"), &["map", "info", &file]);
         let out = cases.out();
-        cases.push(format!("map convert, {name}"), &["map", "convert", &file, &format!("{out}/a.bt")]);
+        cases.push(
+            format!("map convert, {name}"),
+            &["map", "convert", &file, &format!("{out}/a.bt")],
+        );
     }
     // A leaf of 3 km: a grid of it would have more cells than fit.
-    let large =
-        cases.file("bt", &[format!("{head}id OcTree\nsize 2\nres 0.1\ndata\n").as_bytes(), &[2, 0]].concat());
+    let large = cases.file(
+        "bt",
+        &[format!("{head}id OcTree\nsize 2\nres 0.1\ndata\n").as_bytes(), &[2, 0]].concat(),
+    );
     cases.push("a grid of a large map", &["map", "info", &large, "--resolution", "0.1"]);
-    cases.scenario("planning on a large map", &scenarios::with("[map]", "file", &format!("\"{large}\"")));
+    cases.scenario(
+        "planning on a large map",
+        &scenarios::with("[map]", "file", &format!("\"{large}\"")),
+    );
 }
 
 /// Roadmap and mission files cut and changed.
@@ -134,12 +157,17 @@ fn add_roadmaps(cases: &mut Cases) {
         broken.push(("bytes behind its end".into(), [&bytes[..], b"more"].concat()));
         for (what, bytes) in broken {
             let file = cases.file("bin", &bytes);
-            cases
-                .push(format!("upload of a {name}, {what}"), &["upload", &file, "--link", "udp:127.0.0.1:9"]);
+            cases.push(
+                format!("upload of a {name}, {what}"),
+                &["upload", &file, "--link", "udp:127.0.0.1:9"],
+            );
             cases.push(format!("roadmap info of a {name}, {what}"), &["roadmap", "info", &file]);
         }
         if name == "mission" {
-            cases.push("roadmap info of a mission", &["roadmap", "info", &format!("{plan}/mission.bin")]);
+            cases.push(
+                "roadmap info of a mission",
+                &["roadmap", "info", &format!("{plan}/mission.bin")],
+            );
         }
     }
 }

@@ -1,8 +1,10 @@
-//! Wrong inputs to every command: exit code 2 and one short line, soon, in little memory, and nothing left behind.
+//! Wrong inputs to every command: exit code 2 and one short line, soon, in little memory, and
+//! nothing left behind.
 //!
-//! Inputs are made systematically: every key of a scenario with values of every wrong type and range, every argument
-//! left out, doubled and garbled, every file that is read as a directory, FIFO, device, endless or binary file, every
-//! format cut and flipped. Each runs in a process of its own with a limit of 1 GB.
+//! Inputs are made systematically: every key of a scenario with values of every wrong type and
+//! range, every argument left out, doubled and garbled, every file that is read as a directory,
+//! FIFO, device, endless or binary file, every format cut and flipped. Each runs in a process of
+//! its own with a limit of 1 GB.
 #![cfg(target_os = "linux")]
 
 mod areas;
@@ -92,7 +94,12 @@ fn judge(case: &Case, folder: &Path, number: usize) -> Result<Duration, String> 
     let err = folder.join(format!("{number}.err"));
     let began = Instant::now();
     let mut child = Command::new("sh");
-    child.args(["-c", &format!("ulimit -v {MEMORY_KB}; exec \"$@\""), "sh", env!("CARGO_BIN_EXE_host-sim")]);
+    child.args([
+        "-c",
+        &format!("ulimit -v {MEMORY_KB}; exec \"$@\""),
+        "sh",
+        env!("CARGO_BIN_EXE_host-sim"),
+    ]);
     child.args(&case.args).stdin(Stdio::null()).stderr(std::fs::File::create(&err).unwrap());
     // Of address space, which every thread reserves for itself.
     child.env("RAYON_NUM_THREADS", "2").env("MALLOC_ARENA_MAX", "2");
@@ -197,7 +204,8 @@ fn wrong_inputs_end_soon_with_one_short_line() {
     });
     let failures = failures.into_inner().unwrap();
     assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), cases.len(), failures.join("\n"));
-    let left: Vec<_> = std::fs::read_dir(folder.path().join("out")).into_iter().flatten().flatten().collect();
+    let left: Vec<_> =
+        std::fs::read_dir(folder.path().join("out")).into_iter().flatten().flatten().collect();
     assert!(left.is_empty(), "results of nothing: {left:?}");
     println!("{} wrong inputs, the slowest {:?}", cases.len(), slowest.into_inner().unwrap());
 }

@@ -1,4 +1,5 @@
-//! Scenarios: every key with values of the wrong type, range and shape; keys that are none; what cannot hold together.
+//! Scenarios: every key with values of the wrong type, range and shape; keys that are none; what
+//! cannot hold together.
 
 use crate::Cases;
 
@@ -49,7 +50,10 @@ const GOOD: &[(&str, &[(&str, &str)])] = &[
         ],
     ),
     ("[[vehicles]] ", &[("id", "2"), ("start", "[10.0, 6.0, 1.5]")]),
-    ("[deconfliction]", &[("method", "\"priority\""), ("safety_distance_m", "1.5"), ("separation_m", "2.0")]),
+    (
+        "[deconfliction]",
+        &[("method", "\"priority\""), ("safety_distance_m", "1.5"), ("separation_m", "2.0")],
+    ),
     (
         "[simulation]",
         &[
@@ -106,9 +110,25 @@ pub fn good() -> String {
 pub fn wrong(good: &str) -> &'static [&'static str] {
     match good.as_bytes()[0] {
         b'"' => &["\"\"", "\"no such word\"", "\"a\\u001b[31m\\u202Eb\"", "3", "[]", "{ a = 1 }"],
-        b'[' if good.starts_with("[[") => &["[]", "[[1, 2]]", "[[1, 2, nan]]", "\"x\"", "[[1e9, 0, 0]]", "7"],
-        b'[' => &["[]", "[1, 2]", "[1, 2, nan]", "\"x\"", "[1, 2, 3, 4]", "[1e9, 0, inf]", "[\"1\", 2, 3]"],
-        b'{' => &["{}", "[1, 2, 3]", "{ lat_deg = 91.0, lon_deg = 0.0, alt_m = 0.0 }", "\"here\"", "nan"],
+        b'[' if good.starts_with("[[") => {
+            &["[]", "[[1, 2]]", "[[1, 2, nan]]", "\"x\"", "[[1e9, 0, 0]]", "7"]
+        }
+        b'[' => &[
+            "[]",
+            "[1, 2]",
+            "[1, 2, nan]",
+            "\"x\"",
+            "[1, 2, 3, 4]",
+            "[1e9, 0, inf]",
+            "[\"1\", 2, 3]",
+        ],
+        b'{' => &[
+            "{}",
+            "[1, 2, 3]",
+            "{ lat_deg = 91.0, lon_deg = 0.0, alt_m = 0.0 }",
+            "\"here\"",
+            "nan",
+        ],
         _ => &["nan", "-inf", "-1e30", "\"1\"", "[1]", "1e400", "true"],
     }
 }
@@ -119,12 +139,20 @@ pub fn add(cases: &mut Cases) {
             for value in wrong(good) {
                 cases.scenario(format!("{table} {key} = {value}"), &with(table, key, value));
             }
-            cases.scenario(format!("{table} {key} misspelt"), &with(table, &format!("{key}x"), good));
+            cases.scenario(
+                format!("{table} {key} misspelt"),
+                &with(table, &format!("{key}x"), good),
+            );
         }
     }
-    let required =
-        [("[map]", "file"), ("[mission]", "goals"), ("[[vehicles]]", "id"), ("[[vehicles]]", "start")];
-    for (table, key) in required.into_iter().chain([("[[faults]]", "kind"), ("[[faults]]", "at_s")]) {
+    let required = [
+        ("[map]", "file"),
+        ("[mission]", "goals"),
+        ("[[vehicles]]", "id"),
+        ("[[vehicles]]", "start"),
+    ];
+    for (table, key) in required.into_iter().chain([("[[faults]]", "kind"), ("[[faults]]", "at_s")])
+    {
         cases.scenario(format!("{table} without {key}"), &with(table, key, ""));
     }
     add_contradictions(cases);
@@ -149,8 +177,18 @@ fn add_contradictions(cases: &mut Cases) {
         ("single goal of two", "[mission]", "mode", "\"single-goal\""),
         ("a mode to come", "[mission]", "mode", "\"coverage\""),
         ("a fence inside out", "[mission]", "geofence", "{ min = [5, 5, 5], max = [4, 6, 6] }"),
-        ("a start outside the fence", "[mission]", "geofence", "{ min = [20, -5, 0], max = [50, 30, 60] }"),
-        ("a goal outside the fence", "[mission]", "geofence", "{ min = [-5, -5, 0], max = [20, 30, 60] }"),
+        (
+            "a start outside the fence",
+            "[mission]",
+            "geofence",
+            "{ min = [20, -5, 0], max = [50, 30, 60] }",
+        ),
+        (
+            "a goal outside the fence",
+            "[mission]",
+            "geofence",
+            "{ min = [-5, -5, 0], max = [20, 30, 60] }",
+        ),
         ("a vehicle as ground station", "[mission]", "ground_stations", "[2]"),
         ("too many ground stations", "[mission]", "ground_stations", "[251, 252, 253, 254, 255]"),
         ("an id twice", "[[vehicles]]", "id", "2"),
@@ -193,17 +231,25 @@ fn add_syntax(cases: &mut Cases) {
     for part in 0..16 {
         cases.scenario(format!("cut after {part}/16"), &good[..vehicles * part / 16]);
     }
-    for (at, code) in [(0, '\u{0}'), (40, '\u{1b}'), (90, '='), (130, '"'), (200, '\u{feff}'), (260, ']')] {
+    for (at, code) in
+        [(0, '\u{0}'), (40, '\u{1b}'), (90, '='), (130, '"'), (200, '\u{feff}'), (260, ']')]
+    {
         let (before, after) = good.split_at(at);
         cases.scenario(format!("{code:?} at {at}"), &format!("{before}{code}{after}"));
     }
     cases.scenario("round quotes", &good.replace('"', "“"));
-    cases.scenario("a path with backslashes", &good.replace("builtin:building", "C:\\maps\\hall.bt"));
+    cases.scenario(
+        "a path with backslashes",
+        &good.replace("builtin:building", "C:\\maps\\hall.bt"),
+    );
     cases.scenario("single brackets", &good.replace("[[vehicles]]", "[vehicles]"));
     cases.scenario("a key twice", &format!("seed = 2\n{good}"));
     cases.scenario("a table twice", &format!("{good}[map]\nfile = \"builtin:building\"\n"));
     cases.scenario("brackets without end", &"[".repeat(200_000));
-    cases.scenario("a value nested deeply", &format!("seed = {}1{}", "[".repeat(3000), "]".repeat(3000)));
+    cases.scenario(
+        "a value nested deeply",
+        &format!("seed = {}1{}", "[".repeat(3000), "]".repeat(3000)),
+    );
     cases.scenario("a line without end", &format!("{}{}", "k".repeat(900_000), good));
     cases.scenario("a long key", &good.replace("seed", &"s".repeat(50_000)));
     cases.scenario("longer than a scenario may be", &format!("{good}{}", "#\n".repeat(600_000)));

@@ -1,7 +1,9 @@
-//! Shortest augmenting paths: Dijkstra over the columns of a dense matrix, vectorised over all of them.
+//! Shortest augmenting paths: Dijkstra over the columns of a dense matrix, vectorised over all of
+//! them.
 //!
-//! A settled column is taken out of the running by moving its price to minus infinity and its distance to infinity, so
-//! the inner loop has no test for it: its reduced costs come out infinite. Both are kept aside and put back at the end.
+//! A settled column is taken out of the running by moving its price to minus infinity and its
+//! distance to infinity, so the inner loop has no test for it: its reduced costs come out infinite.
+//! Both are kept aside and put back at the end.
 
 use super::costs::CostMatrix;
 use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
@@ -40,7 +42,8 @@ fn augment_shortest_path(
     paths: &mut AugmentingPaths<'_>,
     mut least: f64,
 ) -> bool {
-    // Columns at one distance are settled together and wait in `settled[done..queued]`: integer costs have many.
+    // Columns at one distance are settled together and wait in `settled[done..queued]`: integer
+    // costs have many.
     let (mut done, mut queued) = (0, 0);
     let mut next = least;
     let end = loop {
@@ -62,8 +65,9 @@ fn augment_shortest_path(
         }
         let col = paths.settled[done];
         let row = state.row_of[usize::from(col)];
-        let offset =
-            f64::from(costs.cost_at(row, col)) - paths.settled_price[done] - paths.settled_distance[done];
+        let offset = f64::from(costs.cost_at(row, col))
+            - paths.settled_price[done]
+            - paths.settled_distance[done];
         next = relax_columns(costs.row_costs(row, state.row), state.price, offset, row, paths);
         done += 1;
     };
@@ -75,15 +79,23 @@ fn augment_shortest_path(
 }
 
 /// `distance = min(distance, cost - price - offset)` over all columns; returns the least distance.
-fn relax_columns(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut AugmentingPaths<'_>) -> f64 {
+fn relax_columns(
+    line: &[f32],
+    price: &[f64],
+    offset: f64,
+    row: u16,
+    paths: &mut AugmentingPaths<'_>,
+) -> f64 {
     let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
     let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
     let (distances, distance_rest) = paths.distance.as_chunks_mut::<SIMD_LANES>();
     let (previous, previous_rest) = paths.previous.as_chunks_mut::<SIMD_LANES>();
     let mut least = [f64::INFINITY; SIMD_LANES];
-    for (((line, price), distance), previous) in lines.iter().zip(prices).zip(distances).zip(previous) {
-        // Whole chunks in, whole chunks out, and selects within: so the compiler makes vectors of the lanes, and nothing
-        // is mispredicted.
+    for (((line, price), distance), previous) in
+        lines.iter().zip(prices).zip(distances).zip(previous)
+    {
+        // Whole chunks in, whole chunks out, and selects within: so the compiler makes vectors of
+        // the lanes, and nothing is mispredicted.
         let (mut nearest, mut through) = (*distance, [0.0; SIMD_LANES]);
         for lane in 0..SIMD_LANES {
             through[lane] = f64::from(line[lane]) - price[lane] - offset;
@@ -91,7 +103,8 @@ fn relax_columns(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut
         let mut nearer = [0_u16; SIMD_LANES];
         for lane in 0..SIMD_LANES {
             nearer[lane] = if through[lane] < nearest[lane] { u16::MAX } else { 0 };
-            nearest[lane] = if through[lane] < nearest[lane] { through[lane] } else { nearest[lane] };
+            nearest[lane] =
+                if through[lane] < nearest[lane] { through[lane] } else { nearest[lane] };
         }
         for lane in 0..SIMD_LANES {
             least[lane] = if nearest[lane] < least[lane] { nearest[lane] } else { least[lane] };
@@ -122,7 +135,12 @@ enum NearestColumns {
 }
 
 /// The columns at distance `least`: a free one if there is any, else all of them into `queue`.
-fn nearest_columns(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> NearestColumns {
+fn nearest_columns(
+    distance: &[f64],
+    row_of: &[u16],
+    least: f64,
+    queue: &mut [u16],
+) -> NearestColumns {
     let mut count = 0;
     let mut offer = |first: usize, distances: &[f64]| {
         for (k, _) in distances.iter().enumerate().filter(|(_, d)| **d == least) {
@@ -160,14 +178,15 @@ fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u1
     }
 }
 
-/// Adds one pair by the path from any free row whose largest cost is least; returns that cost. `None` if no path is left.
+/// Adds one pair by the path from any free row whose largest cost is least; returns that cost.
+/// `None` if no path is left.
 pub(super) fn augment_bottleneck(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
 ) -> Option<f32> {
-    // The path to a settled column is final: its distance moves to infinity so that it is not chosen again, and
-    // `settled_price` keeps it from being reached again.
+    // The path to a settled column is final: its distance moves to infinity so that it is not
+    // chosen again, and `settled_price` keeps it from being reached again.
     let done = &mut *paths.settled_price;
     done.fill(0.0);
     paths.distance.fill(f64::INFINITY);

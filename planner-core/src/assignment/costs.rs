@@ -45,9 +45,11 @@ impl<'a> CostMatrix<'a> {
             return Err(AssignmentError::Shape);
         }
         // One pass that vectorises; the place of the bad cost is only sought when there is one.
-        let sound =
-            data.chunks(64).all(|chunk| chunk.iter().fold(true, |ok, &c| ok & (c > f32::NEG_INFINITY)));
-        if !sound && let Some(at) = data.iter().position(|c| c.is_nan() || *c == f32::NEG_INFINITY) {
+        let sound = data
+            .chunks(64)
+            .all(|chunk| chunk.iter().fold(true, |ok, &c| ok & (c > f32::NEG_INFINITY)));
+        if !sound && let Some(at) = data.iter().position(|c| c.is_nan() || *c == f32::NEG_INFINITY)
+        {
             let (row, col) = ((at / cols) as u16, (at % cols) as u16);
             return Err(match data[at].is_nan() {
                 true => AssignmentError::NotANumber { row, col },
@@ -62,11 +64,13 @@ impl<'a> CostMatrix<'a> {
     #[inline]
     pub(super) fn cost_at(&self, row: u16, col: u16) -> f32 {
         let (row, col) = (usize::from(row), usize::from(col));
-        let cost = self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
+        let cost =
+            self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
         if cost <= self.limit { cost } else { f32::INFINITY }
     }
 
-    /// The costs of one row: a slice of the matrix if it is stored by rows, else a copy in `buffer`.
+    /// The costs of one row: a slice of the matrix if it is stored by rows, else a copy in
+    /// `buffer`.
     #[inline]
     pub(super) fn row_costs<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
         let row = usize::from(row);

@@ -6,9 +6,10 @@ use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 /// Columns of a large matrix that are reduced together: four cache lines of each row.
 const BLOCK_COLUMNS: usize = 64;
 
-/// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left over), then two
-/// rounds of augmenting row reduction. Returns how many rows are left in `state.free`, or `None` if some row or, in a
-/// square matrix, some column has no finite cost, so that not every row can be served.
+/// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left
+/// over), then two rounds of augmenting row reduction. Returns how many rows are left in
+/// `state.free`, or `None` if some row or, in a square matrix, some column has no finite cost, so
+/// that not every row can be served.
 pub(super) fn reduce_to_free_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -30,18 +31,20 @@ pub(super) fn reduce_to_free_rows(
     Some(left)
 }
 
-/// Each column is priced at its least cost and given to that row, if the row has none; then a row that is the least of
-/// one column only moves its slack into that column's price.
+/// Each column is priced at its least cost and given to that row, if the row has none; then a row
+/// that is the least of one column only moves its slack into that column's price.
 fn reduce_columns(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
 ) -> Option<usize> {
-    // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a large matrix, the fewer
-    // cache misses. A small matrix has fewer columns than that.
+    // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a
+    // large matrix, the fewer cache misses. A small matrix has fewer columns than that.
     match costs.cols {
         0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
-        SIMD_LANES..BLOCK_COLUMNS => cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous),
+        SIMD_LANES..BLOCK_COLUMNS => {
+            cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous)
+        }
         _ => cheapest_rows_by::<BLOCK_COLUMNS>(costs, state.price, paths.previous),
     }
     if state.price.contains(&f64::INFINITY) {
@@ -76,7 +79,11 @@ fn reduce_columns(
     Some(left)
 }
 
-fn cheapest_rows_by<const K: usize>(costs: &CostMatrix<'_>, price: &mut [f64], least_row: &mut [u16]) {
+fn cheapest_rows_by<const K: usize>(
+    costs: &CostMatrix<'_>,
+    price: &mut [f64],
+    least_row: &mut [u16],
+) {
     for first in (0..costs.cols).step_by(K) {
         cheapest_rows::<K>(costs, first.min(costs.cols - K), price, least_row);
     }
@@ -92,7 +99,8 @@ fn cheapest_rows<const K: usize>(
     let (mut least, mut rows) = ([f32::INFINITY; K], [0_u32; K]);
     for (row, line) in (0..).zip(costs.data.chunks_exact(costs.cols)) {
         let Some(line) = line[first..].first_chunk::<K>() else { return };
-        // Selects of one width, so that the lanes become vectors: which row is cheaper cannot be predicted.
+        // Selects of one width, so that the lanes become vectors: which row is cheaper cannot be
+        // predicted.
         for lane in 0..K {
             let cheaper = (line[lane] < least[lane]) & (line[lane] <= costs.limit);
             least[lane] = if cheaper { line[lane] } else { least[lane] };
@@ -100,7 +108,8 @@ fn cheapest_rows<const K: usize>(
         }
     }
     for lane in 0..K {
-        (price[first + lane], least_row[first + lane]) = (f64::from(least[lane]), rows[lane] as u16);
+        (price[first + lane], least_row[first + lane]) =
+            (f64::from(least[lane]), rows[lane] as u16);
     }
 }
 
@@ -118,9 +127,14 @@ fn least_reduced_cost(line: &[f32], price: &[f64]) -> f64 {
     rest.chain(least).fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
-/// Every free row takes its cheapest column, whose price falls until the second cheapest is as good; the row that held
-/// it is served next, or is left for an augmenting path where no price moved. Returns the rows left free.
-fn reduce_rows(costs: &CostMatrix<'_>, state: &mut MatchingState<'_>, rows_in: usize) -> Option<usize> {
+/// Every free row takes its cheapest column, whose price falls until the second cheapest is as
+/// good; the row that held it is served next, or is left for an augmenting path where no price
+/// moved. Returns the rows left free.
+fn reduce_rows(
+    costs: &CostMatrix<'_>,
+    state: &mut MatchingState<'_>,
+    rows_in: usize,
+) -> Option<usize> {
     let (mut at, mut left) = (0, 0);
     // Rows chase one another for as long as prices fall; this bounds the work.
     let mut budget = rows_in * costs.cols;
@@ -132,7 +146,8 @@ fn reduce_rows(costs: &CostMatrix<'_>, state: &mut MatchingState<'_>, rows_in: u
             return None;
         }
         if two.second == f64::INFINITY {
-            // The row's only column: no second price bounds its fall, so an augmenting path decides.
+            // The row's only column: no second price bounds its fall, so an augmenting path
+            // decides.
             state.free[left] = row;
             left += 1;
             continue;
@@ -173,10 +188,14 @@ struct TwoCheapestColumns {
 
 impl TwoCheapestColumns {
     fn of_row(line: &[f32], price: &[f64]) -> Self {
-        let mut two =
-            Self { least: f64::INFINITY, second: f64::INFINITY, col: UNASSIGNED, second_col: UNASSIGNED };
-        // The first few decide the second cheapest roughly; after them most chunks hold nothing below it, which eight
-        // subtractions and compares tell without a branch within.
+        let mut two = Self {
+            least: f64::INFINITY,
+            second: f64::INFINITY,
+            col: UNASSIGNED,
+            second_col: UNASSIGNED,
+        };
+        // The first few decide the second cheapest roughly; after them most chunks hold nothing
+        // below it, which eight subtractions and compares tell without a branch within.
         let head = line.len().min(2 * SIMD_LANES);
         two.update_cheapest(0, &line[..head], &price[..head]);
         let (lines, line_rest) = line[head..].as_chunks::<SIMD_LANES>();

@@ -6,7 +6,8 @@ pub(super) const UNASSIGNED: u16 = u16::MAX;
 /// registers.
 pub(super) const SIMD_LANES: usize = 8;
 
-/// Dual prices and the matching so far. The matrix is transposed where it has more rows than columns.
+/// Dual prices and the matching so far. The matrix is transposed where it has more rows than
+/// columns.
 pub(super) struct MatchingState<'w> {
     pub(super) price: &'w mut [f64],
     pub(super) row_of: &'w mut [u16],

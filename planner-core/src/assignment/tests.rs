@@ -58,11 +58,14 @@ enum Objective {
     Makespan,
 }
 
-/// The checker of assignments: each column once, only pairs that can be, the figures are those of the pairs.
+/// The checker of assignments: each column once, only pairs that can be, the figures are those of
+/// the pairs.
 fn check_assignment(costs: &[f32], cols: usize, out: &[Option<u16>], said: Assignment) {
     let mut used = vec![false; cols];
     let mut sum = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
-    for (row, col) in out.iter().enumerate().filter_map(|(row, col)| col.map(|col| (row, usize::from(col)))) {
+    for (row, col) in
+        out.iter().enumerate().filter_map(|(row, col)| col.map(|col| (row, usize::from(col))))
+    {
         assert!(!core::mem::replace(&mut used[col], true), "column {col} twice");
         let cost = costs[row * cols + col];
         assert!(cost.is_finite(), "row {row} sent where it cannot go");
@@ -95,14 +98,17 @@ fn solve_checked<const N: usize>(
 
 /// Square, wide and tall; reals and small integers full of ties; a share of the pairs cannot be.
 fn matrices() -> impl Strategy<Value = (usize, usize, Vec<f32>)> {
-    (1usize..=6, 1usize..=6, any::<bool>(), 0u8..=9).prop_flat_map(|(rows, cols, integers, blocked)| {
-        let cost = (-5.0f32..20.0, 0u8..10).prop_map(move |(cost, dice)| match dice < blocked {
-            true => f32::INFINITY,
-            false if integers => libm::roundf(cost / 4.0),
-            false => cost,
-        });
-        (Just(rows), Just(cols), proptest::collection::vec(cost, rows * cols))
-    })
+    (1usize..=6, 1usize..=6, any::<bool>(), 0u8..=9).prop_flat_map(
+        |(rows, cols, integers, blocked)| {
+            let cost =
+                (-5.0f32..20.0, 0u8..10).prop_map(move |(cost, dice)| match dice < blocked {
+                    true => f32::INFINITY,
+                    false if integers => libm::roundf(cost / 4.0),
+                    false => cost,
+                });
+            (Just(rows), Just(cols), proptest::collection::vec(cost, rows * cols))
+        },
+    )
 }
 
 proptest! {
@@ -130,7 +136,8 @@ fn or_library_instances_reach_their_published_optimum() {
         return;
     };
     let optimum = |name: &str| -> f64 {
-        let line = optima.lines().find(|line| line.split_whitespace().next() == Some(name)).unwrap();
+        let line =
+            optima.lines().find(|line| line.split_whitespace().next() == Some(name)).unwrap();
         line.split_whitespace().nth(1).unwrap().parse().unwrap()
     };
     let mut ws = Box::new(AssignmentWorkspace::<200>::new());
@@ -143,7 +150,10 @@ fn or_library_instances_reach_their_published_optimum() {
         assert_eq!((result.pairs, result.total), (n, optimum(name)), "{name}");
         // The same problem seen from the tasks.
         let transposed: Vec<f32> = (0..n * n).map(|k| costs[k % n * n + k / n]).collect();
-        assert_eq!(solve_checked(&transposed, n, n, Objective::Total, &mut ws).total, optimum(name));
+        assert_eq!(
+            solve_checked(&transposed, n, n, Objective::Total, &mut ws).total,
+            optimum(name)
+        );
     }
 }
 
@@ -172,7 +182,8 @@ fn bad_input_is_refused_by_name() {
 #[test]
 fn huge_and_tiny_costs_lose_nothing_to_a_stand_in_for_infinity() {
     // With 1e38 for "cannot be", the thousandths would vanish.
-    let costs = [1e-3, 2e-3, f32::INFINITY, 3e-3, 1e-3, 1e37, f32::INFINITY, f32::INFINITY, f32::INFINITY];
+    let costs =
+        [1e-3, 2e-3, f32::INFINITY, 3e-3, 1e-3, 1e37, f32::INFINITY, f32::INFINITY, f32::INFINITY];
     let mut ws = AssignmentWorkspace::<CAPACITY>::new();
     let result = solve_checked(&costs, 3, 3, Objective::Total, &mut ws);
     assert_eq!((result.pairs, result.total as f32), (2, 2e-3));

@@ -1,8 +1,9 @@
-//! The area: polygons to photograph, holes in them, and zones that no vehicle may enter; checked before anything is computed.
+//! The area: polygons to photograph, holes in them, and zones that no vehicle may enter; checked
+//! before anything is computed.
 //!
-//! Vertices of all rings lie in one slice, ring after ring, the first vertex of a ring not repeated. Which way a ring
-//! turns does not matter: a place is in the area if it is inside an odd number of outer rings and holes. Cost: O(n²) in
-//! the edges for the check, O(n) for a question.
+//! Vertices of all rings lie in one slice, ring after ring, the first vertex of a ring not
+//! repeated. Which way a ring turns does not matter: a place is in the area if it is inside an odd
+//! number of outer rings and holes. Cost: O(n²) in the edges for the check, O(n) for a question.
 
 use crate::Length;
 use libm::{fabs, sqrt};
@@ -143,7 +144,9 @@ impl<'a> Area<'a> {
     }
 
     /// Each ring's kind and vertices.
-    pub(super) fn rings_with_kind(&self) -> impl Iterator<Item = (RingKind, &'a [Flat])> + Clone + use<'a> {
+    pub(super) fn rings_with_kind(
+        &self,
+    ) -> impl Iterator<Item = (RingKind, &'a [Flat])> + Clone + use<'a> {
         let area = *self;
         area.rings.iter().enumerate().map(move |(i, ring)| (ring.kind, area.ring(i)))
     }
@@ -163,8 +166,8 @@ impl<'a> Area<'a> {
         Area { vertices, rings: self.rings }
     }
 
-    /// Whether a place is to be photographed: inside outer rings and holes an odd number of times. No-fly zones are not
-    /// looked at.
+    /// Whether a place is to be photographed: inside outer rings and holes an odd number of times.
+    /// No-fly zones are not looked at.
     pub fn contains(&self, place: &Flat) -> bool {
         let rings = self.rings_with_kind().filter(|(kind, _)| *kind != RingKind::NoFly);
         rings.filter(|(_, ring)| is_inside(ring, place)).count() % 2 == 1
@@ -239,7 +242,9 @@ impl<'a> Area<'a> {
                 continue;
             }
             for (j, (other, far)) in self.rings_with_kind().enumerate().skip(i + 1) {
-                let meets = |(a, b): (Flat, Flat)| edges_of(far).any(|(c, d)| segments_cross(&a, &b, &c, &d));
+                let meets = |(a, b): (Flat, Flat)| {
+                    edges_of(far).any(|(c, d)| segments_cross(&a, &b, &c, &d))
+                };
                 if other != RingKind::NoFly && edges_of(ring).any(meets) {
                     return Err(AreaError::RingsCross { ring: i as u16, other: j as u16 });
                 }
@@ -275,7 +280,8 @@ pub(super) fn edges_of(ring: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + Cl
     ring.iter().copied().zip(next.copied())
 }
 
-/// Twice the usual: positive where the ring turns left. f64, since it is a difference of large numbers.
+/// Twice the usual: positive where the ring turns left. f64, since it is a difference of large
+/// numbers.
 pub(super) fn doubled_signed_area(ring: &[Flat]) -> f64 {
     let base = ring[0];
     let twice: f64 = edges_of(ring).map(|(a, b)| cross_product(&(a - base), &(b - base))).sum();
@@ -293,17 +299,20 @@ fn cross_product(a: &Flat, b: &Flat) -> f64 {
 /// Whether a place is inside a ring, by the edges that a ray to the east crosses.
 pub(super) fn is_inside(ring: &[Flat], place: &Flat) -> bool {
     let crossed = |(a, b): &(Flat, Flat)| {
-        (a.y <= place.y) != (b.y <= place.y) && place.x < a.x + (place.y - a.y) * (b.x - a.x) / (b.y - a.y)
+        (a.y <= place.y) != (b.y <= place.y)
+            && place.x < a.x + (place.y - a.y) * (b.x - a.x) / (b.y - a.y)
     };
     edges_of(ring).filter(crossed).count() % 2 == 1
 }
 
-/// A place inside a ring: the middle of the longest stretch of a line across it that misses every vertex.
+/// A place inside a ring: the middle of the longest stretch of a line across it that misses every
+/// vertex.
 fn interior_point(ring: &[Flat]) -> Flat {
     let (low, high) = ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
         (libm::fminf(low, v.y), libm::fmaxf(high, v.y))
     });
-    // The line lies in the middle of the widest step between two vertices' heights near the middle of the ring.
+    // The line lies in the middle of the widest step between two vertices' heights near the middle
+    // of the ring.
     let middle = (low + high) / 2.0;
     let below = ring.iter().map(|v| v.y).filter(|y| *y <= middle).fold(low, libm::fmaxf);
     let above = ring.iter().map(|v| v.y).filter(|y| *y > middle).fold(high, libm::fminf);
@@ -322,7 +331,8 @@ fn interior_point(ring: &[Flat]) -> Flat {
     best.1
 }
 
-/// Whether the segments `a b` and `c d` cross, each reaching at least [`MIN_EDGE_OVERSHOOT_M`] beyond the other.
+/// Whether the segments `a b` and `c d` cross, each reaching at least [`MIN_EDGE_OVERSHOOT_M`]
+/// beyond the other.
 fn segments_cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
     let apart = |p: f32, q: f32, r: f32, s: f32| {
         libm::fmaxf(p, q) < libm::fminf(r, s) || libm::fmaxf(r, s) < libm::fminf(p, q)

@@ -1,11 +1,15 @@
-//! One vehicle's way home over a field, or aside: around no-fly zones and whatever left the plan, without a roadmap.
+//! One vehicle's way home over a field, or aside: around no-fly zones and whatever left the plan,
+//! without a roadmap.
 //!
-//! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad, and down. What is to be kept off is
-//! walked around: a visibility graph over the zones' corners ([`Transit::corners`]) and eight corners around either end of
-//! each [`KeepOutZone`] that reaches the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer leaves no way, the same at the height at which the
-//! vehicle hovers. Aside: the nearest of places on rings around it, straight there.
+//! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad,
+//! and down. What is to be kept off is walked around: a visibility graph over the zones' corners
+//! ([`Transit::corners`]) and eight corners around either end of each [`KeepOutZone`] that reaches
+//! the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer
+//! leaves no way, the same at the height at which the vehicle hovers. Aside: the nearest of places
+//! on rings around it, straight there.
 //!
-//! No leg leaves the request's fence. ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOutZone`]s.
+//! No leg leaves the request's fence. ENU metres. Cost: n² / 2 looks at most for n places, each at
+//! all edges of zones and all [`KeepOutZone`]s.
 
 use heapless::Vec;
 use libm::{ceilf, cosf, fabsf, fminf, sinf};
@@ -49,8 +53,10 @@ struct FreeSpace<'a, 't, const N: usize> {
 
 impl<const N: usize> FreeSpace<'_, '_, N> {
     fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
-        let touches = |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
-        // A box holds what is between two places in it; where the vehicle is it may have deviated beyond.
+        let touches =
+            |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
+        // A box holds what is between two places in it; where the vehicle is it may have deviated
+        // beyond.
         self.is_inside(b)
             && self.transit.is_line_clear(&a.xy(), &b.xy())
             && self.is_above_field(a, b)
@@ -58,7 +64,8 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
     }
 
     fn is_inside(&self, place: &Point) -> bool {
-        self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
+        self.fence
+            .is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
     /// Whether a leg stays above the height field, checked at samples half a node apart.
@@ -76,8 +83,9 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
     }
 }
 
-/// The way to the goal ([`Goal::Home`]), or aside, that keeps clear of all `obstacles`, above the field and out of the
-/// zones that `transit` knows, written to `out`. Of an obstacle that is nearer already the distance is shortened.
+/// The way to the goal ([`Goal::Home`]), or aside, that keeps clear of all `obstacles`, above the
+/// field and out of the zones that `transit` knows, written to `out`. Of an obstacle that is nearer
+/// already the distance is shortened.
 ///
 /// # Errors
 /// Reason why there is none.
@@ -95,10 +103,12 @@ pub fn plan_detour<const N: usize, const W: usize>(
     };
     detour::shrink_zones(obstacles, &request.here);
     let clear = FreeSpace { transit, field, obstacles, here: request.here, fence: request.fence };
-    let from =
-        |points: &[Point], out: &mut Path<W>| write_path(request, points, out).map_err(DetourError::Path);
+    let from = |points: &[Point], out: &mut Path<W>| {
+        write_path(request, points, out).map_err(DetourError::Path)
+    };
     if request.aside {
-        let place = nearest_reachable_place(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
+        let place =
+            nearest_reachable_place(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
         return from(&[place], out);
     }
     let mut graph = VisibilityGraph::EMPTY;
@@ -120,8 +130,8 @@ pub fn plan_detour<const N: usize, const W: usize>(
     Err(DetourError::Search(SearchError::NoPath))
 }
 
-/// As [`plan_detour`], as the plan of one vehicle that leaves the others' plan: only the path of that plan
-/// counts; the plan has no gates.
+/// As [`plan_detour`], as the plan of one vehicle that leaves the others' plan: only the path of
+/// that plan counts; the plan has no gates.
 ///
 /// # Errors
 /// Reason why there is none.
@@ -145,7 +155,8 @@ fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Opti
     let here = clear.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
     let place = |i: usize| {
-        let (far_m, angle) = ((i / SIDESTEP_DIRECTIONS + 1) as f32, (i % SIDESTEP_DIRECTIONS) as f32 * step);
+        let (far_m, angle) =
+            ((i / SIDESTEP_DIRECTIONS + 1) as f32, (i % SIDESTEP_DIRECTIONS) as f32 * step);
         here + Point::new(cosf(angle), sinf(angle), 0.0) * far_m
     };
     let rests = |place: &Point| {
@@ -173,7 +184,8 @@ impl VisibilityGraph {
         settled: [false; MAX_PLACES],
     };
 
-    /// The shortest way between two places of one height: all its points but the first, none where it stays. Whether there is one.
+    /// The shortest way between two places of one height: all its points but the first, none where
+    /// it stays. Whether there is one.
     fn find_shortest_path<const N: usize, const W: usize>(
         &mut self,
         clear: &FreeSpace<'_, '_, N>,
@@ -192,9 +204,12 @@ impl VisibilityGraph {
         self.settled.fill(false);
         self.distance_m[START_NODE] = 0.0;
         loop {
-            let open = (0..self.places.len()).filter(|&i| !self.settled[i] && self.distance_m[i].is_finite());
+            let open = (0..self.places.len())
+                .filter(|&i| !self.settled[i] && self.distance_m[i].is_finite());
             let whole = |i: usize| self.distance_m[i] + (self.places[i] - to.xy()).length();
-            let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else { return Ok(false) };
+            let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else {
+                return Ok(false);
+            };
             if next == END_NODE {
                 break;
             }
@@ -213,7 +228,9 @@ impl VisibilityGraph {
         }
         let mut at = END_NODE;
         while at != START_NODE {
-            points.push(level(&self.places[at])).map_err(|_| DetourError::Path(PathError::PathFull))?;
+            points
+                .push(level(&self.places[at]))
+                .map_err(|_| DetourError::Path(PathError::PathFull))?;
             at = usize::from(self.previous[at]);
         }
         points.push(*from).map_err(|_| DetourError::Path(PathError::PathFull))?;
@@ -221,8 +238,14 @@ impl VisibilityGraph {
         Ok(true)
     }
 
-    /// Collects both ends, corners of zones, and corners around obstacles at this height, up to the capacity.
-    fn collect_nodes<const N: usize>(&mut self, clear: &FreeSpace<'_, '_, N>, from: &Point, to: &Point) {
+    /// Collects both ends, corners of zones, and corners around obstacles at this height, up to the
+    /// capacity.
+    fn collect_nodes<const N: usize>(
+        &mut self,
+        clear: &FreeSpace<'_, '_, N>,
+        from: &Point,
+        to: &Point,
+    ) {
         self.places.clear();
         let mut add = |place: Flat| _ = self.places.push(place);
         add(from.xy());

@@ -1,9 +1,9 @@
 //! A lower bound on max C_k of every contiguous division of a path.
 //!
-//! Two arguments, the larger counts. (1) If m vehicles fly, their routes leave out at most the m − 1 longest steps between
-//! waypoints, each vehicle has at least the way to the nearest waypoint and back, and the layers are all different; the
-//! largest cost is no less than the mean. The least over m. (2) Somebody flies to the waypoint that is furthest from
-//! everybody. O(n · K).
+//! Two arguments, the larger counts. (1) If m vehicles fly, their routes leave out at most the m −
+//! 1 longest steps between waypoints, each vehicle has at least the way to the nearest waypoint and
+//! back, and the layers are all different; the largest cost is no less than the mean. The least
+//! over m. (2) Somebody flies to the waypoint that is furthest from everybody. O(n · K).
 
 use crate::Length;
 use libm::{fmaxf, fminf};
@@ -19,9 +19,12 @@ const MAX_VEHICLES: usize = 32;
 ///
 /// # Errors
 /// As [`Work::check`] for at most 32 vehicles.
-pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> Result<f32, CoverageError> {
+pub fn lower_bound_s<const L: usize, const N: usize>(
+    work: &Work<'_, L, N>,
+) -> Result<f32, CoverageError> {
     work.check::<MAX_VEHICLES>()?;
-    let fastest = |speed: fn(&super::pack::Vehicle) -> f32| work.vehicles.iter().map(speed).fold(0.0, fmaxf);
+    let fastest =
+        |speed: fn(&super::pack::Vehicle) -> f32| work.vehicles.iter().map(speed).fold(0.0, fmaxf);
     let cruise_mps = fastest(|v| v.cruise_mps);
     let vertical = |layer: u8| {
         let delays = work.vehicles.iter().map(|vehicle| work.altitude_delay_s(vehicle, layer));

@@ -1,14 +1,15 @@
 //! A first order of lanes: cells, each flown back and forth, one after the other.
 //!
-//! Lanes that follow each other, one a strip, are a cell: the boustrophedon decomposition (Choset 2000) of the lanes themselves.
-//! From each cell the way goes on to the nearest corner of another. O(cells · lanes + lanes²) sums, and few distances.
+//! Lanes that follow each other, one a strip, are a cell: the boustrophedon decomposition (Choset 2000)
+//! of the lanes themselves. From each cell the way goes on to the nearest corner of another.
+//! O(cells · lanes + lanes²) sums, and few distances.
 
 use super::lanes::Lane;
 use super::transit::Transit;
 use crate::Length;
 
-/// Groups lanes, in the lanes' frame and in the order of their strips, into cells. `first` of a lane becomes the number of its
-/// cell.
+/// Groups lanes, in the lanes' frame and in the order of their strips, into cells. `first` of a
+/// lane becomes the number of its cell.
 pub(super) fn group_into_cells(lanes: &mut [Lane]) {
     let touch = |a: &Lane, b: &Lane| a.from.x < b.to.x && b.from.x < a.to.x;
     let (mut cells, mut below, mut row) = (0, 0, 0);
@@ -17,8 +18,10 @@ pub(super) fn group_into_cells(lanes: &mut [Lane]) {
         if strip != lanes[row].strip {
             (below, row) = (row, k);
         }
-        // The only lane of the strip before that this one touches, if nothing else touches that one.
-        let mut under = (below..row).filter(|&i| lanes[i].strip + 1 == strip && touch(&lanes[i], &lanes[k]));
+        // The only lane of the strip before that this one touches, if nothing else touches that
+        // one.
+        let mut under =
+            (below..row).filter(|&i| lanes[i].strip + 1 == strip && touch(&lanes[i], &lanes[k]));
         let only = under.next().filter(|_| under.next().is_none());
         let alone = |i: &usize| {
             let own = lanes[row..].iter().take_while(|lane| lane.strip == strip);
@@ -34,7 +37,8 @@ pub(super) fn is_break(lanes: &[Lane], k: usize) -> bool {
     k == 0 || k == lanes.len() || lanes[k - 1].first != lanes[k].first
 }
 
-/// Sorts lanes that are grouped by cells: begins with the first cell and always goes to the nearest corner of another.
+/// Sorts lanes that are grouped by cells: begins with the first cell and always goes to the nearest
+/// corner of another.
 pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
     for k in 1..lanes.len() {
         let place = lanes[..k].partition_point(|lane| lane.first <= lanes[k].first);
@@ -70,8 +74,13 @@ struct Entry {
     turned: bool,
 }
 
-/// The first lane of the cell, from lane `done` on, whose corner is nearest to the end of the lane before, and the corner.
-fn nearest_cell<const N: usize>(lanes: &[Lane], done: usize, transit: &Transit<'_, N>) -> (usize, Entry) {
+/// The first lane of the cell, from lane `done` on, whose corner is nearest to the end of the lane
+/// before, and the corner.
+fn nearest_cell<const N: usize>(
+    lanes: &[Lane],
+    done: usize,
+    transit: &Transit<'_, N>,
+) -> (usize, Entry) {
     let here = lanes[done - 1].to;
     let mut best = (f32::INFINITY, done, Entry::default());
     let mut from = done;

@@ -1,15 +1,17 @@
-//! What is left of a path after a loss, as a path of its own: [`super::pack::binpat`] then divides it among the rest.
+//! What is left of a path after a loss, as a path of its own: [`super::pack::binpat`] then divides
+//! it among the rest.
 //!
-//! A pure function of the path and of what is done or promised, so that every vehicle computes the same bits. Waypoints
-//! that are left keep the order and the lane they have; parts of the path between them are transit.
+//! A pure function of the path and of what is done or promised, so that every vehicle computes the
+//! same bits. Waypoints that are left keep the order and the lane they have; parts of the path
+//! between them are transit.
 
 use super::CoverageError;
 use super::tracks::{Lane, Tracks};
 use super::transit::Transit;
 use crate::flight::WaypointRange;
 
-/// Sets `remaining_lanes` to the lanes without these waypoints. Ranges are in rising order and do not overlap. The number that a
-/// waypoint had before is [`original_waypoint_number`].
+/// Sets `remaining_lanes` to the lanes without these waypoints. Ranges are in rising order and do
+/// not overlap. The number that a waypoint had before is [`original_waypoint_number`].
 ///
 /// # Errors
 /// [`CoverageError::Setting`] for ranges that are out of order, [`CoverageError::LanesFull`],
@@ -20,7 +22,9 @@ pub fn remaining_lanes<const L: usize, const N: usize>(
     transit: &Transit<'_, N>,
     left: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    if !is_sorted_disjoint(done) || done.last().is_some_and(|range| range.end > tracks.waypoint_count()) {
+    if !is_sorted_disjoint(done)
+        || done.last().is_some_and(|range| range.end > tracks.waypoint_count())
+    {
         return Err(CoverageError::Setting("done"));
     }
     left.lanes.clear();
@@ -66,7 +70,8 @@ fn push_lane_part<const L: usize>(
     left.lanes.push(part).map_err(|_| CoverageError::LanesFull)
 }
 
-/// The number that waypoint `number` of what is left had on the whole path: the greatest there is where it had none.
+/// The number that waypoint `number` of what is left had on the whole path: the greatest there is
+/// where it had none.
 pub fn original_waypoint_number(done: &[WaypointRange], number: u32) -> u32 {
     let mut whole = number;
     for range in done.iter().filter(|range| range.first < range.end) {

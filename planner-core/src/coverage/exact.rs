@@ -1,10 +1,11 @@
-//! The least max C_k of all contiguous divisions, subsets of vehicles, layers and directions: what the other methods are
-//! measured by. For a desk: 10 vehicles take 2²⁰ states.
+//! The least max C_k of all contiguous divisions, subsets of vehicles, layers and directions: what
+//! the other methods are measured by. For a desk: 10 vehicles take 2²⁰ states.
 //!
-//! Whether all can be done within T seconds is a dynamic program. `reach[vehicles][layers]` is the most waypoints, counted
-//! from the first, that these vehicles in these layers can photograph within T. A route's cost falls neither if it ends
-//! later nor if it begins earlier, by the triangle inequality; so each step takes as much as fits, which two pointers find
-//! for every beginning at once. T is halved down to [`TIME_RESOLUTION`].
+//! Whether all can be done within T seconds is a dynamic program. `reach[vehicles][layers]` is the
+//! most waypoints, counted from the first, that these vehicles in these layers can photograph
+//! within T. A route's cost falls neither if it ends later nor if it begins earlier, by the
+//! triangle inequality; so each step takes as much as fits, which two pointers find for every
+//! beginning at once. T is halved down to [`TIME_RESOLUTION`].
 //!
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
@@ -27,7 +28,8 @@ pub struct Workspace<'a> {
 }
 
 impl Workspace<'_> {
-    /// Lengths of the three for so many vehicles and waypoints: the greatest number there is where no memory has so much.
+    /// Lengths of the three for so many vehicles and waypoints: the greatest number there is where
+    /// no memory has so much.
     pub fn required_lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
         let vehicles = vehicles.min(MAX_EXACT_VEHICLES);
         let reaches = (vehicles * vehicles).saturating_mul(waypoints.saturating_add(1));
@@ -38,7 +40,8 @@ impl Workspace<'_> {
 /// The best plan there is.
 ///
 /// # Errors
-/// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`]; [`CoverageError::WorkspaceTooSmall`].
+/// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`];
+/// [`CoverageError::WorkspaceTooSmall`].
 pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     ws: &mut Workspace<'_>,
@@ -123,7 +126,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
                     }
                     self.ws.reaches[(v * count + layer) * (waypoints + 1) + from] = end as u32;
                 }
-                self.ws.reaches[(v * count + layer) * (waypoints + 1) + waypoints] = waypoints as u32;
+                self.ws.reaches[(v * count + layer) * (waypoints + 1) + waypoints] =
+                    waypoints as u32;
             }
         }
         let sets = 1usize << count;
@@ -133,7 +137,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
                 let done = self.ws.states[flying * sets + layers].0;
                 for v in (0..count).filter(|v| flying >> v & 1 == 0) {
                     for layer in (0..count).filter(|layer| layers >> layer & 1 == 0) {
-                        let end = self.ws.reaches[(v * count + layer) * (waypoints + 1) + done as usize];
+                        let end =
+                            self.ws.reaches[(v * count + layer) * (waypoints + 1) + done as usize];
                         let next = (flying | 1 << v) * sets + (layers | 1 << layer);
                         if end > self.ws.states[next].0 {
                             self.ws.states[next] = (end, (v * count + layer) as u16);
@@ -163,8 +168,9 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
             state = ((state / sets) & !(1 << v)) * sets + ((state % sets) & !(1 << layer));
             let first = self.ws.states[state].0;
             debug_assert_eq!(self.ws.reaches[usize::from(step) * stride + first as usize], end);
-            let (ground_m, heading) =
-                self.work.ground_distance_m(&self.work.vehicles[v], &self.work.route_ends(first, end));
+            let (ground_m, heading) = self
+                .work
+                .ground_distance_m(&self.work.vehicles[v], &self.work.route_ends(first, end));
             let route = Route {
                 vehicle: v as u8,
                 first,

@@ -1,9 +1,10 @@
 //! Routes as flights: each vehicle's path, and the order of the vehicles where two of them meet.
 //!
-//! Source: CPP §3.2: up to the own layer, over to the first waypoint, down, along the lanes, up, home in the layer, down.
-//! The take-off ends and the landing begins close above the pad: all between is path, on which a vehicle can wait.
-//! A flight is one path like any other mission's, so [`crate::schedule`] keeps it apart from the others: the vehicle that
-//! flies longest leaves first, each other one as early as those before it allow, and gates hold that order in the air.
+//! Source: CPP §3.2: up to the own layer, over to the first waypoint, down, along the lanes, up,
+//! home in the layer, down. The take-off ends and the landing begins close above the pad: all
+//! between is path, on which a vehicle can wait. A flight is one path like any other mission's, so
+//! [`crate::schedule`] keeps it apart from the others: the vehicle that flies longest leaves first,
+//! each other one as early as those before it allow, and gates hold that order in the air.
 
 use heapless::Vec;
 
@@ -12,9 +13,13 @@ use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use super::{Flat, divide};
 use crate::field::follow::TerrainFollowing;
-use crate::flight::{Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange};
+use crate::flight::{
+    Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange,
+};
 use crate::plan::{PlanError, SwarmPlan};
-use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
+use crate::schedule::{
+    self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
+};
 use crate::sort;
 use crate::{Length, Point};
 
@@ -73,15 +78,23 @@ pub struct FlightInputs<'a> {
     pub following: Option<TerrainFollowing<'a>>,
 }
 
-/// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there. Of a route
-/// with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`], a flight is the first stretch ([`PicturePlan::goes_on`]): as many lanes as leave
-/// room for the path home. What is left is for the next division ([`super::losses`]).
+/// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a
+/// route stays there. Of a route with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`],
+/// a flight is the first stretch ([`PicturePlan::goes_on`]): as many lanes as leave room for the
+/// path home. What is left is for the next division ([`super::losses`]).
 ///
 /// # Errors
-/// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a vehicle that cannot be kept
-/// apart from the others, [`PlanError::Terminals`] where pads, vehicles, routes and lanes do not belong together,
-/// [`PlanError::Config`] for a setting, [`PlanError::BadTask`] for a vehicle's, [`PlanError::SameId`].
-pub fn plan_flights<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+/// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a
+/// vehicle that cannot be kept apart from the others, [`PlanError::Terminals`] where pads,
+/// vehicles, routes and lanes do not belong together, [`PlanError::Config`] for a setting,
+/// [`PlanError::BadTask`] for a vehicle's, [`PlanError::SameId`].
+pub fn plan_flights<
+    const L: usize,
+    const N: usize,
+    const K: usize,
+    const V: usize,
+    const W: usize,
+>(
     work: &Work<'_, L, N>,
     routes: &Plan<K>,
     swarm: &FlightInputs<'_>,
@@ -97,7 +110,13 @@ pub fn plan_flights<const L: usize, const N: usize, const K: usize, const V: usi
             Some(route) => route_flight(work, route, swarm, pad),
             None if pad.airborne => {
                 // Cannot fail: there are more layers than vehicles.
-                flight_home(work, layers.next().unwrap_or(u8::MAX), &work.vehicles[index], swarm, pad)
+                flight_home(
+                    work,
+                    layers.next().unwrap_or(u8::MAX),
+                    &work.vehicles[index],
+                    swarm,
+                    pad,
+                )
             }
             None => grounded_flight(pad),
         };
@@ -129,7 +148,9 @@ fn check_inputs<const L: usize, const N: usize>(
     crate::all_positive(&settings).map_err(PlanError::Config)?;
     let all = work.tracks.waypoint_count();
     let within = |route: &Route| {
-        route.first < route.end && route.end <= all && usize::from(route.vehicle) < work.vehicles.len()
+        route.first < route.end
+            && route.end <= all
+            && usize::from(route.vehicle) < work.vehicles.len()
     };
     if swarm.pads.len() != work.vehicles.len()
         || !routes.iter().all(within)
@@ -144,8 +165,12 @@ fn check_inputs<const L: usize, const N: usize>(
             ("descend_mps", vehicle.descend_mps),
         ];
         let heights = [pad.climb_m, pad.descent_m];
-        let places =
-            pad.start.iter().chain(vehicle.place.iter()).chain(vehicle.home.iter()).chain([&pad.end_z_m]);
+        let places = pad
+            .start
+            .iter()
+            .chain(vehicle.place.iter())
+            .chain(vehicle.home.iter())
+            .chain([&pad.end_z_m]);
         if crate::all_positive(&speeds).is_err()
             || !heights.iter().all(|height_m| *height_m >= 0.0 && height_m.is_finite())
             || !places.into_iter().all(|place| place.is_finite())
@@ -164,8 +189,9 @@ pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
     (1..64).filter(move |layer| held >> layer & 1 == 0)
 }
 
-/// The vehicle that flies longest leaves first, each other one as early as those before it allow. One that they leave no
-/// departure goes before all of them, and the search begins again. Returns a bound of each vehicle's gates.
+/// The vehicle that flies longest leaves first, each other one as early as those before it allow.
+/// One that they leave no departure goes before all of them, and the search begins again. Returns a
+/// bound of each vehicle's gates.
 fn schedule_departures<const V: usize, const W: usize>(
     swarm: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
@@ -187,7 +213,10 @@ fn schedule_departures<const V: usize, const W: usize>(
             Err((place, error)) => {
                 tries = tries.saturating_sub(1);
                 if tries == 0 || place == stay || error != ScheduleError::Blocked {
-                    return Err(PlanError::Schedule(out.flights[usize::from(order[place].2)].id, error));
+                    return Err(PlanError::Schedule(
+                        out.flights[usize::from(order[place].2)].id,
+                        error,
+                    ));
                 }
                 order[stay..=place].rotate_right(1);
             }
@@ -195,7 +224,8 @@ fn schedule_departures<const V: usize, const W: usize>(
     }
 }
 
-/// Lets vehicles leave in this order; a bound of each one's gates, or the place of the first that cannot.
+/// Lets vehicles leave in this order; a bound of each one's gates, or the place of the first that
+/// cannot.
 fn schedule_in_order<const V: usize, const W: usize>(
     cfg: &ScheduleConfig,
     order: &[(bool, f32, u16)],
@@ -253,7 +283,11 @@ struct FlightPathBuilder<'a, const N: usize, const W: usize> {
 
 impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     /// Without a waypoint yet: the first is to be above the pad.
-    const fn new<const L: usize>(work: &Work<'a, L, N>, swarm: &FlightInputs<'a>, pad: &Pad) -> Self {
+    const fn new<const L: usize>(
+        work: &Work<'a, L, N>,
+        swarm: &FlightInputs<'a>,
+        pad: &Pad,
+    ) -> Self {
         let FlightInputs { clearance_m, following, .. } = *swarm;
         Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start }
     }
@@ -284,12 +318,13 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
     }
 
-    /// Appends the descent to the start of the first lane, which leads to `end`. Returns the index of that waypoint.
+    /// Appends the descent to the start of the first lane, which leads to `end`. Returns the index
+    /// of that waypoint.
     fn descend_to_lane(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
         let here = self.here.xy();
-        let begin = self
-            .following
-            .map_or(point_at_height(&here, mission_m), |following| following.start_point(&here, end));
+        let begin = self.following.map_or(point_at_height(&here, mission_m), |following| {
+            following.start_point(&here, end)
+        });
         self.add_straight_leg(begin)
     }
 
@@ -304,7 +339,11 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     }
 
     /// As `add_picture_leg`, around no-fly zones.
-    fn add_picture_legs_around_zones(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
+    fn add_picture_legs_around_zones(
+        &mut self,
+        to: &Flat,
+        mission_m: f32,
+    ) -> Result<usize, PathError> {
         let mut corners = Vec::new();
         self.find_corners_around_zones(to, &mut corners);
         for corner in &corners {
@@ -314,8 +353,8 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     }
 }
 
-/// How long a leg takes that is flown no faster than `most_mps` and from rest to rest: at its corners a vehicle nearly
-/// stops. Seconds.
+/// How long a leg takes that is flown no faster than `most_mps` and from rest to rest: at its
+/// corners a vehicle nearly stops. Seconds.
 fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     if length_m * PLANNED_ACCEL_MPS2 > most_mps * most_mps {
         length_m / most_mps + most_mps / PLANNED_ACCEL_MPS2
@@ -329,8 +368,8 @@ fn lane_part_of_route(lane: &Lane, route: &Route) -> (u32, u32) {
     (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
 }
 
-/// Heading of a vehicle on this route. A lane of one waypoint has no direction of its own: with the heading along the path, such a
-/// route keeps the direction of the other lanes all the way.
+/// Heading of a vehicle on this route. A lane of one waypoint has no direction of its own: with the
+/// heading along the path, such a route keeps the direction of the other lanes all the way.
 fn heading_mode<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -339,7 +378,9 @@ fn heading_mode<const L: usize, const N: usize>(
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let alone = |lane: usize| {
         let lane = work.tracks.lanes().get(lane);
-        lane.is_some_and(|lane| matches!(lane_part_of_route(lane, route), (begin, end) if begin == end))
+        lane.is_some_and(
+            |lane| matches!(lane_part_of_route(lane, route), (begin, end) if begin == end),
+        )
     };
     let along = work.tracks.lane_direction();
     match swarm.capture.heading_mode {
@@ -376,7 +417,8 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
     }
 }
 
-/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the path home.
+/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the
+/// path home.
 fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -387,7 +429,8 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
     let CaptureSettings { waypoint_m, trigger, .. } = swarm.capture;
     let look = heading_mode(work, route, swarm);
-    let done = swarm.photographed.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
+    let done =
+        swarm.photographed.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
     let area = work.tracks.waypoint_count().saturating_add(done);
     let backward = route.heading == Heading::Backward;
     let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, backward);

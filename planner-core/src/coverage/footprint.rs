@@ -28,7 +28,8 @@ pub enum Camera {
     },
 }
 
-/// The rectangle on the ground in one picture; the long side lies across the lanes, so that there are the fewest.
+/// The rectangle on the ground in one picture; the long side lies across the lanes, so that there
+/// are the fewest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     /// Along the lanes, metres.
@@ -129,7 +130,9 @@ impl Spacing {
         crate::all_positive(&sides).map_err(|error| CoverageError::Setting(error.0))?;
         // Spacings that were computed from the footprint may be a rounding above it.
         let beyond = |spacing: f32, side: f32| spacing > side * (1.0 + 1e-5);
-        if beyond(self.lane_m, self.footprint.across_m) || beyond(self.waypoint_m, self.footprint.along_m) {
+        if beyond(self.lane_m, self.footprint.across_m)
+            || beyond(self.waypoint_m, self.footprint.along_m)
+        {
             return Err(CoverageError::Gaps);
         }
         Ok(())

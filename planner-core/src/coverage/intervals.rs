@@ -61,7 +61,10 @@ impl<const N: usize> Intervals<N> {
             match (low < from, high > to) {
                 (true, true) => {
                     self.spans[i][1] = from;
-                    return self.spans.insert(i + 1, [to, high]).map_err(|_| CoverageError::LanesFull);
+                    return self
+                        .spans
+                        .insert(i + 1, [to, high])
+                        .map_err(|_| CoverageError::LanesFull);
                 }
                 (true, false) => {
                     self.spans[i][1] = from;

@@ -20,7 +20,8 @@ pub struct LanePattern {
     pub angle_deg: Option<f32>,
     /// Distance beyond the area's edge at which lanes begin and end, metres.
     pub margin_m: f32,
-    /// Most changes of the lanes' order that are looked at; few of them cost distances around zones.
+    /// Most changes of the lanes' order that are looked at; few of them cost distances around
+    /// zones.
     pub search_steps: u32,
 }
 
@@ -31,11 +32,13 @@ pub struct Lane {
     pub from: Flat,
     /// End of the lane.
     pub to: Flat,
-    /// Number of its first waypoint, counted along the whole path; while lanes are ordered, that of its cell.
+    /// Number of its first waypoint, counted along the whole path; while lanes are ordered, that of
+    /// its cell.
     pub first: u32,
     /// Waypoints on it, at least 1.
     pub count: u32,
-    /// Length of the whole path before its first waypoint, metres; while lanes are ordered, of the way to the next one.
+    /// Length of the whole path before its first waypoint, metres; while lanes are ordered, of the
+    /// way to the next one.
     pub start_m: f32,
     /// The strip it lies in.
     pub strip: u16,
@@ -49,7 +52,11 @@ impl Lane {
 
     /// Waypoint `k` of it, from 0: the last one for numbers beyond.
     pub fn waypoint(&self, k: u32) -> Flat {
-        if self.count < 2 { self.from } else { self.from + (self.to - self.from) * self.fraction_at(k) }
+        if self.count < 2 {
+            self.from
+        } else {
+            self.from + (self.to - self.from) * self.fraction_at(k)
+        }
     }
 
     fn fraction_at(&self, k: u32) -> f32 {
@@ -124,8 +131,11 @@ impl<const L: usize> Tracks<L> {
             if steps > MAX_WAYPOINTS {
                 return Err(CoverageError::Setting("waypoint_m"));
             }
-            lane.count =
-                if lane.length_m() < super::area::SAME_VERTEX_M { 1 } else { fmaxf(steps, 1.0) as u32 + 1 };
+            lane.count = if lane.length_m() < super::area::SAME_VERTEX_M {
+                1
+            } else {
+                fmaxf(steps, 1.0) as u32 + 1
+            };
         }
         self.measure_lengths(transit)
     }

@@ -1,8 +1,9 @@
-//! The division after a loss: what is left of the area goes to the vehicles that fly on, from where they hold.
+//! The division after a loss: what is left of the area goes to the vehicles that fly on, from where
+//! they hold.
 //!
-//! Beyond CPP, which has this as future work. It is BINPAT over what is left ([`super::divide`]), a pure function of the plan
-//! before it and of what all vehicles agree on, their [`VehicleStatus`]s: every vehicle computes the same bits. A further loss is
-//! divided from the division before.
+//! Beyond CPP, which has this as future work. It is BINPAT over what is left ([`super::divide`]), a
+//! pure function of the plan before it and of what all vehicles agree on, their [`VehicleStatus`]s:
+//! every vehicle computes the same bits. A further loss is divided from the division before.
 
 use heapless::Vec;
 
@@ -55,9 +56,9 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
         }
     }
 
-    /// To be called before the first division of a plan: these waypoints are done, by their numbers on the whole path. Where
-    /// that is all of it, the area is begun again. Returns the lanes that are left, and what is
-    /// done.
+    /// To be called before the first division of a plan: these waypoints are done, by their numbers
+    /// on the whole path. Where that is all of it, the area is begun again. Returns the lanes that
+    /// are left, and what is done.
     ///
     /// # Errors
     /// Those of [`divide::remaining_lanes`]; [`CoverageError::LanesFull`] for too many ranges.
@@ -128,12 +129,20 @@ impl From<PlanError> for Error {
     }
 }
 
-/// Divides what is left. `routes` are those of the plan before, `out` has its flights; afterwards both are those of the division.
+/// Divides what is left. `routes` are those of the plan before, `out` has its flights; afterwards
+/// both are those of the division.
 ///
 /// # Errors
-/// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`]; [`CoverageError::Vehicles`] where fates, routes and
-/// vehicles do not belong together; [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
-pub fn redivide_work<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+/// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
+/// [`CoverageError::Vehicles`] where fates, routes and vehicles do not belong together;
+/// [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
+pub fn redivide_work<
+    const L: usize,
+    const N: usize,
+    const K: usize,
+    const V: usize,
+    const W: usize,
+>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
     pack: &mut PackWorkspace<K>,
@@ -179,7 +188,8 @@ const fn layer_bit(layer: u8) -> u64 {
     1u64.wrapping_shl(layer as u32)
 }
 
-/// Adds the waypoints that each vehicle has photographed, or keeps as its commitment, to the earlier ones.
+/// Adds the waypoints that each vehicle has photographed, or keeps as its commitment, to the
+/// earlier ones.
 fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: usize>(
     fates: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
@@ -190,7 +200,9 @@ fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: u
         let taken = photographs.taken_count(&flight.path, fate.along_m);
         let sure = fate.alive || fate.along_m.is_infinite();
         let count = if sure { taken } else { taken.saturating_sub(1) };
-        for range in photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: count }) {
+        for range in
+            photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: count })
+        {
             ws.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }
     }
@@ -198,7 +210,13 @@ fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: u
 }
 
 /// Sets the place from which each vehicle continues.
-fn set_start_places<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+fn set_start_places<
+    const L: usize,
+    const N: usize,
+    const K: usize,
+    const V: usize,
+    const W: usize,
+>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
@@ -235,10 +253,15 @@ fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
     if survivors.iter().all(|vehicle| vehicle.weight == 0.0) {
         survivors.iter_mut().for_each(|vehicle| vehicle.weight = 1.0);
     }
-    pack::binpat(&Work { tracks: &ws.remaining, vehicles: &survivors, ..*work }, pack, &mut ws.rest)?;
+    pack::binpat(
+        &Work { tracks: &ws.remaining, vehicles: &survivors, ..*work },
+        pack,
+        &mut ws.rest,
+    )?;
     for route in &ws.rest.routes {
         let vehicle = living().nth(usize::from(route.vehicle)).ok_or(CoverageError::Vehicles)?;
-        let layer = flights::free_layers(ws.held_layers).nth(usize::from(route.layer).saturating_sub(1));
+        let layer =
+            flights::free_layers(ws.held_layers).nth(usize::from(route.layer).saturating_sub(1));
         let layer = layer.ok_or(CoverageError::Vehicles)?;
         let route = Route { vehicle: vehicle as u8, layer, ..*route };
         routes.routes.push(route).map_err(|_| CoverageError::Vehicles)?;

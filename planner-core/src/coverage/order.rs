@@ -1,12 +1,14 @@
-//! The order in which lanes are flown, and each one's direction: the shortest way from lane to lane.
+//! The order in which lanes are flown, and each one's direction: the shortest way from lane to
+//! lane.
 //!
-//! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1), from the end where that joins them by
-//! less. Elsewhere a first order takes one cell after the other (`cells`). Parts of it are turned round (2-opt) and
-//! cells of up to ten lanes moved (Or-opt) as long as that shortens the way. Lanes that are laid for what no strip shows
-//! (`patches`) are put where they make the way longer by least; then the same is done with lanes instead of cells,
-//! until the looks are used up. Both ends of the way are free. O(n²) sums a round, rounds bounded by `steps_left`, and O(n²) for
-//! the first order: ways between lanes that follow each other are kept, and a distance around zones is taken only where straight
-//! lines would be shorter.
+//! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1), from the end
+//! where that joins them by less. Elsewhere a first order takes one cell after the other (`cells`).
+//! Parts of it are turned round (2-opt) and cells of up to ten lanes moved (Or-opt) as long as that
+//! shortens the way. Lanes that are laid for what no strip shows (`patches`) are put where they
+//! make the way longer by least; then the same is done with lanes instead of cells, until the looks
+//! are used up. Both ends of the way are free. O(n²) sums a round, rounds bounded by `steps_left`,
+//! and O(n²) for the first order: ways between lanes that follow each other are kept, and a
+//! distance around zones is taken only where straight lines would be shorter.
 
 use super::Flat;
 use super::cells::{is_break, order_cells};
@@ -19,8 +21,8 @@ const MIN_GAIN_M: f32 = 1e-3;
 /// Most lanes that Or-opt moves together: whole cells at first.
 const MAX_MOVED: usize = 10;
 
-/// Sorts lanes into the order and the directions in which they are flown. The first `strips` of them are along the middle of
-/// strips, in the strips' order and grouped into cells.
+/// Sorts lanes into the order and the directions in which they are flown. The first `strips` of
+/// them are along the middle of strips, in the strips' order and grouped into cells.
 pub(super) fn order_lanes<const N: usize>(
     lanes: &mut [Lane],
     strips: usize,
@@ -56,7 +58,8 @@ fn should_reverse_first(lanes: &[Lane]) -> bool {
     gain_m > MIN_GAIN_M
 }
 
-/// Changes of an order. Meanwhile `start_m` of a lane is the length of the way from it to the next one.
+/// Changes of an order. Meanwhile `start_m` of a lane is the length of the way from it to the next
+/// one.
 struct LaneOrderSearch<'t, 'a, const N: usize> {
     transit: &'t Transit<'a, N>,
     steps_left: u32,
@@ -109,10 +112,13 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
                 let after = lanes.get(j + 1).map(|lane| lane.from);
                 let (from, to) = (lanes[i].from, lanes[j].to);
                 // No way is shorter than the straight one.
-                if straight_distance_m(before, to) + straight_distance_m(after, from) > old - MIN_GAIN_M {
+                if straight_distance_m(before, to) + straight_distance_m(after, from)
+                    > old - MIN_GAIN_M
+                {
                     continue;
                 }
-                let new = self.transit_length_m(before, Some(to)) + self.transit_length_m(Some(from), after);
+                let new = self.transit_length_m(before, Some(to))
+                    + self.transit_length_m(Some(from), after);
                 if new < old - MIN_GAIN_M {
                     reverse_lanes(&mut lanes[i..=j]);
                     self.measure_links(lanes, &[i, j + 1]);
@@ -123,7 +129,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// Or-opt: moves up to [`MAX_MOVED`] lanes that follow each other, at first whole cells, as they are or turned round.
+    /// Or-opt: moves up to [`MAX_MOVED`] lanes that follow each other, at first whole cells, as
+    /// they are or turned round.
     fn or_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();
@@ -153,7 +160,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// The best place for `len` lanes from `i` on: they would stand before the lane that is at it now.
+    /// The best place for `len` lanes from `i` on: they would stand before the lane that is at it
+    /// now.
     fn best_insertion(&mut self, lanes: &[Lane], i: usize, len: usize) -> Option<(usize, bool)> {
         let before = i.checked_sub(1).map(|k| lanes[k].to);
         let after = lanes.get(i + len).map(|lane| lane.from);
@@ -161,8 +169,10 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         if links_m - before.map_or(0.0, |before| straight_distance_m(after, before)) <= MIN_GAIN_M {
             return None;
         }
-        let mut best =
-            Insertion { more_m: links_m - self.transit_length_m(before, after) - MIN_GAIN_M, at: None };
+        let mut best = Insertion {
+            more_m: links_m - self.transit_length_m(before, after) - MIN_GAIN_M,
+            at: None,
+        };
         for place in (0..i).chain(i + len + 1..=lanes.len()).filter(|k| is_break(lanes, *k)) {
             if !self.take_search_step() {
                 break;
@@ -189,16 +199,25 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
 
     /// Whether the way becomes longer by less where a part with these ends comes before a lane.
     #[inline(never)]
-    fn try_insertion(&self, lanes: &[Lane], place: usize, [from, to]: [Flat; 2], best: &mut Insertion) {
+    fn try_insertion(
+        &self,
+        lanes: &[Lane],
+        place: usize,
+        [from, to]: [Flat; 2],
+        best: &mut Insertion,
+    ) {
         let left = place.checked_sub(1).map(|k| lanes[k].to);
         let right = lanes.get(place).map(|lane| lane.from);
         let gap = link_before_m(lanes, place);
         for (first, last, turned) in [(from, to, false), (to, from, true)] {
-            if straight_distance_m(left, first) + straight_distance_m(right, last) - gap >= best.more_m {
+            if straight_distance_m(left, first) + straight_distance_m(right, last) - gap
+                >= best.more_m
+            {
                 continue;
             }
-            let more_m =
-                self.transit_length_m(left, Some(first)) + self.transit_length_m(Some(last), right) - gap;
+            let more_m = self.transit_length_m(left, Some(first))
+                + self.transit_length_m(Some(last), right)
+                - gap;
             if more_m < best.more_m {
                 *best = Insertion { more_m, at: Some((place, turned)) };
             }
@@ -206,7 +225,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
     }
 }
 
-/// Where a part of the order is put: by how much the way becomes longer; before which lane, and whether turned round.
+/// Where a part of the order is put: by how much the way becomes longer; before which lane, and
+/// whether turned round.
 struct Insertion {
     more_m: f32,
     at: Option<(usize, bool)>,

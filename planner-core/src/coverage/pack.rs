@@ -1,12 +1,14 @@
 //! SIMPLE-BINPAT and BINPAT: the path is cut into contiguous routes, and routes go to vehicles.
 //!
-//! Source: CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills one bin after the other with tracks until
-//! its share of the whole length is full; the track that would exceed the share goes in only where the result is nearer to
-//! it. The last bin with a share takes the rest. Bins go to vehicles by linear sum assignment over the way from a vehicle's
-//! place to the first waypoint and from the last one home, in the better of both directions. The higher the cost, the
+//! Source: CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills one bin after the
+//! other with tracks until its share of the whole length is full; the track that would exceed the
+//! share goes in only where the result is nearer to it. The last bin with a share takes the rest.
+//! Bins go to vehicles by linear sum assignment over the way from a vehicle's place to the first
+//! waypoint and from the last one home, in the better of both directions. The higher the cost, the
 //! lower the layer. `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (CPP eq. 4).
 //!
-//! Δh is at least one layer: a vehicle in transit never is at the height at which others photograph.
+//! Δh is at least one layer: a vehicle in transit never is at the height at which others
+//! photograph.
 //!
 //! Cost: K vehicles, n lanes: K · log n, K² ways, one assignment (K³).
 
@@ -38,7 +40,8 @@ pub struct Vehicle {
 /// Heights of a mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heights {
-    /// h_m: the height at which pictures are taken, above the ground from which vehicles take off, metres.
+    /// h_m: the height at which pictures are taken, above the ground from which vehicles take off,
+    /// metres.
     pub mission_m: f32,
     /// Height from one transit layer to the next, metres.
     pub layer_m: f32,
@@ -103,7 +106,8 @@ impl Route {
     }
 }
 
-/// All routes, in the order of the path: at most one a vehicle. A vehicle without one stays on the ground.
+/// All routes, in the order of the path: at most one a vehicle. A vehicle without one stays on the
+/// ground.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan<const K: usize> {
     /// The routes.
@@ -177,7 +181,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     /// Whether all settings are what they may be.
     ///
     /// # Errors
-    /// The setting that is not; [`CoverageError::Vehicles`] for none or more than `K`; [`CoverageError::NothingToCover`].
+    /// The setting that is not; [`CoverageError::Vehicles`] for none or more than `K`;
+    /// [`CoverageError::NothingToCover`].
     pub fn check<const K: usize>(&self) -> Result<(), CoverageError> {
         if self.vehicles.is_empty() || self.vehicles.len() > K.min(usize::from(u8::MAX)) {
             return Err(CoverageError::Vehicles);
@@ -220,7 +225,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         RouteEnds {
             first: place(first),
             last: place(end - 1),
-            inside_m: self.tracks.distance_to_waypoint_m(end - 1) - self.tracks.distance_to_waypoint_m(first),
+            inside_m: self.tracks.distance_to_waypoint_m(end - 1)
+                - self.tracks.distance_to_waypoint_m(first),
         }
     }
 
@@ -228,7 +234,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     #[inline(never)]
     pub(super) fn ground_distance_m(&self, vehicle: &Vehicle, ends: &RouteEnds) -> (f32, Heading) {
         let transit_m = |from: &Flat, to: &Flat| {
-            self.transit.distance_m(&vehicle.place, from) + self.transit.distance_m(to, &vehicle.home)
+            self.transit.distance_m(&vehicle.place, from)
+                + self.transit.distance_m(to, &vehicle.home)
         };
         let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.place == vehicle.home {
@@ -265,13 +272,19 @@ pub fn binpat<const L: usize, const N: usize, const K: usize>(
         *share = vehicle.weight;
     }
     let alike = work.vehicles.iter().all(|vehicle| vehicle.weight == work.vehicles[0].weight);
-    pack_routes(work, if alike { BinEligibility::Anyone } else { BinEligibility::SameWeight }, ws, out)
+    pack_routes(
+        work,
+        if alike { BinEligibility::Anyone } else { BinEligibility::SameWeight },
+        ws,
+        out,
+    )
 }
 
 /// BINPAT by shares that were found before (POWELL's W): any vehicle may take any bin.
 ///
 /// # Errors
-/// See [`Work::check`]; [`CoverageError::Setting`] for shares that are not one a vehicle, finite, at least 0 and not all 0.
+/// See [`Work::check`]; [`CoverageError::Setting`] for shares that are not one a vehicle, finite,
+/// at least 0 and not all 0.
 pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     shares: &[f32],
@@ -312,7 +325,12 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
 }
 
 /// CBinPack: `ends[k]` becomes the number after bin `k`'s last waypoint.
-pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: TrackUnit, shares: &[f32], ends: &mut [u32]) {
+pub fn cbinpack<const L: usize>(
+    tracks: &Tracks<L>,
+    unit: TrackUnit,
+    shares: &[f32],
+    ends: &mut [u32],
+) {
     let whole: f32 = shares.iter().sum();
     let total_m = tracks.length_m();
     let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
@@ -329,9 +347,14 @@ pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: TrackUnit, shares: &[f
     }
 }
 
-/// Puts tracks from waypoint `from` on into a bin that is full at `full_m` along the path: the number after its last
-/// waypoint, and how far along the path that is.
-fn fill_bin<const L: usize>(tracks: &Tracks<L>, unit: TrackUnit, from: u32, full_m: f32) -> (u32, f32) {
+/// Puts tracks from waypoint `from` on into a bin that is full at `full_m` along the path: the
+/// number after its last waypoint, and how far along the path that is.
+fn fill_bin<const L: usize>(
+    tracks: &Tracks<L>,
+    unit: TrackUnit,
+    from: u32,
+    full_m: f32,
+) -> (u32, f32) {
     let lanes = tracks.lanes();
     // The lane in which the bin gets full.
     let lane = lanes.partition_point(|lane| lane.start_m + lane.length_m() <= full_m);
@@ -410,8 +433,8 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
     for (row, route) in out.routes.iter_mut().enumerate() {
         let vehicle = usize::from(ws.columns[row].ok_or(CoverageError::Unreachable)?);
         route.vehicle = vehicle as u8;
-        (route.ground_m, route.heading) =
-            work.ground_distance_m(&work.vehicles[vehicle], &work.route_ends(route.first, route.end));
+        (route.ground_m, route.heading) = work
+            .ground_distance_m(&work.vehicles[vehicle], &work.route_ends(route.first, route.end));
         if !route.ground_m.is_finite() {
             return Err(CoverageError::Unreachable);
         }
@@ -424,7 +447,8 @@ pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     plan: &mut Plan<K>,
 ) {
-    let seconds = |route: &Route| route.ground_m / work.vehicles[usize::from(route.vehicle)].cruise_mps;
+    let seconds =
+        |route: &Route| route.ground_m / work.vehicles[usize::from(route.vehicle)].cruise_mps;
     for i in 0..plan.routes.len() {
         let own = seconds(&plan.routes[i]);
         let longer = plan.routes.iter().enumerate().filter(|(j, other)| {
@@ -445,6 +469,7 @@ pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
         let vehicle = &work.vehicles[usize::from(route.vehicle)];
         let top_m = work.heights.mission_m + f32::from(route.layer) * work.heights.layer_m;
         route.cost_m = route.ground_m + 2.0 * top_m;
-        route.cost_s = route.ground_m / vehicle.cruise_mps + work.altitude_delay_s(vehicle, route.layer);
+        route.cost_s =
+            route.ground_m / vehicle.cruise_mps + work.altitude_delay_s(vehicle, route.layer);
     }
 }

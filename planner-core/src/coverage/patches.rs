@@ -1,10 +1,11 @@
 //! More lanes where a no-fly zone covers the middle of a strip and not all of it.
 //!
-//! A strip that a zone reaches into, and of which something is left, is cut into eighths. What no lane shows of one yet gets
-//! lanes along the strip's border next to it, which is furthest from the middle that is not free, then along the eighth's own
-//! middle and lines beside that: a footprint reaches at least half a lane to both sides. What one picture shows gets one, as
-//! near to the middle of it as is free. O(strips at zones · 8 · (vertices + lanes)), and 18 lines for each eighth of which something
-//! stays left.
+//! A strip that a zone reaches into, and of which something is left, is cut into eighths. What no
+//! lane shows of one yet gets lanes along the strip's border next to it, which is furthest from the
+//! middle that is not free, then along the eighth's own middle and lines beside that: a footprint
+//! reaches at least half a lane to both sides. What one picture shows gets one, as near to the
+//! middle of it as is free. O(strips at zones · 8 · (vertices + lanes)), and 18 lines for each
+//! eighth of which something stays left.
 
 use libm::{fmaxf, fminf};
 
@@ -24,7 +25,8 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     ws: &mut Sets<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    for strip in (0..strips.count).filter(|strip| overlaps_no_fly_zone(strips, strips.strip_borders(*strip)))
+    for strip in
+        (0..strips.count).filter(|strip| overlaps_no_fly_zone(strips, strips.strip_borders(*strip)))
     {
         // Where lanes show all of a strip, they show all of its parts.
         let [low, high] = strips.strip_borders(strip);
@@ -43,7 +45,8 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     Ok(())
 }
 
-/// Lays lanes for an eighth of a strip, the nearer border of which is given, until nothing is left of it.
+/// Lays lanes for an eighth of a strip, the nearer border of which is given, until nothing is left
+/// of it.
 fn lay_missing_lanes_of<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),
@@ -87,14 +90,16 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
 /// Whether a no-fly zone comes between two `v`.
 fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
     strips.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly).any(|(_, ring)| {
-        let (first, last) = ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), corner| {
-            (fminf(first, corner.y), fmaxf(last, corner.y))
-        });
+        let (first, last) =
+            ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), corner| {
+                (fminf(first, corner.y), fmaxf(last, corner.y))
+            });
         first <= high + ZONE_CLEARANCE_M && last >= low - ZONE_CLEARANCE_M
     })
 }
 
-/// `ws.needed` becomes what no lane shows yet of the strip's part between two `v`, and no zone holds.
+/// `ws.needed` becomes what no lane shows yet of the strip's part between two `v`, and no zone
+/// holds.
 fn compute_uncovered<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     span: Span,
@@ -107,7 +112,8 @@ fn compute_uncovered<const L: usize, const V: usize>(
     for lane in tracks.lanes().iter().filter(|lane| covers_band(strips, lane.from.y, span)) {
         ws.needed.remove([lane.from.x - along, lane.to.x + along])?;
     }
-    // Intervals that rounding left over are dropped: shorter than what two pictures that meet keep back.
+    // Intervals that rounding left over are dropped: shorter than what two pictures that meet keep
+    // back.
     let kept_back_m = strips.pattern.spacing.footprint.along_m / 2.0 - along;
     ws.needed.drop_shorter(fminf(strips.strip_width_m / 100.0, kept_back_m));
     Ok(())

@@ -1,11 +1,14 @@
-//! POWELL-BINPAT: the shares W, 0 ≤ W_k ≤ 1, that make max C_k least; a share of nothing leaves a vehicle on the ground.
+//! POWELL-BINPAT: the shares W, 0 ≤ W_k ≤ 1, that make max C_k least; a share of nothing leaves a
+//! vehicle on the ground.
 //!
-//! Source: CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a function of several variables
-//! without calculating derivatives", Computer Journal 7 (1964). Own and bounded: at most `evaluations` packings.
+//! Source: CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a function
+//! of several variables without calculating derivatives", Computer Journal 7 (1964). Own and
+//! bounded: at most `evaluations` packings.
 //!
-//! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to the other), so a line search looks
-//! at points all along the line first and narrows around the best. Each bin's share is taken by the sum of all, as in
-//! [`super::pack::cbinpack`]. The start is BINPAT with equal shares, and the best plan seen is kept: never worse than that.
+//! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to the other),
+//! so a line search looks at points all along the line first and narrows around the best. Each
+//! bin's share is taken by the sum of all, as in [`super::pack::cbinpack`]. The start is BINPAT
+//! with equal shares, and the best plan seen is kept: never worse than that.
 
 use super::CoverageError;
 use super::pack::{BinEligibility, PackWorkspace, Plan, Work, pack_routes};
@@ -70,8 +73,13 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     let count = work.vehicles.len();
-    let mut search =
-        ShareSearch { work, evaluations_left: config.evaluations.max(1), least_cost: f32::INFINITY, ws, out };
+    let mut search = ShareSearch {
+        work,
+        evaluations_left: config.evaluations.max(1),
+        least_cost: f32::INFINITY,
+        ws,
+        out,
+    };
     let weights = work.vehicles.iter().map(|vehicle| vehicle.weight);
     let largest = weights.clone().fold(0.0, libm::fmaxf);
     for (share, weight) in search.ws.current.iter_mut().zip(weights) {
@@ -142,9 +150,16 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
     }
 
     /// The least cost along a line through `current`, inside the box; `current` moves there.
-    fn line_search(&mut self, line: &[f32; K], count: usize, cost: f32) -> Result<f32, CoverageError> {
+    fn line_search(
+        &mut self,
+        line: &[f32; K],
+        count: usize,
+        cost: f32,
+    ) -> Result<f32, CoverageError> {
         let from = self.ws.current;
-        let Some((low, high)) = range_in_box(&from[..count], &line[..count]) else { return Ok(cost) };
+        let Some((low, high)) = range_in_box(&from[..count], &line[..count]) else {
+            return Ok(cost);
+        };
         let mut best = (cost, 0.0);
         let step = (high - low) / LINE_POINTS as f32;
         for k in 0..=LINE_POINTS {

@@ -12,7 +12,8 @@ use super::{CoverageError, Flat};
 use crate::geometry::{Length as _, clamp_to};
 use crate::sort;
 
-/// A width that is a whole number of lanes is often a rounding above it: up to this share of a lane. More is not in their pictures.
+/// A width that is a whole number of lanes is often a rounding above it: up to this share of a
+/// lane. More is not in their pictures.
 pub(super) const WIDTH_ROUNDING: f32 = 1e-4;
 
 /// Memory lent: `V` is at least the number of the area's vertices.
@@ -84,11 +85,15 @@ pub(super) struct Strips<'a> {
 
 impl<'a> Strips<'a> {
     pub(super) fn new(area: &Area<'a>, pattern: &LanePattern) -> Result<Self, CoverageError> {
-        let outer =
-            area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::Outer).flat_map(|(_, ring)| ring);
+        let outer = area
+            .rings_with_kind()
+            .filter(|(kind, _)| *kind == RingKind::Outer)
+            .flat_map(|(_, ring)| ring);
         let (low, high) = outer
             .map(|vertex| vertex.y)
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (fminf(low, v), fmaxf(high, v)));
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
+                (fminf(low, v), fmaxf(high, v))
+            });
         let count = fmaxf(ceilf((high - low) / pattern.spacing.lane_m - WIDTH_ROUNDING), 1.0);
         if count > f32::from(u16::MAX) {
             return Err(CoverageError::LanesFull);
@@ -117,14 +122,15 @@ impl<'a> Strips<'a> {
         project_rings(self.area.edges(), self.inset(span), &mut ws.crossings, &mut ws.needed)
     }
 
-    /// A little less than what lies between two `v`: a ring that only touches the border of a strip is its neighbour's.
+    /// A little less than what lies between two `v`: a ring that only touches the border of a strip
+    /// is its neighbour's.
     fn inset(&self, [low, high]: Span) -> Span {
         let inset = self.strip_width_m * 1e-4;
         [low + inset, high - inset]
     }
 
-    /// Takes from `ws.needed` every `u` at which one no-fly zone holds all between two `v`: those inside it on both border
-    /// lines, without those of its edges between them.
+    /// Takes from `ws.needed` every `u` at which one no-fly zone holds all between two `v`: those
+    /// inside it on both border lines, without those of its edges between them.
     pub(super) fn subtract_no_fly_zones<const V: usize>(
         &self,
         span: Span,
@@ -154,8 +160,13 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Sets `ws.barred` to every `u` at which the line `v` comes nearer than the clearance to a no-fly zone.
-    fn compute_barred<const V: usize>(&self, v: f32, ws: &mut Sets<V>) -> Result<(), CoverageError> {
+    /// Sets `ws.barred` to every `u` at which the line `v` comes nearer than the clearance to a
+    /// no-fly zone.
+    fn compute_barred<const V: usize>(
+        &self,
+        v: f32,
+        ws: &mut Sets<V>,
+    ) -> Result<(), CoverageError> {
         ws.barred.clear();
         for (_, ring) in self.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly) {
             line_crossings(edges_of(ring), v, &mut ws.crossings)?;
@@ -195,8 +206,8 @@ impl<'a> Strips<'a> {
         self.lay_between_borders(strip, v, ws, out)
     }
 
-    /// Lays lanes where `ws.barred` lets them be, from border to border of those in `ws.crossings`. What one picture shows that is on
-    /// no border gets one, as near to its middle as can be.
+    /// Lays lanes where `ws.barred` lets them be, from border to border of those in `ws.crossings`.
+    /// What one picture shows that is on no border gets one, as near to its middle as can be.
     #[inline(never)]
     fn lay_between_borders<const L: usize, const V: usize>(
         &self,
@@ -238,16 +249,20 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Where a lane begins and ends for an area that reaches over `need` in its strip: from border to border, further where the
-    /// first or last picture would else leave a part out. It ends before it begins where one picture between both shows all.
+    /// Where a lane begins and ends for an area that reaches over `need` in its strip: from border
+    /// to border, further where the first or last picture would else leave a part out. It ends
+    /// before it begins where one picture between both shows all.
     fn lane_extent(&self, need: &Span, borders: &[f32]) -> Span {
         let reach = self.picture_half_width();
         let inside = borders.iter().filter(|u| (need[0]..=need[1]).contains(u));
-        inside.fold([need[0] + reach, need[1] - reach], |[from, to], u| [fminf(from, *u), fmaxf(to, *u)])
+        inside.fold([need[0] + reach, need[1] - reach], |[from, to], u| {
+            [fminf(from, *u), fmaxf(to, *u)]
+        })
     }
 
-    /// Distance beyond its middle to which a picture shows the lane: half its side, less a rounding. Where pictures overlap, one of
-    /// them is to show all of a cell, a tenth of the spacing, that a border cuts: two of them that meet overlap by more than that.
+    /// Distance beyond its middle to which a picture shows the lane: half its side, less a
+    /// rounding. Where pictures overlap, one of them is to show all of a cell, a tenth of the
+    /// spacing, that a border cuts: two of them that meet overlap by more than that.
     pub(super) fn picture_half_width(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
@@ -281,9 +296,9 @@ fn line_crossings<const V: usize>(
     Ok(())
 }
 
-/// Projects these rings on the strip between two `v`: adds every `u` at which they hold a place there, those of the places on the
-/// lines at both borders, and those of the rings' own edges between them. A place inside that is not on a border line crosses an
-/// edge before it.
+/// Projects these rings on the strip between two `v`: adds every `u` at which they hold a place
+/// there, those of the places on the lines at both borders, and those of the rings' own edges
+/// between them. A place inside that is not on a border line crosses an edge before it.
 fn project_rings<const V: usize>(
     edges: impl Iterator<Item = (Flat, Flat)> + Clone,
     [low, high]: Span,
@@ -313,8 +328,8 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
     Some([fminf(from, to), fmaxf(from, to)])
 }
 
-/// Range of the line `v` that is nearer than the clearance to an edge: between the circles around its ends and the lines
-/// beside it.
+/// Range of the line `v` that is nearer than the clearance to an edge: between the circles around
+/// its ends and the lines beside it.
 fn near_edge((a, b): (Flat, Flat), v: f32) -> Option<Span> {
     const CLEAR_M: f32 = ZONE_CLEARANCE_M;
     if fmaxf(a.y, b.y) < v - CLEAR_M || fminf(a.y, b.y) > v + CLEAR_M {

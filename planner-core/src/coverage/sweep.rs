@@ -1,7 +1,8 @@
-//! The direction of the lanes: along the side of the hull across which it is least wide, so that there are the fewest
-//! lanes and turns.
+//! The direction of the lanes: along the side of the hull across which it is least wide, so that
+//! there are the fewest lanes and turns.
 //!
-//! Source: CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978. The hull is Andrew's monotone chain. O(n log n).
+//! Source: CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978. The hull is Andrew's
+//! monotone chain. O(n log n).
 
 use heapless::Vec;
 
@@ -9,7 +10,8 @@ use super::area::{Area, AreaError, RingKind};
 use super::{CoverageError, Flat};
 use crate::sort;
 
-/// Lanes run along `along`; they are counted along `across`, a quarter turn to the left of it. Both have length 1.
+/// Lanes run along `along`; they are counted along `across`, a quarter turn to the left of it. Both
+/// have length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneDirection {
     /// Along the lanes.
@@ -30,8 +32,8 @@ impl LaneDirection {
     }
 }
 
-/// The direction across which the area's outer rings are least wide. `hull` is memory lent: as many places as the outer
-/// rings have vertices.
+/// The direction across which the area's outer rings are least wide. `hull` is memory lent: as many
+/// places as the outer rings have vertices.
 ///
 /// # Errors
 /// `AreaFull` where `hull` is too small.
@@ -65,7 +67,10 @@ pub fn least_width<const V: usize>(
 }
 
 /// The corners of the convex hull of the outer rings, turning left.
-fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Result<(), CoverageError> {
+fn convex_hull<const V: usize>(
+    area: &Area<'_>,
+    hull: &mut Vec<Flat, V>,
+) -> Result<(), CoverageError> {
     hull.clear();
     let mut sorted: Vec<Flat, V> = Vec::new();
     for (_, ring) in area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::Outer) {

@@ -1,12 +1,13 @@
 //! Back-and-forth lanes over an area: concave, with holes and no-fly zones.
 //!
-//! Source: CPP §3.2.1, Fig. 4. The area is cut into strips as wide as the lane spacing or a little less, all alike. In
-//! each strip the lane runs along the middle. It reaches from border to border along that line, and further where the
-//! strip's area would else lie beyond the last picture. "Simple" and "sampled" patterns are the same lanes: the first
-//! packs whole lanes, the second waypoints ([`super::pack::TrackUnit`]).
+//! Source: CPP §3.2.1, Fig. 4. The area is cut into strips as wide as the lane spacing or a little
+//! less, all alike. In each strip the lane runs along the middle. It reaches from border to border
+//! along that line, and further where the strip's area would else lie beyond the last picture.
+//! "Simple" and "sampled" patterns are the same lanes: the first packs whole lanes, the second
+//! waypoints ([`super::pack::TrackUnit`]).
 //!
-//! Frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes · vertices), and the order of the
-//! lanes ([`super::order`]).
+//! Frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes · vertices),
+//! and the order of the lanes ([`super::order`]).
 
 use super::CoverageError;
 use super::area::{Area, AreaError};

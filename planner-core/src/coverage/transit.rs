@@ -1,9 +1,11 @@
-//! Shortest ways around no-fly zones: straight where nothing is between, else over corners of the zones.
+//! Shortest ways around no-fly zones: straight where nothing is between, else over corners of the
+//! zones.
 //!
-//! Method: a visibility graph over the zones' outward corners, each pushed out by [`ZONE_CLEARANCE_M`]; shortest ways between
-//! all pairs of corners once (Floyd and Warshall, n³), then a way between two places over the least pair of corners that they
-//! see: n² sums a round, and a round more for each corner that proves hidden, at most 2 n; each corner is checked once. All in
-//! metres.
+//! Method: a visibility graph over the zones' outward corners, each pushed out by
+//! [`ZONE_CLEARANCE_M`]; shortest ways between all pairs of corners once (Floyd and Warshall, n³),
+//! then a way between two places over the least pair of corners that they see: n² sums a round, and
+//! a round more for each corner that proves hidden, at most 2 n; each corner is checked once. All
+//! in metres.
 
 use crate::Length;
 use heapless::Vec;
@@ -12,8 +14,9 @@ use libm::fminf;
 use super::area::{Area, RingKind, doubled_signed_area};
 use super::{CoverageError, Flat};
 
-/// Distance that lanes keep from no-fly zones, and ways from the corners that they turn at, metres: more than rounding, less than
-/// any vehicle's margin. A straight way only does not touch a zone: a margin for the vehicle belongs into the zone.
+/// Distance that lanes keep from no-fly zones, and ways from the corners that they turn at, metres:
+/// more than rounding, less than any vehicle's margin. A straight way only does not touch a zone: a
+/// margin for the vehicle belongs into the zone.
 pub const ZONE_CLEARANCE_M: f32 = 0.25;
 
 /// The visibility graph of shortest transits: corners and the lines between them, of at most `N`
@@ -43,17 +46,20 @@ impl<'a, const N: usize> Transit<'a, N> {
         for (_, ring) in area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly) {
             let left = doubled_signed_area(ring) > 0.0;
             for (i, corner) in ring.iter().enumerate() {
-                let (before, after) = (ring[(i + ring.len() - 1) % ring.len()], ring[(i + 1) % ring.len()]);
+                let (before, after) =
+                    (ring[(i + ring.len() - 1) % ring.len()], ring[(i + 1) % ring.len()]);
                 let (into, out) = ((corner - before).normalize(), (after - corner).normalize());
                 let turn = into.perp(&out);
                 if (turn > 0.0) != left {
                     continue;
                 }
-                // Away from both edges: along their bisector, as far as keeps the clearance from both.
+                // Away from both edges: along their bisector, as far as keeps the clearance from
+                // both.
                 let outward = (into - out).try_normalize(1e-6);
                 let Some(outward) = outward else { continue };
                 let half = fpu::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
-                let far = ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_from_sin(half), 0.25), 4.0);
+                let far =
+                    ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_from_sin(half), 0.25), 4.0);
                 let place = corner + outward * far;
                 if !area.is_in_no_fly_zone(&place) {
                     self.corners.push(place).map_err(|_| CoverageError::NoFlyFull)?;
@@ -107,7 +113,9 @@ impl<'a, const N: usize> Transit<'a, N> {
         let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
         let (across, up) = (sorted(from.x, to.x), sorted(from.y, to.y));
         // Both ends of an edge beyond the same end of the line, on one axis.
-        let beyond = |a: f32, b: f32, (low, high): (f32, f32)| (a > high && b > high) || (a < low && b < low);
+        let beyond = |a: f32, b: f32, (low, high): (f32, f32)| {
+            (a > high && b > high) || (a < low && b < low)
+        };
         let along = to - from;
         let zones = self.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly);
         zones.map(|(_, ring)| ring).all(|ring| {
@@ -131,9 +139,11 @@ impl<'a, const N: usize> Transit<'a, N> {
         if self.is_line_clear(from, to) {
             return (to - from).length();
         }
-        let far_m = |place: &Flat| self.corners.iter().map(|corner| (corner - place).length()).collect();
+        let far_m =
+            |place: &Flat| self.corners.iter().map(|corner| (corner - place).length()).collect();
         let (mut first_m, mut last_m): (Vec<f32, N>, Vec<f32, N>) = (far_m(from), far_m(to));
-        // The shortest way of those over corners that may be hidden: a look costs more than the sums, so only at its ends.
+        // The shortest way of those over corners that may be hidden: a look costs more than the
+        // sums, so only at its ends.
         loop {
             let mut best = (f32::INFINITY, 0, 0);
             for (i, first) in first_m.iter().enumerate().filter(|(_, first)| first.is_finite()) {
@@ -152,7 +162,10 @@ impl<'a, const N: usize> Transit<'a, N> {
             if least.is_infinite() {
                 return least;
             }
-            let seen = [self.is_line_clear(from, &self.corners[i]), self.is_line_clear(&self.corners[j], to)];
+            let seen = [
+                self.is_line_clear(from, &self.corners[i]),
+                self.is_line_clear(&self.corners[j], to),
+            ];
             match seen {
                 [true, true] => return least,
                 [false, _] => first_m[i] = f32::INFINITY,

@@ -6,7 +6,8 @@ use super::*;
 use crate::roadmap::Edge;
 use crate::roadmap::tests::{encode, header};
 
-/// A start, a goal 8 m east of it, a way straight there and one by the north, and a shaft up from the middle.
+/// A start, a goal 8 m east of it, a way straight there and one by the north, and a shaft up from
+/// the middle.
 const NODES: [Point; 6] = [
     Point::new(0.0, 0.0, 5.0),
     Point::new(8.0, 0.0, 5.0),
@@ -38,15 +39,26 @@ fn landing(from: Point) -> KeepOutZone {
     KeepOutZone { to: Point::new(from.x, from.y, 0.0), kind: ZoneKind::Descending, ..at(from, 2.0) }
 }
 
-/// Plans, and holds the path against what every path must keep: it begins here, joins nodes and ends at one.
-fn planned(request: &DetourRequest, obstacles: &[KeepOutZone]) -> Result<StdVec<Point>, DetourError> {
+/// Plans, and holds the path against what every path must keep: it begins here, joins nodes and
+/// ends at one.
+fn planned(
+    request: &DetourRequest,
+    obstacles: &[KeepOutZone],
+) -> Result<StdVec<Point>, DetourError> {
     let edges = EDGES.map(|(a, b)| Edge { a: a.min(b), b: a.max(b), clearance_m: 1.5 });
     let mut edges = edges.to_vec();
     edges.sort_by_key(|edge| (edge.a, edge.b));
     let bytes = encode(&header(1, 1), &NODES, &edges);
     let view = RoadmapView::parse(&bytes).unwrap();
     let (mut ws, mut out) = (Box::new(SearchWorkspace::<8>::new()), Path::<8>::new());
-    plan_detour(&view, request, &mut obstacles.to_vec(), &mut ws, &mut Vec::<u16, 8>::new(), &mut out)?;
+    plan_detour(
+        &view,
+        request,
+        &mut obstacles.to_vec(),
+        &mut ws,
+        &mut Vec::<u16, 8>::new(),
+        &mut out,
+    )?;
     let points: StdVec<Point> = out.waypoints().iter().map(|w| w.position).collect();
     assert_eq!(points[0], request.here);
     assert!(points[1..].iter().all(|p| NODES.contains(p)), "{points:?}");
@@ -93,7 +105,8 @@ fn aside_is_the_nearest_node_that_nobody_lands_on() {
 
 #[test]
 fn aside_does_not_lead_up_to_who_lands() {
-    let aside = DetourRequest { aside: true, leg: [NODES[2], NODES[2]], here: NODES[2], ..request() };
+    let aside =
+        DetourRequest { aside: true, leg: [NODES[2], NODES[2]], here: NODES[2], ..request() };
     // The ways on the floor are taken by others: what is left is the shaft, from which it comes.
     let floor = [at(NODES[0], 1.0), at(NODES[1], 1.0), at(NODES[3], 1.0)];
     let with = |top_z: f32| {
@@ -112,8 +125,9 @@ fn a_path_is_blocked_by_what_is_ahead_of_it_only() {
         path.push(point, 1.5).unwrap();
     }
     let far = Point::new(0.0, 50.0, 0.0);
-    let between =
-        |ahead: Range<f32>, place: Point| is_path_blocked(&path, ahead, 4.0, 4.0, &far, &at(place, 1.0));
+    let between = |ahead: Range<f32>, place: Point| {
+        is_path_blocked(&path, ahead, 4.0, 4.0, &far, &at(place, 1.0))
+    };
     let blocked = |along_m: f32, place: Point| between(along_m..f32::INFINITY, place);
     assert!(blocked(1.0, Point::new(6.0, 0.5, 5.0)) && !blocked(7.5, Point::new(6.0, 0.5, 5.0)));
     assert!(!blocked(1.0, Point::new(6.0, 1.5, 5.0)), "beside it");

@@ -1,9 +1,11 @@
-//! A path above the field, with few corners: between the field and a tolerance above it, no steeper than vehicles fly.
+//! A path above the field, with few corners: between the field and a tolerance above it, no steeper
+//! than vehicles fly.
 //!
-//! Method: the cone of slopes that stay between both at each sample so far; where the next sample closes it, a corner
-//! before that one, as high as can be where the ground rises and as low where it falls. Each corner lies in the tunnel,
-//! and the field is nowhere steeper than the path may be: so the next sample can always be reached. Samples are half a
-//! node apart. Cost: one lookup of the field for each sample.
+//! Method: the cone of slopes that stay between both at each sample so far; where the next sample
+//! closes it, a corner before that one, as high as can be where the ground rises and as low where
+//! it falls. Each corner lies in the tunnel, and the field is nowhere steeper than the path may be:
+//! so the next sample can always be reached. Samples are half a node apart. Cost: one lookup of the
+//! field for each sample.
 
 use libm::{ceilf, fmaxf, fminf};
 
@@ -45,10 +47,11 @@ impl TerrainFollowing<'_> {
         for share in [0.0, 0.5, 1.0] {
             let height_m = low_m + share * self.tolerance_m;
             let mut count = 0;
-            let counted: Result<(), ()> = self.corners_to(&Point::new(from.x, from.y, height_m), to, |_| {
-                count += 1;
-                Ok(())
-            });
+            let counted: Result<(), ()> =
+                self.corners_to(&Point::new(from.x, from.y, height_m), to, |_| {
+                    count += 1;
+                    Ok(())
+                });
             if counted.is_ok() && count < best.0 {
                 best = (count, height_m);
             }
@@ -56,7 +59,8 @@ impl TerrainFollowing<'_> {
         Point::new(from.x, from.y, best.1)
     }
 
-    /// The corners of a path from a point between the field and the tolerance, the last of them at `corners_to`.
+    /// The corners of a path from a point between the field and the tolerance, the last of them at
+    /// `corners_to`.
     ///
     /// # Errors
     /// What `corner` says.
@@ -74,8 +78,9 @@ impl TerrainFollowing<'_> {
         if step_m < 1e-3 {
             return corner(Point::new(to.x, to.y, from.z));
         }
-        let place =
-            |sample: u32| if sample == count { *to } else { start + way * (sample as f32 / count as f32) };
+        let place = |sample: u32| {
+            if sample == count { *to } else { start + way * (sample as f32 / count as f32) }
+        };
         let steep = self.slope;
         let (mut last, mut z_m) = (0, from.z);
         let (mut cone, mut floor_m) = ((-steep, steep), from.z);

@@ -21,7 +21,10 @@ fn flattened(columns: usize, nodes: &mut [i16], most: i16) {
         let before = nodes.to_vec();
         for (i, node) in nodes.iter_mut().enumerate() {
             let near = [(i % columns > 0, i.wrapping_sub(1)), (i % columns + 1 < columns, i + 1)];
-            let far = [(i >= columns, i.wrapping_sub(columns)), (i + columns < before.len(), i + columns)];
+            let far = [
+                (i >= columns, i.wrapping_sub(columns)),
+                (i + columns < before.len(), i + columns),
+            ];
             for (_, other) in near.into_iter().chain(far).filter(|(there, _)| *there) {
                 *node = (*node).max(before[other] - most);
             }
@@ -88,7 +91,8 @@ proptest! {
             for k in 0..=samples {
                 let at: Point = leg[0] + step * (k as f32 / samples as f32);
                 let low_m = following.lowest_m(&at.xy());
-                // Between two samples of the path, half a node apart, the field bends by a part of its slope.
+                // Between two samples of the path, half a node apart, the field bends by a part of
+                // its slope.
                 let bent_m = f32::from(most) * HEIGHT_STEP_M / 2.0;
                 prop_assert!(at.z >= low_m - bent_m - 0.01, "{} {}", at.z, low_m);
                 prop_assert!(at.z <= low_m + tolerance_m + bent_m + 0.01, "{} {}", at.z, low_m);
@@ -103,8 +107,10 @@ fn over_level_ground_and_along_a_slope_a_path_is_straight() {
     let level = field(&shape, &[70; 40]);
     let rising: Vec<i16> = (0..40).map(|i| (i % 20) * 10).collect();
     let rising = field(&shape, &rising);
-    // A ridge of 10 m takes a corner before it, one on each side of its top or on it, and one behind it.
-    let ridge: Vec<i16> = (0..40).map(|i| 100 - 10 * i16::abs(i % 20 - 10)).map(|h| h.max(0)).collect();
+    // A ridge of 10 m takes a corner before it, one on each side of its top or on it, and one
+    // behind it.
+    let ridge: Vec<i16> =
+        (0..40).map(|i| 100 - 10 * i16::abs(i % 20 - 10)).map(|h| h.max(0)).collect();
     let ridge = field(&shape, &ridge);
     for (bytes, most) in [(&level, 1), (&rising, 1), (&ridge, 2)] {
         let field = FieldView::parse(bytes).unwrap();

@@ -11,7 +11,8 @@ pub struct WaypointRange {
     pub end: u32,
 }
 
-/// A set of waypoints that only grows, of at most `N` ranges: in rising order, apart from each other.
+/// A set of waypoints that only grows, of at most `N` ranges: in rising order, apart from each
+/// other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WaypointSet<const N: usize> {
     ranges: Vec<WaypointRange, N>,
@@ -53,7 +54,10 @@ impl<const N: usize> WaypointSet<N> {
 }
 
 /// Independent of the capacity, so that the program has one copy of this function.
-fn insert(ranges: &mut VecView<WaypointRange>, range: WaypointRange) -> Result<bool, WaypointRange> {
+fn insert(
+    ranges: &mut VecView<WaypointRange>,
+    range: WaypointRange,
+) -> Result<bool, WaypointRange> {
     if range.first >= range.end {
         return Ok(false);
     }

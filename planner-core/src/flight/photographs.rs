@@ -26,8 +26,8 @@ pub enum Trigger {
     None,
 }
 
-/// A stretch of a path on which pictures are taken, metres along it: one picture at each end, others in between, as far apart
-/// over ground. Both ends are the same where one picture is enough.
+/// A stretch of a path on which pictures are taken, metres along it: one picture at each end,
+/// others in between, as far apart over ground. Both ends are the same where one picture is enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureStretch<'p> {
     /// Place of the first picture.
@@ -43,7 +43,8 @@ pub struct PictureStretch<'p> {
     corners: &'p [Waypoint],
 }
 
-/// A straight piece of a stretch: where it begins and how long it is, along the path and over ground, metres.
+/// A straight piece of a stretch: where it begins and how long it is, along the path and over
+/// ground, metres.
 #[derive(Clone, Copy)]
 struct StraightPiece {
     begin_m: f32,
@@ -70,9 +71,12 @@ impl<'p> PictureStretch<'p> {
         Some(Self { from_m, to_m, step_m, count, corners })
     }
 
-    /// Pictures of the stretch with these corners that are taken once the vehicle is `along_m` metres along the path.
+    /// Pictures of the stretch with these corners that are taken once the vehicle is `along_m`
+    /// metres along the path.
     fn taken_count(corners: &'p [Waypoint], count: u32, along_m: f32) -> u32 {
-        let Some([first, last]) = corners.first().zip(corners.last()).map(<[_; 2]>::from) else { return 0 };
+        let Some([first, last]) = corners.first().zip(corners.last()).map(<[_; 2]>::from) else {
+            return 0;
+        };
         if along_m < first.along_m || along_m.is_nan() {
             0
         } else if along_m >= last.along_m {
@@ -117,7 +121,8 @@ impl<'p> PictureStretch<'p> {
     }
 }
 
-/// Which parts of a path of at most [`PicturePlan::MAX_PATH_WAYPOINTS`] waypoints are photographed, and how.
+/// Which parts of a path of at most [`PicturePlan::MAX_PATH_WAYPOINTS`] waypoints are photographed,
+/// and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PicturePlan {
     /// Bit `i`: a stretch begins at waypoint `i`.
@@ -138,7 +143,8 @@ pub struct PicturePlan {
     pub heading_mode: HeadingMode,
     /// Trigger of the pictures.
     pub trigger: Trigger,
-    /// Whether the route has more lanes than the path: a stretch of it, after which all divide what is left.
+    /// Whether the route has more lanes than the path: a stretch of it, after which all divide what
+    /// is left.
     pub goes_on: bool,
 }
 
@@ -177,15 +183,21 @@ impl PicturePlan {
         self.area
     }
 
-    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was marked before: these waypoints
-    /// of the area, evenly from one end to the other.
+    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was
+    /// marked before: these waypoints of the area, evenly from one end to the other.
     ///
     /// # Errors
-    /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`] and [`Self::MAX_STRETCHES`], for numbers beyond [`Self::MAX_AREA_WAYPOINTS`], and for no
-    /// waypoint.
-    pub fn add_stretch(&mut self, from: usize, to: usize, waypoints: WaypointRange) -> Result<(), PathError> {
+    /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`] and [`Self::MAX_STRETCHES`], for
+    /// numbers beyond [`Self::MAX_AREA_WAYPOINTS`], and for no waypoint.
+    pub fn add_stretch(
+        &mut self,
+        from: usize,
+        to: usize,
+        waypoints: WaypointRange,
+    ) -> Result<(), PathError> {
         let number = u16::try_from(waypoints.first).map_err(|_| PathError::PathFull)?;
-        let count = waypoints.end.checked_sub(waypoints.first).and_then(|count| u16::try_from(count).ok());
+        let count =
+            waypoints.end.checked_sub(waypoints.first).and_then(|count| u16::try_from(count).ok());
         let count = count.filter(|count| *count > 0).ok_or(PathError::PathFull)?;
         let stretch = self.begins.count_ones() as usize;
         if from > to || to >= Self::MAX_PATH_WAYPOINTS || stretch >= Self::MAX_STRETCHES {
@@ -202,7 +214,8 @@ impl PicturePlan {
         &self,
         path: &'p Path<W>,
     ) -> impl Iterator<Item = PictureStretch<'p>> {
-        self.corners_and_counts(path).filter_map(|(corners, count)| PictureStretch::new(corners, count))
+        self.corners_and_counts(path)
+            .filter_map(|(corners, count)| PictureStretch::new(corners, count))
     }
 
     /// The corners of each stretch and the number of its pictures.
@@ -243,10 +256,16 @@ impl PicturePlan {
 
     /// Place of the last picture no further than `along_m` metres along the path; none before the
     /// first.
-    pub fn last_picture_before_m<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
+    pub fn last_picture_before_m<const W: usize>(
+        &self,
+        path: &Path<W>,
+        along_m: f32,
+    ) -> Option<f32> {
         let (corners, count, taken) = self
             .corners_and_counts(path)
-            .map(|(corners, count)| (corners, count, PictureStretch::taken_count(corners, count, along_m)))
+            .map(|(corners, count)| {
+                (corners, count, PictureStretch::taken_count(corners, count, along_m))
+            })
             .filter(|(.., taken)| *taken > 0)
             .last()?;
         PictureStretch::new(corners, count).map(|stretch| stretch.picture_at_m(taken - 1))
@@ -321,7 +340,10 @@ mod tests {
             assert_eq!(photographs.last_picture_before_m(&path, along_m), last_m, "{along_m}");
         }
         assert_eq!(photographs.last_picture_m(&path), Some(80.0));
-        assert_eq!(PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).last_picture_m(&path), None);
+        assert_eq!(
+            PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).last_picture_m(&path),
+            None
+        );
     }
 
     #[test]
@@ -338,7 +360,8 @@ mod tests {
         for k in 0..9 {
             let place = path.point_at(shots.picture_at_m(k)).unwrap();
             assert!((place.x - 10.0 * k as f32).abs() < 1e-3, "{place}");
-            let by = |beside_m: f32| photographs.taken_count(&path, shots.picture_at_m(k) + beside_m);
+            let by =
+                |beside_m: f32| photographs.taken_count(&path, shots.picture_at_m(k) + beside_m);
             assert_eq!((by(-0.05), by(0.0), by(0.05)), (k, k + 1, k + 1), "{k}");
         }
         assert_eq!(photographs.taken_count(&path, 1e9), 9);
@@ -346,14 +369,19 @@ mod tests {
 
     #[test]
     fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
-        for (backward, [part, whole]) in [(false, [(30, 33), (30, 35)]), (true, [(32, 35), (30, 35)])] {
-            let mut photographs =
-                PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).with_area(50, backward);
+        for (backward, [part, whole]) in
+            [(false, [(30, 33), (30, 35)]), (true, [(32, 35), (30, 35)])]
+        {
+            let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance)
+                .with_area(50, backward);
             mark_three(&mut photographs);
             let path = path();
             let shown = |first, end| -> std::vec::Vec<_> {
                 let pictures = WaypointRange { first, end };
-                photographs.shown_waypoints(&path, pictures).map(|range| (range.first, range.end)).collect()
+                photographs
+                    .shown_waypoints(&path, pictures)
+                    .map(|range| (range.first, range.end))
+                    .collect()
             };
             let numbers = |count| shown(0, count);
             assert_eq!(numbers(0), []);
@@ -361,7 +389,8 @@ mod tests {
             assert_eq!(numbers(8), [(7, 12), part]);
             assert_eq!(numbers(11), [(7, 12), whole, (40, 41)]);
             assert_eq!(numbers(99), numbers(11));
-            // Whatever pictures are asked for, they show what fewer of them do not, each waypoint once.
+            // Whatever pictures are asked for, they show what fewer of them do not, each waypoint
+            // once.
             for (first, end) in (0..13).flat_map(|first| (0..13).map(move |end| (first, end))) {
                 let all = |ranges: std::vec::Vec<(u32, u32)>| -> std::collections::BTreeSet<u32> {
                     ranges.into_iter().flat_map(|(first, end)| first..end).collect()

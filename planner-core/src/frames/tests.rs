@@ -19,7 +19,8 @@ fn check_same_place(a: &Geodetic, b: &Geodetic, metres: f64) {
 
 #[test]
 fn ecef_matches_the_parametric_latitude_formula() {
-    // Computed with the reduced latitude, tan β = (1 − f) tan φ, instead of the prime vertical radius.
+    // Computed with the reduced latitude, tan β = (1 − f) tan φ, instead of the prime vertical
+    // radius.
     let known = [
         (at(0.0, 0.0, 0.0), [6378137.0, 0.0, 0.0]),
         (at(90.0, 0.0, 0.0), [0.0, 0.0, 6356752.3142]),
@@ -36,7 +37,11 @@ fn ecef_matches_the_parametric_latitude_formula() {
 fn enu_matches_independent_figures() {
     let known = [
         (at(40.3327, -3.7659, 700.0), at(40.3507, -3.7424, 760.0), [1996.6893, 1999.2455, 59.3739]),
-        (at(-35.363262, 149.165237, 584.09), at(-35.3, 149.1, 0.0), [-5933.5476, 7016.751, -590.7195]),
+        (
+            at(-35.363262, 149.165237, 584.09),
+            at(-35.3, 149.1, 0.0),
+            [-5933.5476, 7016.751, -590.7195],
+        ),
         (at(78.2, 15.6, 10.0), at(78.21, 15.9, 300.0), [6845.895, 1134.0643, 286.2375]),
         (at(-17.8, 179.99, 0.0), at(-17.81, -179.98, 25.0), [3180.547, -1107.0406, 24.1106]),
     ];
@@ -47,7 +52,8 @@ fn enu_matches_independent_figures() {
     }
 }
 
-/// GLOBAL_POSITION_INT (33) and, 8 to 16 ms from it, LOCAL_POSITION_NED (32): position and velocity.
+/// GLOBAL_POSITION_INT (33) and, 8 to 16 ms from it, LOCAL_POSITION_NED (32): position and
+/// velocity.
 type Sample = (f64, f64, f64, [f64; 3], [f64; 3]);
 
 fn check_recording(projection: Projection, origin: &Geodetic, samples: &[Sample]) {
@@ -69,9 +75,10 @@ fn check_recording(projection: Projection, origin: &Geodetic, samples: &[Sample]
 
 #[test]
 fn px4_projection_agrees_with_the_recording() {
-    // data/mavlink/px4-1.17-offboard.tlog. It holds no GPS_GLOBAL_ORIGIN: the origin is that of its HOME_POSITION (242)
-    // messages, which give the same place globally and locally, (473977414, 85455962) = (−0.0143 m, −0.0065 m) and
-    // (473977427, 85455941) = (0.1287 m, −0.1666 m), rounded to whole units.
+    // data/mavlink/px4-1.17-offboard.tlog. It holds no GPS_GLOBAL_ORIGIN: the origin is that of its
+    // HOME_POSITION (242) messages, which give the same place globally and locally, (473977414, 85455962) =
+    // (−0.0143 m, −0.0065 m) and (473977427, 85455941) = (0.1287 m, −0.1666 m), rounded to whole
+    // units.
     let origin = from_int(473_977_415.35, 85_455_963.3, 489_824);
     check_recording(
         Projection::Px4,
@@ -88,14 +95,27 @@ fn px4_projection_agrees_with_the_recording() {
 
 #[test]
 fn ardupilot_projection_agrees_with_the_recording() {
-    // data/mavlink/arducopter-4.6-guided.tlog; its GPS_GLOBAL_ORIGIN (49) is (−353632620, 1491652370, 584090).
+    // data/mavlink/arducopter-4.6-guided.tlog; its GPS_GLOBAL_ORIGIN (49) is (−353632620,
+    // 1491652370, 584090).
     let origin = from_int(-353_632_620.0, 1_491_652_370.0, 584_090);
     check_recording(
         Projection::ArduPilot,
         &origin,
         &[
-            (-353_630_502.0, 1_491_652_189.0, 0.013, [23.5856, -1.6388, 0.0], [-0.0155, -0.0018, 0.0]),
-            (-353_630_504.0, 1_491_652_189.0, 0.012, [23.5504, -1.6505, 0.0], [-0.0811, 0.0009, 0.0]),
+            (
+                -353_630_502.0,
+                1_491_652_189.0,
+                0.013,
+                [23.5856, -1.6388, 0.0],
+                [-0.0155, -0.0018, 0.0],
+            ),
+            (
+                -353_630_504.0,
+                1_491_652_189.0,
+                0.012,
+                [23.5504, -1.6505, 0.0],
+                [-0.0811, 0.0009, 0.0],
+            ),
             (-353_630_828.0, 1_491_654_600.0, 0.012, [19.9487, 20.2481, 0.0], [0.0, 0.0, 0.0]),
         ],
     );
@@ -122,7 +142,8 @@ fn two_kilometres_away_the_three_frames_differ_by_metres() {
 
 #[test]
 fn haversine_errs_by_what_it_says() {
-    // One arc minute along a meridian; against the meridian's own radius of curvature a(1 − e²)/(1 − e² sin² φ)^1.5.
+    // One arc minute along a meridian; against the meridian's own radius of curvature a(1 − e²)/(1
+    // − e² sin² φ)^1.5.
     let error = |lat: f64| {
         let arc = 1.0 / 60.0;
         let radius = WGS84_A * (1.0 - WGS84_E2)
@@ -143,9 +164,12 @@ fn haversine_errs_by_what_it_says() {
 
 #[test]
 fn invalid_places_are_known() {
-    for place in
-        [at(f64::NAN, 0.0, 0.0), at(0.0, f64::INFINITY, 0.0), at(0.0, 0.0, f64::NAN), at(90.1, 0.0, 0.0)]
-    {
+    for place in [
+        at(f64::NAN, 0.0, 0.0),
+        at(0.0, f64::INFINITY, 0.0),
+        at(0.0, 0.0, f64::NAN),
+        at(90.1, 0.0, 0.0),
+    ] {
         assert!(!place.is_valid());
     }
     assert!(at(-90.0, 180.0, -400.0).is_valid());

@@ -1,9 +1,10 @@
 //! Earlier landings: the order in which vehicles are taken decides how long all of them wait.
 //!
-//! The paths stay as they are. For each pair of flights the differences of their take-off times that bring both near each
-//! other are covered by one interval. With these, an order gives take-off times in a few comparisons a pair, so many orders
-//! are tried: a local search that moves one vehicle to another place in the order. The best order is then scheduled exactly,
-//! and kept if the last vehicle lands earlier.
+//! The paths stay as they are. For each pair of flights the differences of their take-off times
+//! that bring both near each other are covered by one interval. With these, an order gives take-off
+//! times in a few comparisons a pair, so many orders are tried: a local search that moves one
+//! vehicle to another place in the order. The best order is then scheduled exactly, and kept if the
+//! last vehicle lands earlier.
 //!
 //! Cost: the timed segments of each pair of flights, then [`MAX_COMPARISONS`] comparisons.
 
@@ -41,8 +42,15 @@ impl ForbiddenDifferences<'_> {
         if i < j { (from, to) } else { (-to, -from) }
     }
 
-    /// Take-off times of vehicles taken in this `order`, and how good they are: smaller is better, infinite is no schedule.
-    fn departure_times(&self, order: &[u16], lasts_s: &[f32], departs_s: &mut [f32], looks: &mut u32) -> f32 {
+    /// Take-off times of vehicles taken in this `order`, and how good they are: smaller is better,
+    /// infinite is no schedule.
+    fn departure_times(
+        &self,
+        order: &[u16],
+        lasts_s: &[f32],
+        departs_s: &mut [f32],
+        looks: &mut u32,
+    ) -> f32 {
         let (mut makespan_s, mut sum_s) = (0.0, 0.0);
         for (place, &i) in order.iter().enumerate() {
             let i = usize::from(i);
@@ -70,9 +78,14 @@ impl ForbiddenDifferences<'_> {
     }
 }
 
-/// Takes the vehicles in the order that ends the mission earliest, of those that are tried. A place is free `handover_s` after
-/// its vehicle has left it.
-pub(super) fn improve_departure_order<const N: usize, const V: usize, const W: usize, const P: usize>(
+/// Takes the vehicles in the order that ends the mission earliest, of those that are tried. A place
+/// is free `handover_s` after its vehicle has left it.
+pub(super) fn improve_departure_order<
+    const N: usize,
+    const V: usize,
+    const W: usize,
+    const P: usize,
+>(
     request: &PlanRequest<'_>,
     handover_s: f32,
     ws: &mut PlanWorkspace<N, V, P>,
@@ -96,14 +109,17 @@ pub(super) fn improve_departure_order<const N: usize, const V: usize, const W: u
     let ends = &mut ws.costs.as_flattened_mut()[..count * count];
     for (i, a) in out.flights.iter().enumerate() {
         for (j, b) in out.flights.iter().enumerate().skip(i + 1) {
-            let differences = schedule::forbidden_differences(cfg, a, b, handover_s, &mut ws.schedule);
+            let differences =
+                schedule::forbidden_differences(cfg, a, b, handover_s, &mut ws.schedule);
             let (from, to) = differences.map_err(|e| PlanError::Schedule(a.id, e))?;
             (ends[i * count + j], ends[j * count + i]) = (from, to);
         }
     }
-    let differences = ForbiddenDifferences { ends: &ws.costs.as_flattened()[..count * count], count };
-    let by_departure =
-        |a: &u16, b: &u16| found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b));
+    let differences =
+        ForbiddenDifferences { ends: &ws.costs.as_flattened()[..count * count], count };
+    let by_departure = |a: &u16, b: &u16| {
+        found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b))
+    };
     sort::sort_by(&mut order, by_departure);
     let pairs = (order.len() * order.len()) as u32;
     let mut looks = if count <= BOARD_VEHICLES {
@@ -134,7 +150,10 @@ pub(super) fn improve_departure_order<const N: usize, const V: usize, const W: u
     if schedule_departures(&order, request, handover_s, ws, out).is_err()
         || makespan_s(&out.flights) >= before_s
     {
-        out.flights.iter_mut().zip(&found_s).for_each(|(flight, &depart_s)| flight.depart_s = depart_s);
+        out.flights
+            .iter_mut()
+            .zip(&found_s)
+            .for_each(|(flight, &depart_s)| flight.depart_s = depart_s);
     }
     Ok(())
 }
@@ -142,7 +161,8 @@ pub(super) fn improve_departure_order<const N: usize, const V: usize, const W: u
 /// Largest swarm that is planned on a board.
 const BOARD_VEHICLES: usize = 32;
 
-/// Each vehicle in turn takes off as early as those before it allow; one that stays on its pad comes before all.
+/// Each vehicle in turn takes off as early as those before it allow; one that stays on its pad
+/// comes before all.
 fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: usize>(
     order: &[u16],
     request: &PlanRequest<'_>,
@@ -151,15 +171,19 @@ fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: 
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), ScheduleError> {
     for (place, &i) in order.iter().enumerate() {
-        let scheduled = out
-            .flights
-            .iter()
-            .enumerate()
-            .filter(|&(j, flight)| !flight.task.leaves_pad() || order[..place].contains(&(j as u16)));
-        let (flight, scheduled) = (&out.flights[usize::from(i)], scheduled.map(|(_, flight)| flight));
+        let scheduled = out.flights.iter().enumerate().filter(|&(j, flight)| {
+            !flight.task.leaves_pad() || order[..place].contains(&(j as u16))
+        });
+        let (flight, scheduled) =
+            (&out.flights[usize::from(i)], scheduled.map(|(_, flight)| flight));
         let cfg = &request.schedule;
-        let departure =
-            schedule::departure_with_handover(cfg, flight, (0.0, handover_s), scheduled, &mut ws.schedule);
+        let departure = schedule::departure_with_handover(
+            cfg,
+            flight,
+            (0.0, handover_s),
+            scheduled,
+            &mut ws.schedule,
+        );
         out.flights[usize::from(i)].depart_s = departure?;
     }
     Ok(())

@@ -1,8 +1,9 @@
 //! The order of the swarm: each vehicle in turn gets its path and its place in the schedule.
 //!
-//! Prioritised planning: a vehicle keeps clear of those before it. Shortest path and a wait on the pad where that is enough,
-//! stepping aside on the way ([`sipp`]) where it is not. A vehicle that cannot be fitted in goes first in the next round; when that
-//! does not help, the others leave it a head start; then all of it again with the shortest path first. Rounds are bounded.
+//! Prioritised planning: a vehicle keeps clear of those before it. Shortest path and a wait on the
+//! pad where that is enough, stepping aside on the way ([`sipp`]) where it is not. A vehicle that
+//! cannot be fitted in goes first in the next round; when that does not help, the others leave it a
+//! head start; then all of it again with the shortest path first. Rounds are bounded.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -17,8 +18,8 @@ use crate::schedule::{self, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleErr
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::sort;
 
-/// Schedules the longest path first, and where that leads to no schedule the shortest. A place is free `handover_s` after its
-/// vehicle has left it.
+/// Schedules the longest path first, and where that leads to no schedule the shortest. A place is
+/// free `handover_s` after its vehicle has left it.
 pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -43,11 +44,14 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     }
     let mut failed = Ok(());
     for first in [InitialOrder::Longest, InitialOrder::Shortest] {
-        // A vehicle that stays on its pad comes first: it blocks all others. Ties go to the higher id (P3D §3.4).
+        // A vehicle that stays on its pad comes first: it blocks all others. Ties go to the higher
+        // id (P3D §3.4).
         sort::sort_by(&mut order, |&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
-            let (goals, ids) =
-                ([a, b].map(|i| out.flights[i].task.leaves_pad()), (out.flights[b].id, out.flights[a].id));
+            let (goals, ids) = (
+                [a, b].map(|i| out.flights[i].task.leaves_pad()),
+                (out.flights[b].id, out.flights[a].id),
+            );
             let longer = straight[b].total_cmp(&straight[a]);
             let longer = if first == InitialOrder::Longest { longer } else { longer.reverse() };
             goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
@@ -68,7 +72,8 @@ enum InitialOrder {
     Shortest,
 }
 
-/// Schedules in this order; a vehicle that cannot be fitted in goes first in the next round, or later gets a head start.
+/// Schedules in this order; a vehicle that cannot be fitted in goes first in the next round, or
+/// later gets a head start.
 fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -86,7 +91,10 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
         let blocked = order.remove(place);
         // Cannot overflow: one was just removed.
         if round < reorderings {
-            let front = order.iter().take_while(|&&i| !out.flights[usize::from(i)].task.leaves_pad()).count();
+            let front = order
+                .iter()
+                .take_while(|&&i| !out.flights[usize::from(i)].task.leaves_pad())
+                .count();
             let _ = order.insert(front, blocked);
         } else {
             rush.count = rush.count.max(order.len() + 1 - place);
@@ -143,7 +151,8 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
         let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
-        let turn = SchedulingTurn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
+        let turn =
+            SchedulingTurn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
         let waits = wait_on_pad(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,
@@ -174,7 +183,10 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
             continue;
         }
         let mut path = path_from_nodes(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
-        path.label_times(flight.climb_m / request.schedule.vertical_mps, request.schedule.cruise_mps);
+        path.label_times(
+            flight.climb_m / request.schedule.vertical_mps,
+            request.schedule.cruise_mps,
+        );
         let mut flight = Flight { path, depart_s: 0.0, ..flight.clone() };
         flight.fit_segment_length();
         let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
@@ -189,8 +201,8 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     Ok(None)
 }
 
-/// The flight that waits and steps aside on its way. The earliest to arrive may leave its pad only to wait for long among the
-/// others; then a later departure is tried, as often as that helps.
+/// The flight that waits and steps aside on its way. The earliest to arrive may leave its pad only
+/// to wait for long among the others; then a later departure is tried, as often as that helps.
 fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -206,7 +218,8 @@ fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
         let parked = ParkedVehicles::<V>::new(view, avoid, &out.flights, waiting, index);
         let cfg = &request.schedule;
-        let mut route = RouteQuery { cfg, from, to, not_before_s, parked: &parked.before_flight, handover_s };
+        let mut route =
+            RouteQuery { cfg, from, to, not_before_s, parked: &parked.before_flight, handover_s };
         let mut best: Option<Flight<W>> = None;
         flight.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_DEPARTURES {
@@ -275,15 +288,22 @@ impl<const V: usize> ParkedVehicles<V> {
         index: usize,
     ) -> Self {
         let mut parked = Self { before_flight: Vec::new(), after_flight: Vec::new() };
-        let below = |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
-        for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
+        let below =
+            |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
+        for (j, flight) in
+            flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
         {
             // Cannot overflow: at most one entry of each kind per flight.
-            if avoid == Avoid::AllPlaces || !flight.task.leaves_pad() || waiting.contains(&(j as u16)) {
+            if avoid == Avoid::AllPlaces
+                || !flight.task.leaves_pad()
+                || waiting.contains(&(j as u16))
+            {
                 let _ = parked.before_flight.push(below(j, flight.climb_m));
             }
             if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.task.goal()) {
-                let _ = parked.after_flight.push(below(flights.len() + usize::from(goal), flight.descent_m));
+                let _ = parked
+                    .after_flight
+                    .push(below(flights.len() + usize::from(goal), flight.descent_m));
             }
         }
         parked
@@ -337,7 +357,10 @@ fn find_path<const N: usize, const V: usize, const W: usize>(
     }
 }
 
-fn path_from_nodes<const W: usize>(view: &RoadmapView<'_>, nodes: &[u16]) -> Result<Path<W>, PathError> {
+fn path_from_nodes<const W: usize>(
+    view: &RoadmapView<'_>,
+    nodes: &[u16],
+) -> Result<Path<W>, PathError> {
     let mut path = Path::new();
     for (i, &node) in nodes.iter().enumerate() {
         let edge = i.checked_sub(1).and_then(|before| view.edge_between(nodes[before], node));

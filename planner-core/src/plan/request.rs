@@ -53,7 +53,8 @@ pub struct PlanRequest<'a> {
 }
 
 impl PlanRequest<'_> {
-    /// Whether every number is one that can be planned with, every id is one vehicle's and, labelled, every goal as well.
+    /// Whether every number is one that can be planned with, every id is one vehicle's and,
+    /// labelled, every goal as well.
     pub fn check(&self) -> Result<(), PlanError> {
         self.schedule.check().map_err(PlanError::Config)?;
         let good = |number: f32| number >= 0.0 && number.is_finite();

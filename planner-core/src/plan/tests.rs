@@ -14,8 +14,12 @@ use crate::frames::Geodetic;
 use crate::roadmap::{self, Edge, RoadmapHeader};
 use crate::schedule::tests::checker;
 
-const SCHEDULE: ScheduleConfig =
-    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+const SCHEDULE: ScheduleConfig = ScheduleConfig {
+    separation_m: 2.0,
+    parked_separation_m: 1.7,
+    cruise_mps: 2.0,
+    vertical_mps: 1.0,
+};
 /// The building's starts hover this high over their pads.
 const HEIGHT_M: f32 = 1.5;
 
@@ -70,7 +74,8 @@ fn plan(
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 2048>::new());
     let mut out = SwarmPlan::new();
     let descents = std::vec![HEIGHT_M; goals];
-    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: 1024 };
+    let request =
+        PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: 1024 };
     plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
 }
 
@@ -92,7 +97,9 @@ fn spread(count: usize, seed: u64) -> StdVec<Point> {
 fn connected(view: &RoadmapView<'_>) -> BTreeSet<u16> {
     let (mut reached, mut open) = (BTreeSet::from([0]), std::vec![0]);
     while let Some(node) = open.pop() {
-        open.extend(view.half_edges(node).map(|edge| edge.target).filter(|target| reached.insert(*target)));
+        open.extend(
+            view.half_edges(node).map(|edge| edge.target).filter(|target| reached.insert(*target)),
+        );
     }
     reached
 }
@@ -120,7 +127,8 @@ proptest! {
     }
 }
 
-/// A corridor along x with one side room off its middle; nodes by hand, every vehicle at one height.
+/// A corridor along x with one side room off its middle; nodes by hand, every vehicle at one
+/// height.
 fn corridor(length_m: f32, side_at_m: f32, depth_m: f32) -> StdVec<u8> {
     let p = |x: f32, y: f32| Point::new(x, y, HEIGHT_M);
     // Two starts, two goals over each other's pads, the corridor, the side room.
@@ -164,7 +172,8 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
         let plan = plan(&bytes, &tasks(2, true), 2, Mode::Labelled).unwrap();
         let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
         assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
-        let waits = plan.flights.iter().flat_map(|f| f.path.waypoints()).map(|w| w.leave_s - w.arrive_s);
+        let waits =
+            plan.flights.iter().flat_map(|f| f.path.waypoints()).map(|w| w.leave_s - w.arrive_s);
         // It waits on its pad, and in the side room only while the other passes.
         assert!(waits.fold(0.0, f32::max) < 2.1, "side room at {side_at_m}, {depth_m} deep");
         for speeds in [[1.0, 1.0], [0.3, 2.0], [2.0, 0.3]] {
@@ -182,12 +191,16 @@ fn antipodal_swaps_over_a_circle_are_planned() {
         let angle = i as f32 * core::f32::consts::TAU / 10.0;
         Point::new(20.0 + 20.0 * libm::cosf(angle), 20.0 + 20.0 * libm::sinf(angle), HEIGHT_M)
     };
-    let terminals: StdVec<Point> = (0..10).map(place).chain((0..10).map(|i| place(i + 5))).collect();
+    let terminals: StdVec<Point> =
+        (0..10).map(place).chain((0..10).map(|i| place(i + 5))).collect();
     for seed in 0..4 {
         let bytes = open_roadmap(&terminals, 10, 400, seed);
         let plan = plan(&bytes, &tasks(10, true), 10, Mode::Labelled).unwrap();
         let apart = checker::fly(&SCHEDULE, &plan.flights, &[1.5; 10], 40_000);
-        assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{seed}: {apart:?}");
+        assert!(
+            apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3),
+            "{seed}: {apart:?}"
+        );
     }
 }
 
@@ -195,10 +208,13 @@ fn antipodal_swaps_over_a_circle_are_planned() {
 fn unlabelled_is_no_longer_than_labelled_and_makespan_no_later() {
     for seed in 0..10 {
         let bytes = open_roadmap(&spread(16, seed), 8, 300, seed);
-        let longest = |p: &SwarmPlan<16, 64>| p.flights.iter().map(|f| f.path.length_m()).fold(0.0, f32::max);
+        let longest =
+            |p: &SwarmPlan<16, 64>| p.flights.iter().map(|f| f.path.length_m()).fold(0.0, f32::max);
         let labelled = plan(&bytes, &tasks(8, true), 8, Mode::Labelled).unwrap();
-        let total = plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
-        let makespan = plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::Makespan)).unwrap();
+        let total =
+            plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
+        let makespan =
+            plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::Makespan)).unwrap();
         // Detours around pads and landing places may lengthen a path a little.
         assert!(total.total_m() <= labelled.total_m() * 1.05, "seed {seed}");
         assert!(longest(&makespan) <= longest(&total) * 1.05, "seed {seed}");
@@ -210,7 +226,8 @@ fn a_vehicle_without_a_goal_stays_and_a_goal_without_a_way_is_left() {
     let mut terminals = spread(5, 3);
     terminals.push(Point::new(500.0, 500.0, HEIGHT_M)); // out of reach
     let bytes = open_roadmap(&terminals, 4, 300, 3);
-    let plan = plan(&bytes, &tasks(4, false), 2, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
+    let plan =
+        plan(&bytes, &tasks(4, false), 2, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
     let flying: StdVec<_> = plan.flights.iter().filter_map(|f| f.task.goal()).collect();
     assert_eq!(flying, [0], "one goal in reach, one vehicle flies to it");
     checker::fly(&SCHEDULE, &plan.flights, &[1.0; 4], 10_000).unwrap();
@@ -240,10 +257,17 @@ fn wrong_requests_are_refused_by_name() {
     assert_eq!(plan(&bytes, &labelled, 2, Mode::Labelled).unwrap_err(), PlanError::BadGoal(2));
 }
 
-/// A corridor along x that vehicles cross one behind the other, starts on its left and goals on its right.
-fn queue(length_m: f32, vehicles: usize, edge_m: f32, seed: u64) -> (StdVec<u8>, StdVec<VehicleTask>) {
+/// A corridor along x that vehicles cross one behind the other, starts on its left and goals on its
+/// right.
+fn queue(
+    length_m: f32,
+    vehicles: usize,
+    edge_m: f32,
+    seed: u64,
+) -> (StdVec<u8>, StdVec<VehicleTask>) {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let mut uniform = |low: f32, high: f32| low + (high - low) * (rng.next_u32() as f32 / u32::MAX as f32);
+    let mut uniform =
+        |low: f32, high: f32| low + (high - low) * (rng.next_u32() as f32 / u32::MAX as f32);
     let mut nodes = StdVec::new();
     for side in [0.0, length_m] {
         for i in 0..vehicles {
@@ -284,11 +308,12 @@ fn fits<const G: usize>(bytes: &[u8], vehicles: &[VehicleTask]) -> (bool, Result
     let mut out = SwarmPlan::<16, 64>::new();
     let descents = std::vec![HEIGHT_M; vehicles.len()];
     let mode = Mode::Labelled;
-    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: G };
+    let request =
+        PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: G };
     let planned = plan_swarm(&view, &request, &mut ws, &mut out);
     let mut own = VehiclePlan::<64, G>::default();
-    let all =
-        (0..vehicles.len()).all(|i| vehicle_plan(&out, i, &SCHEDULE, &mut ws.schedule, &mut own).is_ok());
+    let all = (0..vehicles.len())
+        .all(|i| vehicle_plan(&out, i, &SCHEDULE, &mut ws.schedule, &mut own).is_ok());
     (all, planned)
 }
 
@@ -311,10 +336,15 @@ fn flights_of_four_kilometres_are_scheduled_and_flown() {
     let (bytes, vehicles) = queue(4000.0, 3, 99.0, 1);
     let plan = plan(&bytes, &vehicles, 3, Mode::Labelled).unwrap();
     for flight in &plan.flights {
-        assert!(flight.path.length_m() > 4000.0 && flight.segment_m > schedule::MAX_TIMED_SEGMENT_M);
+        assert!(
+            flight.path.length_m() > 4000.0 && flight.segment_m > schedule::MAX_TIMED_SEGMENT_M
+        );
     }
     for speeds in [[10.0, 10.0, 10.0], [4.0, 10.0, 7.0]] {
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 100_000);
-        assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 0.3), "{apart:?}");
+        assert!(
+            apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 0.3),
+            "{apart:?}"
+        );
     }
 }

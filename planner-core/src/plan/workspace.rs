@@ -8,12 +8,14 @@ use crate::schedule::ScheduleWorkspace;
 use crate::schedule::sipp::SippWorkspace;
 use crate::search::SearchWorkspace;
 
-/// The plan of a whole swarm: flight `i` is vehicle `i` of the request. A vehicle without a goal stays on its pad.
+/// The plan of a whole swarm: flight `i` is vehicle `i` of the request. A vehicle without a goal
+/// stays on its pad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SwarmPlan<const V: usize, const W: usize> {
     /// One flight per vehicle.
     pub flights: Vec<Flight<W>, V>,
-    /// CRC-32 over separation and speeds, ids, goals, climbs, descents, waypoints with their times, and departures.
+    /// CRC-32 over separation and speeds, ids, goals, climbs, descents, waypoints with their times,
+    /// and departures.
     pub crc: u32,
 }
 
@@ -29,8 +31,8 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// Scratch of [`super::plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles and goals, and `P` pieces of flights among
-/// which one steps aside.
+/// Scratch of [`super::plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V`
+/// vehicles and goals, and `P` pieces of flights among which one steps aside.
 pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     /// Scratch of searches, also for [`crate::detour`].
     pub search: SearchWorkspace<N>,

@@ -13,10 +13,12 @@ pub const TRIES_PER_BRIDGE: usize = 1_000;
 pub enum Sampling {
     /// Independent and uniform, as in the paper.
     Uniform,
-    /// The Halton sequence in bases 2, 3 and 5, shifted by the seed (Cranley and Patterson 1976): more even.
+    /// The Halton sequence in bases 2, 3 and 5, shifted by the seed (Cranley and Patterson 1976):
+    /// more even.
     Halton,
-    /// Every second node by the bridge test (Hsu et al. 2003), the others uniform: more of them in doors and
-    /// narrow passages. Such a node is clear and lies half way between two points that are not.
+    /// Every second node by the bridge test (Hsu et al. 2003), the others uniform: more of them in
+    /// doors and narrow passages. Such a node is clear and lies half way between two points that
+    /// are not.
     Bridge,
 }
 
@@ -86,8 +88,8 @@ impl Config {
     }
 }
 
-/// Squared length of the segment from `a` to `b`, m²; the one place where it is computed, so that every builder
-/// rounds alike.
+/// Squared length of the segment from `a` to `b`, m²; the one place where it is computed, so that
+/// every builder rounds alike.
 #[inline(always)]
 pub fn squared_length(a: [f32; 3], b: [f32; 3]) -> f32 {
     let (x, y, z) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);

@@ -1,15 +1,17 @@
 //! What a node sees at once: an empty box of cells around it, and the walls that close it.
 //!
-//! Boxes are convex, so a segment with both ends strictly inside is clear; and a segment that leaves one goes through
-//! the cell behind that face, mostly a wall. One box answers for all rays of a node, and for the nodes beside it. Both
-//! answers are given only where no rounding can turn them: ends at least [`ROUNDING_CELLS`] cells inside, and a point of the ray
-//! at least [`ROUNDING_CELLS`] cells inside an occupied cell. All other rays go to the exact check.
+//! Boxes are convex, so a segment with both ends strictly inside is clear; and a segment that
+//! leaves one goes through the cell behind that face, mostly a wall. One box answers for all rays
+//! of a node, and for the nodes beside it. Both answers are given only where no rounding can turn
+//! them: ends at least [`ROUNDING_CELLS`] cells inside, and a point of the ray at least
+//! [`ROUNDING_CELLS`] cells inside an occupied cell. All other rays go to the exact check.
 
 use super::config::Config;
 use super::neighbours::Workspace;
 use crate::Point;
 use crate::segment::{
-    MIN_MISSED_CELLS, Snapped, is_farther_than, lane_mask, segment_is_clear, snap, snapped_rest_touches,
+    MIN_MISSED_CELLS, Snapped, is_farther_than, lane_mask, segment_is_clear, snap,
+    snapped_rest_touches,
 };
 use crate::voxel::VoxelGrid;
 
@@ -51,7 +53,8 @@ pub(super) struct NodeVisibility<'g, 'a> {
 
 #[derive(Clone, Copy)]
 struct BoxView {
-    /// A ray that ends between these is clear. Empty if `here` itself is nearer to a face than the clearance.
+    /// A ray that ends between these is clear. Empty if `here` itself is nearer to a face than the
+    /// clearance.
     clear_low: [f32; 3],
     clear_high: [f32; 3],
     /// The faces, [`PROBE_DEPTH_CELLS`] farther out.
@@ -123,8 +126,8 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         self.view = Some(view);
     }
 
-    /// Calls `found` with those of `places` to which the segment from here is clear, and with what it keeps from the faces
-    /// of the box, metres: 0 where it leaves the box.
+    /// Calls `found` with those of `places` to which the segment from here is clear, and with what
+    /// it keeps from the faces of the box, metres: 0 where it leaves the box.
     #[inline(always)]
     pub(super) fn for_each_visible<E, const NODES: usize, const CUBES: usize>(
         &self,
@@ -136,15 +139,17 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         for &place in places {
             let place = usize::from(place);
             let there = workspace.point(place);
-            let (clear, room) =
-                match self.view.as_ref().map_or(RayClass::Leaves(0.0), |view| self.classify_ray(view, there))
-                {
-                    RayClass::Clear(room) => (true, room),
-                    RayClass::Blocked => (false, 0.0),
-                    RayClass::Leaves(known) => {
-                        (hint(place).unwrap_or_else(|| self.check_exactly(there, known)), 0.0)
-                    }
-                };
+            let (clear, room) = match self
+                .view
+                .as_ref()
+                .map_or(RayClass::Leaves(0.0), |view| self.classify_ray(view, there))
+            {
+                RayClass::Clear(room) => (true, room),
+                RayClass::Blocked => (false, 0.0),
+                RayClass::Leaves(known) => {
+                    (hint(place).unwrap_or_else(|| self.check_exactly(there, known)), 0.0)
+                }
+            };
             if clear {
                 found(place, room * self.grid.shape().resolution_m)?;
             }
@@ -156,9 +161,17 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     #[inline]
     fn check_exactly(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
-        let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else { return false };
+        let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else {
+            return false;
+        };
         if self.clearance_cells >= MIN_MISSED_CELLS {
-            return is_farther_than(self.grid, &Point::from(self.here), &there, known, self.clearance_m);
+            return is_farther_than(
+                self.grid,
+                &Point::from(self.here),
+                &there,
+                known,
+                self.clearance_m,
+            );
         }
         if self.clearance_m > 0.0 {
             return segment_is_clear(self.grid, &Point::from(self.here), &there, self.clearance_m);
@@ -193,9 +206,10 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         if t < 0.999 && self.is_obstacle(at(t)) {
             return RayClass::Blocked;
         }
-        // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead, and as far
-        // away as the clearance.
-        let near = [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
+        // The probe lies outside, on a ray along a face far outside: back to where the first face
+        // is still ahead, and as far away as the clearance.
+        let near =
+            [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
         RayClass::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
     }
@@ -231,7 +245,8 @@ impl FreeBox {
         (0..3).all(|axis| cell[axis] >= self.low[axis] && cell[axis] < self.high[axis])
     }
 
-    /// Grows up and down to floor and ceiling, then along x and y to the walls; `None` if the cell is an obstacle.
+    /// Grows up and down to floor and ceiling, then along x and y to the walls; `None` if the cell
+    /// is an obstacle.
     fn grow(grid: &VoxelGrid<'_>, cell: [i32; 3], reach: i32) -> Option<Self> {
         if grid.is_occupied(cell.map(|c| c as u32)) {
             return None;
@@ -279,8 +294,8 @@ impl FreeBox {
         limit.min(start)
     }
 
-    /// Which of the four layers of cells of brick layer `brick` along `axis` hold an obstacle within the box's extent on the
-    /// other two axes.
+    /// Which of the four layers of cells of brick layer `brick` along `axis` hold an obstacle
+    /// within the box's extent on the other two axes.
     fn occupied_layers(&self, grid: &VoxelGrid<'_>, axis: usize, brick: i32) -> u32 {
         let [v, w] = [[1, 2], [0, 2], [0, 1]][axis];
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
@@ -295,14 +310,17 @@ impl FreeBox {
         let (first_mask, last_mask) = (lane_mask(v, lanes(v, first)), lane_mask(v, lanes(v, last)));
         let mut all = 0;
         for brick_w in self.low[w] >> 2..=(self.high[w] - 1) >> 2 {
-            let at =
-                |brick_v: i32| (brick * strides[axis] + brick_v * strides[v] + brick_w * strides[w]) as usize;
+            let at = |brick_v: i32| {
+                (brick * strides[axis] + brick_v * strides[v] + brick_w * strides[w]) as usize
+            };
             let mut row = grid.words()[at(first)] & first_mask | grid.words()[at(last)] & last_mask;
             if last > first + 1 {
                 let between = &grid.words()[at(first + 1)..at(last)];
                 row |= match strides[v] {
                     1 => between.iter().fold(0, |row, word| row | word),
-                    stride => between.iter().step_by(stride as usize).fold(0, |row, word| row | word),
+                    stride => {
+                        between.iter().step_by(stride as usize).fold(0, |row, word| row | word)
+                    }
                 };
             }
             all |= row & lane_mask(w, lanes(w, brick_w));

@@ -1,7 +1,8 @@
 //! Nodes sorted into cubes, so that the pairs in range are found without looking at all pairs.
 //!
-//! A counting sort over a box of cubes around the nodes, half the longest edge a side (more where that would be too many
-//! cubes), x fastest: the nodes of neighbouring cubes in a row lie side by side, and a node's neighbours are a few runs.
+//! A counting sort over a box of cubes around the nodes, half the longest edge a side (more where
+//! that would be too many cubes), x fastest: the nodes of neighbouring cubes in a row lie side by
+//! side, and a node's neighbours are a few runs.
 
 use super::config::{Config, LengthRange, PrmError, squared_length};
 use crate::Point;
@@ -9,7 +10,8 @@ use crate::Point;
 /// Candidates whose distances are computed at once.
 const CANDIDATE_LANES: usize = 16;
 
-/// Scratch for `NODES` nodes and `CUBES` cubes: 14 bytes a node, 2 a cube. The default board has 4096 of each.
+/// Scratch for `NODES` nodes and `CUBES` cubes: 14 bytes a node, 2 a cube. The default board has
+/// 4096 of each.
 pub struct Workspace<const NODES: usize, const CUBES: usize> {
     /// Coordinates in sorted order.
     x: [f32; NODES],
@@ -81,7 +83,8 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         let [nx, ny, nz] = self.dims;
         let count = nx * ny * nz;
         self.first.fill(0);
-        // Counts become the ends of the cubes, and placing the nodes moves each end down to the beginning.
+        // Counts become the ends of the cubes, and placing the nodes moves each end down to the
+        // beginning.
         for node in nodes {
             self.first[self.cube_of(node)] += 1;
         }
@@ -137,8 +140,8 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         [self.x[place], self.y[place], self.z[place]]
     }
 
-    /// Calls `visit` with the places after `place` whose nodes are in the range of lengths from it, up to [`CANDIDATE_LANES`] at a
-    /// time.
+    /// Calls `visit` with the places after `place` whose nodes are in the range of lengths from it,
+    /// up to [`CANDIDATE_LANES`] at a time.
     #[inline(always)]
     pub(super) fn for_each_in_range<E>(
         &self,
@@ -148,7 +151,8 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
     ) -> Result<(), E> {
         let lengths = LengthRange::new(config);
         let here = self.point(place);
-        // Rounding of `x ± reach` must not lose a cube: a millionth more, and an ulp of the largest coordinate.
+        // Rounding of `x ± reach` must not lose a cube: a millionth more, and an ulp of the largest
+        // coordinate.
         let largest = here[0].abs().max(here[1].abs()).max(here[2].abs());
         let reach = config.edge_max_m * (1.0 + 1e-6) + largest * 4.0 * f32::EPSILON;
         let [_, j0, k0] = [0, 1, 2].map(|axis| self.cube_along(axis, here[axis]));
@@ -198,13 +202,15 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         ) {
             (Some(x), Some(y), Some(z)) => {
                 for i in 0..CANDIDATE_LANES {
-                    hits |= u32::from(lengths.contains(squared_length(here, [x[i], y[i], z[i]]))) << i;
+                    hits |=
+                        u32::from(lengths.contains(squared_length(here, [x[i], y[i], z[i]]))) << i;
                 }
                 hits & ((1 << lanes) - 1)
             }
             _ => {
                 for i in 0..lanes {
-                    hits |= u32::from(lengths.contains(squared_length(here, self.point(from + i)))) << i;
+                    hits |= u32::from(lengths.contains(squared_length(here, self.point(from + i))))
+                        << i;
                 }
                 hits
             }

@@ -36,8 +36,8 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
             for k in 0..dims[2] {
                 let cell = [i, j, k];
                 let wall = walls.iter().any(|(axis, at, door)| {
-                    let open =
-                        (0..3).all(|a| a == *axis || (door[a]..door[a] + dims[a] / 3).contains(&cell[a]));
+                    let open = (0..3)
+                        .all(|a| a == *axis || (door[a]..door[a] + dims[a] / 3).contains(&cell[a]));
                     cell[*axis] == *at && !open
                 });
                 if wall || rng.next_u32().is_multiple_of(500) {
@@ -86,7 +86,8 @@ fn edges_are_those_of_all_pairs() {
                 let count = sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
                 // Some on cell corners, and two in one place.
                 for node in &mut nodes[..20] {
-                    *node = ((*node - shape.min) / shape.resolution_m).map(f32::round) * shape.resolution_m
+                    *node = ((*node - shape.min) / shape.resolution_m).map(f32::round)
+                        * shape.resolution_m
                         + shape.min;
                 }
                 nodes[21] = nodes[22];
@@ -97,15 +98,16 @@ fn edges_are_those_of_all_pairs() {
     assert!(total > 50_000, "{total} edges are too few to mean much");
 }
 
-/// A thin wall full of holes, nodes a hair to either side of its faces: rays leave the empty box at shallow angles, often
-/// through a hole and into the cell beside it, which no shortcut may skip.
+/// A thin wall full of holes, nodes a hair to either side of its faces: rays leave the empty box at
+/// shallow angles, often through a hole and into the cell beside it, which no shortcut may skip.
 #[test]
 fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
     let (mut edges, mut pairs) = (0, 0);
     for seed in 0..15 {
         let mut rng = Pcg32::seed_from_u64(seed);
         let axis = seed as usize % 3;
-        let shape = GridShape { dims: [40, 36, 32], min: Point::new(-1.0, 2.0, 0.5), resolution_m: 0.25 };
+        let shape =
+            GridShape { dims: [40, 36, 32], min: Point::new(-1.0, 2.0, 0.5), resolution_m: 0.25 };
         let wall = shape.dims[axis] / 2;
         let mut words = vec![0; shape.brick_count()];
         for i in 0..shape.dims[0] {
@@ -124,7 +126,8 @@ fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
             [0.0, 1.0 / 16384.0, 1.0 / 1024.0, 1.0 / 512.0, 1.0 / 300.0, 1.0 / 64.0, 0.1, 0.5];
         let nodes: Vec<Point> = (0..240)
             .map(|_| {
-                let mut cells = uniform(&mut rng).component_mul(&Point::from(shape.dims.map(|d| d as f32)));
+                let mut cells =
+                    uniform(&mut rng).component_mul(&Point::from(shape.dims.map(|d| d as f32)));
                 let (hair, draw) = (HAIRS[(rng.next_u32() % 8) as usize], rng.next_u32());
                 let face = (wall + (draw & 1)) as f32;
                 cells[axis] = if draw & 2 == 0 { face - hair } else { face + hair };
@@ -135,7 +138,10 @@ fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
         edges += check_edges(&grid, &nodes, &config);
         pairs += nodes.len() * (nodes.len() - 1) / 2;
     }
-    assert!(edges > 10_000 && edges < pairs / 2, "{edges} of {pairs}: too few of one kind to mean much");
+    assert!(
+        edges > 10_000 && edges < pairs / 2,
+        "{edges} of {pairs}: too few of one kind to mean much"
+    );
 }
 
 #[test]
@@ -163,15 +169,19 @@ fn nodes_are_free_and_repeat_with_the_seed() {
     }
 }
 
-/// A wall across the map with a door that leaves 0.2 m to fly in. The edges of the rooms draw bridges as well.
+/// A wall across the map with a door that leaves 0.2 m to fly in. The edges of the rooms draw
+/// bridges as well.
 #[test]
 fn bridges_lie_in_doors() {
     let (mut in_doors, mut by_chance) = (0, 0);
     for seed in 0..10 {
-        let shape = GridShape { dims: [60, 40, 20], min: Point::new(-2.0, 1.0, 0.0), resolution_m: 0.1 };
+        let shape =
+            GridShape { dims: [60, 40, 20], min: Point::new(-2.0, 1.0, 0.0), resolution_m: 0.1 };
         let mut words = vec![0; shape.brick_count()];
         let door = 5 + seed as u32 * 2..13 + seed as u32 * 2;
-        for (j, k) in (0..40).flat_map(|j| (0..20).map(move |k| (j, k))).filter(|(j, _)| !door.contains(j)) {
+        for (j, k) in
+            (0..40).flat_map(|j| (0..20).map(move |k| (j, k))).filter(|(j, _)| !door.contains(j))
+        {
             let (word, mask) = shape.address([30, j, k]);
             words[word] |= mask;
         }
@@ -213,12 +223,20 @@ fn refusals_are_named() {
     let good = config(1);
     assert_eq!(sample_nodes(&full, None, &[], &good, &mut nodes), Err(PrmError::NoFreeSpace(0)));
     let inside = Point::new(1.0, 1.0, 1.0);
-    assert_eq!(sample_nodes(&full, None, &[inside], &good, &mut nodes), Err(PrmError::TooManyNodes));
+    assert_eq!(
+        sample_nodes(&full, None, &[inside], &good, &mut nodes),
+        Err(PrmError::TooManyNodes)
+    );
     let few = Config { nodes: 10, ..good };
-    assert_eq!(sample_nodes(&full, None, &[inside], &few, &mut nodes), Err(PrmError::TerminalBlocked(0)));
-    for bad in
-        [Point::new(f32::NAN, 1.0, 1.0), Point::new(-0.1, 1.0, 1.0), Point::new(1.0, f32::INFINITY, 1.0)]
-    {
+    assert_eq!(
+        sample_nodes(&full, None, &[inside], &few, &mut nodes),
+        Err(PrmError::TerminalBlocked(0))
+    );
+    for bad in [
+        Point::new(f32::NAN, 1.0, 1.0),
+        Point::new(-0.1, 1.0, 1.0),
+        Point::new(1.0, f32::INFINITY, 1.0),
+    ] {
         assert_eq!(
             sample_nodes(&empty, None, &[inside, bad], &few, &mut nodes),
             Err(PrmError::TerminalBlocked(1))
@@ -240,7 +258,10 @@ fn refusals_are_named() {
         connect(&empty, &nodes[..count], &few, &mut workspace, &mut edges),
         Err(PrmError::RoadmapFull)
     );
-    assert_eq!(connect(&empty, &nodes[..21], &few, &mut workspace, &mut edges), Err(PrmError::TooManyNodes));
+    assert_eq!(
+        connect(&empty, &nodes[..21], &few, &mut workspace, &mut edges),
+        Err(PrmError::TooManyNodes)
+    );
     nodes[3].y = f32::NAN;
     assert_eq!(
         connect(&empty, &nodes[..count], &few, &mut workspace, &mut edges),

@@ -1,11 +1,13 @@
-//! What makes a file a roadmap: rows in order, edges both ways within the header's limits, ways to the landmarks that are right.
+//! What makes a file a roadmap: rows in order, edges both ways within the header's limits, ways to
+//! the landmarks that are right.
 
 use super::{LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapView, in_range};
 
 impl RoadmapView<'_> {
     /// Rows, nodes and edges are what the header and one another say.
     pub(super) fn check_graph(&self) -> Result<(), RoadmapError> {
-        // Ranges first: the opposite of a half-edge is looked up in a row that must already be known to be sound.
+        // Ranges first: the opposite of a half-edge is looked up in a row that must already be
+        // known to be sound.
         let mut end = 0;
         for (i, raw) in self.offsets.iter().enumerate() {
             let node = i.min(MAX_NODES) as u16;
@@ -35,7 +37,9 @@ impl RoadmapView<'_> {
         for node in 0..self.nodes.len() as u16 {
             let here = self.node(node);
             for edge in self.half_edges(node) {
-                if self.edge_between(edge.target, node).map(|e| e.clearance_m) != Some(edge.clearance_m) {
+                if self.edge_between(edge.target, node).map(|e| e.clearance_m)
+                    != Some(edge.clearance_m)
+                {
                     return Err(RoadmapError::OneWay(node));
                 }
                 if !(least_m..=most_m).contains(&edge.clearance_m) {
@@ -53,10 +57,11 @@ impl RoadmapView<'_> {
         Ok(())
     }
 
-    /// The ways to the landmarks must be, to the bit, those that a search over all edges finds; then their differences
-    /// bound every way from below. Nothing is searched: the ways are right if that to the landmark is zero, no edge
-    /// shortens one, and each other one is the sum of an edge and of a shorter way from the edge's other end. (Along the
-    /// shorter ways one comes to the landmark, so none is too short; along the true shortest way, none is too long.)
+    /// The ways to the landmarks must be, to the bit, those that a search over all edges finds;
+    /// then their differences bound every way from below. Nothing is searched: the ways are right
+    /// if that to the landmark is zero, no edge shortens one, and each other one is the sum of an
+    /// edge and of a shorter way from the edge's other end. (Along the shorter ways one comes to
+    /// the landmark, so none is too short; along the true shortest way, none is too long.)
     pub(super) fn check_landmarks(&self) -> Result<(), RoadmapError> {
         if self.landmarks.is_empty() {
             return Ok(());
@@ -87,7 +92,10 @@ impl RoadmapView<'_> {
                 sound &= match here[i] {
                     0.0 => true,
                     way => {
-                        way > 0.0 && way <= MAX_LANDMARK_DISTANCE_M && explained[i] && node != landmarks[i]
+                        way > 0.0
+                            && way <= MAX_LANDMARK_DISTANCE_M
+                            && explained[i]
+                            && node != landmarks[i]
                     }
                 };
             }

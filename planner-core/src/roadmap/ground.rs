@@ -1,8 +1,9 @@
 //! The ground below nodes, and the ground below any place, found from the nodes around it.
 //!
-//! The desk writes with each node how high it is over the first obstacle below it. Between a node and its ground all is free,
-//! so a place beside it at a height between the two is on the same storey. A node that is lower than the place may be below
-//! the storey's floor, but not if it is lower by less than twice the clearance of every edge: both have that much room.
+//! The desk writes with each node how high it is over the first obstacle below it. Between a node
+//! and its ground all is free, so a place beside it at a height between the two is on the same
+//! storey. A node that is lower than the place may be below the storey's floor, but not if it is
+//! lower by less than twice the clearance of every edge: both have that much room.
 
 use libm::{fmaxf, fminf};
 
@@ -17,14 +18,15 @@ pub const GROUND_REACH_M: f32 = 3.0;
 const MAX_GROUND_NODES: usize = 6;
 
 impl RoadmapView<'_> {
-    /// Height of the ground below a node, metres; `None` where the file does not say, or nothing is below.
+    /// Height of the ground below a node, metres; `None` where the file does not say, or nothing is
+    /// below.
     pub fn ground_m(&self, node: u16) -> Option<f32> {
         let height_m = f32::from_le_bytes(*self.heights.get(usize::from(node))?);
         height_m.is_finite().then(|| self.node(node).z - height_m)
     }
 
-    /// The lowest and the highest ground that the nodes around a place have on its storey, metres; `None` where none has any.
-    /// O(nodes).
+    /// The lowest and the highest ground that the nodes around a place have on its storey, metres;
+    /// `None` where none has any. O(nodes).
     pub fn ground_range_near(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;
         let mut nearest = [(GROUND_REACH_M * GROUND_REACH_M, None); MAX_GROUND_NODES];
@@ -43,12 +45,15 @@ impl RoadmapView<'_> {
             }
         }
         let grounds = nearest.iter().filter_map(|(_, ground_m)| *ground_m);
-        grounds.map(|ground_m| (ground_m, ground_m)).reduce(|a, b| (fminf(a.0, b.0), fmaxf(a.1, b.1)))
+        grounds
+            .map(|ground_m| (ground_m, ground_m))
+            .reduce(|a, b| (fminf(a.0, b.0), fmaxf(a.1, b.1)))
     }
 
     pub(super) fn check_heights(&self) -> Result<(), RoadmapError> {
-        let sound =
-            |height_m: f32| (0.0..=MAX_LANDMARK_DISTANCE_M).contains(&height_m) || height_m == f32::INFINITY;
+        let sound = |height_m: f32| {
+            (0.0..=MAX_LANDMARK_DISTANCE_M).contains(&height_m) || height_m == f32::INFINITY
+        };
         match self.heights.iter().position(|raw| !sound(f32::from_le_bytes(*raw))) {
             Some(node) => Err(RoadmapError::Height(node as u16)),
             None => Ok(()),

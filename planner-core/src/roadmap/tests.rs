@@ -25,7 +25,11 @@ pub(crate) fn encode(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) ->
     out
 }
 
-pub(crate) fn encode_with_landmarks(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Vec<u8> {
+pub(crate) fn encode_with_landmarks(
+    header: &RoadmapHeader,
+    nodes: &[Point],
+    edges: &[Edge],
+) -> Vec<u8> {
     let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARKS).unwrap()];
     let mut ws = SearchWorkspace::<32>::new();
     assert_eq!(write_with_landmarks(header, nodes, edges, &[], &mut ws, &mut out), Ok(out.len()));
@@ -36,12 +40,15 @@ pub(crate) fn encode_with_landmarks(header: &RoadmapHeader, nodes: &[Point], edg
 fn graphs() -> impl Strategy<Value = (Vec<Point>, Vec<Edge>)> {
     (2usize..24).prop_flat_map(|n| {
         let heights = proptest::collection::vec(-20.0f32..20.0, n);
-        let clearances = proptest::collection::vec(proptest::option::of(0.25f32..70.0), n * (n - 1) / 2);
+        let clearances =
+            proptest::collection::vec(proptest::option::of(0.25f32..70.0), n * (n - 1) / 2);
         (heights, clearances).prop_map(move |(heights, clearances)| {
-            let nodes = heights.iter().enumerate().map(|(i, &z)| Point::new(i as f32, -z, z)).collect();
+            let nodes =
+                heights.iter().enumerate().map(|(i, &z)| Point::new(i as f32, -z, z)).collect();
             let pairs = (0..n as u16).flat_map(|a| (a + 1..n as u16).map(move |b| (a, b)));
             let edges = pairs.zip(clearances);
-            let edges = edges.filter_map(|((a, b), c)| c.map(|clearance_m| Edge { a, b, clearance_m }));
+            let edges =
+                edges.filter_map(|((a, b), c)| c.map(|clearance_m| Edge { a, b, clearance_m }));
             (nodes, edges.collect())
         })
     })
@@ -70,7 +77,8 @@ proptest! {
 }
 
 fn small() -> (Vec<Point>, Vec<Edge>) {
-    let nodes = vec![Point::new(0.0, 0.0, 1.0), Point::new(3.0, 4.0, 1.0), Point::new(-1.0, 0.0, 2.0)];
+    let nodes =
+        vec![Point::new(0.0, 0.0, 1.0), Point::new(3.0, 4.0, 1.0), Point::new(-1.0, 0.0, 2.0)];
     (nodes, vec![Edge { a: 0, b: 1, clearance_m: 0.7 }, Edge { a: 2, b: 0, clearance_m: 0.25 }])
 }
 
@@ -191,14 +199,23 @@ fn bad_input_is_refused_by_name() {
     assert_eq!(refuse(|_, _, edges| edges[1].clearance_m = 0.248), RoadmapError::EdgeClearance(2));
     assert_eq!(refuse(|_, nodes, _| nodes[1] *= 16.0), RoadmapError::EdgeLength(0));
     assert_eq!(refuse(|header, _, _| header.edge_min_m = 2.0), RoadmapError::EdgeLength(2));
-    assert_eq!(refuse(|header, _, _| header.edge_max_m = 101.0), FileError::Header("edge_max_m").into());
+    assert_eq!(
+        refuse(|header, _, _| header.edge_max_m = 101.0),
+        FileError::Header("edge_max_m").into()
+    );
     assert_eq!(
         refuse(|_, _, edges| edges.push(Edge { a: 1, b: 0, clearance_m: 0.7 })),
         RoadmapError::Duplicate(0, 1)
     );
     assert_eq!(refuse(|header, _, _| header.goals = 3), FileError::Header("terminals").into());
-    assert_eq!(refuse(|header, _, _| header.origin.lat_deg = f64::NAN), FileError::Header("origin").into());
-    assert_eq!(refuse(|header, _, _| header.edge_max_m = 0.4), FileError::Header("edge_max_m").into());
+    assert_eq!(
+        refuse(|header, _, _| header.origin.lat_deg = f64::NAN),
+        FileError::Header("origin").into()
+    );
+    assert_eq!(
+        refuse(|header, _, _| header.edge_max_m = 0.4),
+        FileError::Header("edge_max_m").into()
+    );
     let (nodes, edges) = small();
     let full = write(&header(1, 1), &nodes, &edges, &mut [0; 143]);
     assert_eq!(full, Err(RoadmapError::RoadmapFull { needed: 144 }));
@@ -236,8 +253,14 @@ fn ways_to_landmarks_are_written_and_checked() {
         let refused = RoadmapView::parse(&sealed(changed)).map(|_| ());
         assert!(matches!(refused, Err(RoadmapError::Landmark(_))), "{wrong}: {refused:?}");
     }
-    let small =
-        write_with_landmarks(&header(1, 1), &nodes, &edges, &[], &mut SearchWorkspace::<2>::new(), &mut out);
+    let small = write_with_landmarks(
+        &header(1, 1),
+        &nodes,
+        &edges,
+        &[],
+        &mut SearchWorkspace::<2>::new(),
+        &mut out,
+    );
     assert_eq!(small, Err(RoadmapError::WorkspaceTooSmall));
 }
 
@@ -270,12 +293,16 @@ fn heights_over_ground_are_written_and_checked() {
     // A file of version 1 says nothing of the ground.
     let old = with_heights(&[]).unwrap();
     let view = RoadmapView::parse(&old).unwrap();
-    assert_eq!((old[8], view.ground_m(0), view.ground_range_near(&Point::zeros())), (1, None, None));
+    assert_eq!(
+        (old[8], view.ground_m(0), view.ground_range_near(&Point::zeros())),
+        (1, None, None)
+    );
 }
 
 #[test]
 fn the_ground_of_a_place_is_that_of_nodes_on_its_storey() {
-    // Two storeys, the upper floor at 4 m; nodes 0 and 1 above it, node 2 below, node 3 on the upper one but far away.
+    // Two storeys, the upper floor at 4 m; nodes 0 and 1 above it, node 2 below, node 3 on the
+    // upper one but far away.
     let places = [(0.0, 5.0, 1.0), (2.0, 6.0, 1.5), (1.0, 3.0, 3.0), (9.0, 5.0, 3.0)];
     let nodes: Vec<Point> = places.iter().map(|&(x, z, _)| Point::new(x, 0.0, z)).collect();
     let heights: Vec<f32> = places.iter().map(|&(.., height_m)| height_m).collect();
@@ -284,7 +311,11 @@ fn the_ground_of_a_place_is_that_of_nodes_on_its_storey() {
     write_with_landmarks(&header(0, 0), &nodes, &[], &heights, &mut ws, &mut out).unwrap();
     let view = RoadmapView::parse(&out).unwrap();
     let around = |x: f32, z: f32| view.ground_range_near(&Point::new(x, 0.0, z));
-    assert_eq!(around(1.0, 5.2), Some((4.0, 4.5)), "0.25 m of clearance: node 0 may be lower by 0.5 m");
+    assert_eq!(
+        around(1.0, 5.2),
+        Some((4.0, 4.5)),
+        "0.25 m of clearance: node 0 may be lower by 0.5 m"
+    );
     assert_eq!(around(1.0, 5.6), Some((4.5, 4.5)));
     assert_eq!(around(1.0, 2.0), Some((0.0, 0.0)));
     assert_eq!(around(1.0, 3.6), None, "between the storeys");

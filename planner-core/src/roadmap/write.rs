@@ -1,9 +1,10 @@
-//! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
+//! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and
+//! sorted in place.
 
 use super::{
-    HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M, MAX_NODES, NODE_LEN,
-    RoadmapError, RoadmapHeader, RoadmapView, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN, in_range,
-    millimetres_down, target_of,
+    HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M, MAX_NODES,
+    NODE_LEN, RoadmapError, RoadmapHeader, RoadmapView, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN,
+    in_range, millimetres_down, target_of,
 };
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -16,13 +17,14 @@ pub struct Edge {
     pub a: u16,
     /// The other node.
     pub b: u16,
-    /// Distance from the segment to the nearest obstacle, metres; stored rounded down to a millimetre and saturated at
-    /// [`RoadmapHeader::max_clearance_m`].
+    /// Distance from the segment to the nearest obstacle, metres; stored rounded down to a
+    /// millimetre and saturated at [`RoadmapHeader::max_clearance_m`].
     pub clearance_m: f32,
 }
 
-/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length. `columns` are the numbers that each node has
-/// beside its place: 0, or [`LANDMARKS`] for [`write_with_landmarks`], and one more with heights.
+/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length. `columns` are
+/// the numbers that each node has beside its place: 0, or [`LANDMARKS`] for
+/// [`write_with_landmarks`], and one more with heights.
 pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
     let a_node = columns.checked_add(4)?;
     let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
@@ -30,10 +32,11 @@ pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> 
     u32::try_from(bytes).ok().map(|_| bytes)
 }
 
-/// Writes a roadmap and returns its length in bytes. O(nodes + edges · log degree), no memory but `out`.
+/// Writes a roadmap and returns its length in bytes. O(nodes + edges · log degree), no memory but
+/// `out`.
 ///
-/// Terminals come first in `nodes`: starts, then goals. The order of `edges` and of their ends does not change the
-/// bytes. On an error `out` holds nothing of use.
+/// Terminals come first in `nodes`: starts, then goals. The order of `edges` and of their ends does
+/// not change the bytes. On an error `out` holds nothing of use.
 pub fn write(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -44,10 +47,12 @@ pub fn write(
     Ok(append_crc(out))
 }
 
-/// As [`write()`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in a building: node 0, a start
-/// where there are any, and the node farthest from it. Adds a search from each.
+/// As [`write()`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in
+/// a building: node 0, a start where there are any, and the node farthest from it. Adds a search
+/// from each.
 ///
-/// `heights_m` are those of the nodes over the ground, infinite where there is none; or there are none at all.
+/// `heights_m` are those of the nodes over the ground, infinite where there is none; or there are
+/// none at all.
 pub fn write_with_landmarks<const N: usize>(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -98,7 +103,8 @@ pub fn write_with_landmarks<const N: usize>(
     Ok(append_crc(out))
 }
 
-/// Everything but the `columns` of numbers and the CRC; the bytes of the whole roadmap are returned.
+/// Everything but the `columns` of numbers and the CRC; the bytes of the whole roadmap are
+/// returned.
 fn write_graph<'a>(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -116,7 +122,13 @@ fn write_graph<'a>(
 
     let (head, rest) = out.split_at_mut(HEADER_LEN);
     let version = if columns > LANDMARKS { VERSION } else { VERSION_WITHOUT_HEIGHTS };
-    write_header(header, version, [nodes.len(), 2 * edges.len(), columns.min(LANDMARKS)], needed, head);
+    write_header(
+        header,
+        version,
+        [nodes.len(), 2 * edges.len(), columns.min(LANDMARKS)],
+        needed,
+        head,
+    );
     let (node_bytes, rest) = rest.split_at_mut(nodes.len() * NODE_LEN);
     let scalars = nodes.iter().flat_map(|p| [p.x, p.y, p.z]);
     for (bytes, value) in node_bytes.as_chunks_mut::<4>().0.iter_mut().zip(scalars) {
@@ -134,7 +146,11 @@ fn append_crc(out: &mut [u8]) -> usize {
     out.len()
 }
 
-fn check_edges(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
+fn check_edges(
+    header: &RoadmapHeader,
+    nodes: &[Point],
+    edges: &[Edge],
+) -> Result<(), RoadmapError> {
     for (i, node) in nodes.iter().enumerate() {
         if !in_range(node) {
             return Err(RoadmapError::Node(i as u16));
@@ -142,7 +158,8 @@ fn check_edges(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Resul
     }
     let (least_m, _) = header.clearances();
     for (i, edge) in edges.iter().enumerate() {
-        let (Some(a), Some(b)) = (nodes.get(usize::from(edge.a)), nodes.get(usize::from(edge.b))) else {
+        let (Some(a), Some(b)) = (nodes.get(usize::from(edge.a)), nodes.get(usize::from(edge.b)))
+        else {
             return Err(RoadmapError::EdgeNode(i));
         };
         if edge.a == edge.b {
@@ -165,7 +182,13 @@ fn check_edges(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Resul
 }
 
 /// `counts` are those of nodes, half-edges and landmarks.
-fn write_header(header: &RoadmapHeader, version: u16, counts: [usize; 3], total: usize, head: &mut [u8]) {
+fn write_header(
+    header: &RoadmapHeader,
+    version: u16,
+    counts: [usize; 3],
+    total: usize,
+    head: &mut [u8],
+) {
     let mut at = 0;
     let mut put = |bytes: &[u8]| {
         head[at..at + bytes.len()].copy_from_slice(bytes);
@@ -178,7 +201,9 @@ fn write_header(header: &RoadmapHeader, version: u16, counts: [usize; 3], total:
     for value in [header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m] {
         put(&value.to_le_bytes());
     }
-    for value in [header.edge_min_m, header.edge_max_m, header.tested_clearance_m, header.max_clearance_m] {
+    for value in
+        [header.edge_min_m, header.edge_max_m, header.tested_clearance_m, header.max_clearance_m]
+    {
         put(&value.to_le_bytes());
     }
     put(&header.starts.to_le_bytes());
@@ -188,14 +213,16 @@ fn write_header(header: &RoadmapHeader, version: u16, counts: [usize; 3], total:
     }
 }
 
-/// Fills the compressed rows: the offsets first count the degrees, then serve as cursors, then are moved back by one.
+/// Fills the compressed rows: the offsets first count the degrees, then serve as cursors, then are
+/// moved back by one.
 fn write_rows(
     header: &RoadmapHeader,
     edges: &[Edge],
     offsets: &mut [[u8; WORD_LEN]],
     half_edges: &mut [[u8; WORD_LEN]],
 ) -> Result<(), RoadmapError> {
-    let get = |offsets: &[[u8; WORD_LEN]], node: u16| u32::from_le_bytes(offsets[usize::from(node)]);
+    let get =
+        |offsets: &[[u8; WORD_LEN]], node: u16| u32::from_le_bytes(offsets[usize::from(node)]);
     offsets.fill([0; WORD_LEN]);
     for node in edges.iter().flat_map(|e| [e.a, e.b]) {
         offsets[usize::from(node)] = (get(offsets, node) + 1).to_le_bytes();

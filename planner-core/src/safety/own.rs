@@ -1,8 +1,8 @@
 //! A vehicle's own set, prepared once to be compared with those of many neighbours.
 //!
-//! Most pairs of legs are far apart, and a board sees that without their distance: by the box around the own set and by
-//! balls around the legs. What is left is compared leg by leg. Each of these bounds is a little wider than it has to be,
-//! so rounding skips no pair that counts.
+//! Most pairs of legs are far apart, and a board sees that without their distance: by the box
+//! around the own set and by balls around the legs. What is left is compared leg by leg. Each of
+//! these bounds is a little wider than it has to be, so rounding skips no pair that counts.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -17,7 +17,8 @@ const APPROACH_ROUNDING_M: f32 = 0.003;
 /// Margin added to bounding boxes, metres: more than a coordinate of the mission frame is rounded
 /// by.
 const BOUNDS_ROUNDING_M: f32 = 0.01;
-/// No less than the square root, and at most 7 % more: half the exponent, and the line between two powers of four.
+/// No less than the square root, and at most 7 % more: half the exponent, and the line between two
+/// powers of four.
 #[inline]
 fn sqrt_upper_bound(square: f32) -> f32 {
     f32::from_bits((square.to_bits() >> 1) + (127 << 22))
@@ -68,7 +69,8 @@ pub struct OwnSet<'a> {
 }
 
 impl<'a> OwnSet<'a> {
-    /// The set that a vehicle can no longer avoid. The caller lends the room for its legs: a board takes long to copy them.
+    /// The set that a vehicle can no longer avoid. The caller lends the room for its legs: a board
+    /// takes long to copy them.
     pub fn new<'s: 'a>(set: &'s ReachableSet, legs: &'a mut Legs<'s>) -> Self {
         let first = set.points[0];
         // The second leg begins at the same point where a first leg has no length.
@@ -84,7 +86,8 @@ impl<'a> OwnSet<'a> {
         Self { set, legs, middle: (low + high) * 0.5, half: (high - low) * 0.5 }
     }
 
-    /// From the box around the set to a place, metres; 0 on each axis along which the place is beside no face.
+    /// From the box around the set to a place, metres; 0 on each axis along which the place is
+    /// beside no face.
     #[inline]
     pub fn away_from_box(&self, place: &Point) -> Point {
         let axis = |axis: usize| {
@@ -94,7 +97,8 @@ impl<'a> OwnSet<'a> {
         Point::new(axis(0), axis(1), axis(2))
     }
 
-    /// Whether a segment, given by its middle and half of it, stays outside the box around this set, by `apart_m`.
+    /// Whether a segment, given by its middle and half of it, stays outside the box around this
+    /// set, by `apart_m`.
     #[inline]
     fn is_outside(&self, middle: &Point, half: &Point, apart_m: f32) -> bool {
         let apart = |axis: usize| {
@@ -126,8 +130,8 @@ impl<'a> OwnSet<'a> {
         least_sq
     }
 
-    /// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place` now, and nearer than the
-    /// vehicle is already.
+    /// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place`
+    /// now, and nearer than the vehicle is already.
     pub fn conflicts(&self, other: &ReachableSet, place: &Point, apart_m: f32) -> bool {
         let most_m = apart_m + other.widened_by_m + self.set.widened_by_m;
         let most_sq = most_m * most_m;
@@ -137,7 +141,13 @@ impl<'a> OwnSet<'a> {
 
     /// Whether a motion that comes too near comes nearer than the vehicle is.
     #[inline(never)]
-    fn comes_nearer(&self, motion_sq: f32, other: &ReachableSet, place: &Point, most_m: f32) -> bool {
+    fn comes_nearer(
+        &self,
+        motion_sq: f32,
+        other: &ReachableSet,
+        place: &Point,
+        most_m: f32,
+    ) -> bool {
         if self.set.widened_by_m > 0.0 {
             return true;
         }
@@ -160,8 +170,8 @@ impl<'a> OwnSet<'a> {
     }
 }
 
-/// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about numbers that are none takes a
-/// board three times as long.
+/// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about
+/// numbers that are none takes a board three times as long.
 #[inline]
 fn merge_coordinates(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
     let of = |a: f32, b: f32| if more(b, a) { b } else { a };

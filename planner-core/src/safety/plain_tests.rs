@@ -56,7 +56,8 @@ fn conflict(own: &ReachableSet, other: &ReachableSet, place: &Point, apart_m: f3
     least_m < (own.points[0] - place).norm_squared().sqrt().min(2.0 * most_m) - NEARER_M
 }
 
-/// A way of up to so many legs: nearly straight, or to and fro, or straight up and down; the first may have no length.
+/// A way of up to so many legs: nearly straight, or to and fro, or straight up and down; the first
+/// may have no length.
 fn way(rng: &mut Pcg32, from: Point, most: u32) -> StdVec<Point> {
     let leg_m = one_of(rng, &[0.2, 1.0, 5.0]);
     let onward = near(rng, leg_m);
@@ -90,7 +91,10 @@ fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Neighbour
         extent_m: points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max),
         rests_within_m: one_of(rng, &[0.0, 0.0, 6.0]),
         grounded: rng.next_u32().is_multiple_of(16),
-        column_to_m: rng.next_u32().is_multiple_of(3).then(|| position.z - uniform(rng, -1.0, 60.0)),
+        column_to_m: rng
+            .next_u32()
+            .is_multiple_of(3)
+            .then(|| position.z - uniform(rng, -1.0, 60.0)),
     }
 }
 
@@ -126,7 +130,10 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
         );
         assert!(other.reach_m() <= heard.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
         let from_line_m = least_sq(&ReachableSet::at(position), &set, f32::INFINITY).sqrt();
-        assert!(own.away_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001, "{seed}: {set:?}");
+        assert!(
+            own.away_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001,
+            "{seed}: {set:?}"
+        );
         let apart_m = uniform(rng, 0.5, 3.0);
         let conflicts = own.conflicts(&other, &position, apart_m);
         assert_eq!(
@@ -153,8 +160,10 @@ fn places(points: &[Point]) -> StdVec<(f32, Point)> {
         let (along_m, leg_m) = (places[places.len() - 1].0, (leg[1] - leg[0]).norm());
         let steps = (leg_m / 0.01) as usize + 1;
         let share = |i: usize| i as f32 / steps as f32;
-        places
-            .extend((1..=steps).map(|i| (along_m + leg_m * share(i), leg[0] + (leg[1] - leg[0]) * share(i))));
+        places.extend(
+            (1..=steps)
+                .map(|i| (along_m + leg_m * share(i), leg[0] + (leg[1] - leg[0]) * share(i))),
+        );
     }
     places
 }
@@ -189,7 +198,8 @@ fn the_nearest_place_is_among_the_remembered_ones() {
     assert!(on > 2000 && back > 200, "{on} {back}");
 }
 
-/// Points may lead past a vehicle again, or straight back: wherever on them it truly is, it stays in its set.
+/// Points may lead past a vehicle again, or straight back: wherever on them it truly is, it stays
+/// in its set.
 #[test]
 fn a_vehicle_stays_in_its_set_where_points_lead_back() {
     let bounds = MotionBounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };

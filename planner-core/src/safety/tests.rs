@@ -123,7 +123,8 @@ struct Flier {
     path: StdVec<Point>,
     along_m: f32,
     speed_mps: f32,
-    /// What the other heard of it last: place, velocity, when, and from which of its points on it flies.
+    /// What the other heard of it last: place, velocity, when, and from which of its points on it
+    /// flies.
     reported: (Point, Point, f32, usize),
 }
 
@@ -149,7 +150,8 @@ impl Flier {
     fn set(&self) -> ReachableSet {
         let (place, next, _) = self.at(self.along_m);
         let length_m = self.speed_mps * REACTION_S + BRAKING.stop_m(self.speed_mps) + 0.1;
-        let ahead = core::iter::once(place).chain(self.path[next.min(self.path.len())..].iter().copied());
+        let ahead =
+            core::iter::once(place).chain(self.path[next.min(self.path.len())..].iter().copied());
         ReachableSet::along(place, ahead, length_m)
     }
 
@@ -165,9 +167,11 @@ impl Flier {
 
 #[test]
 fn two_that_stop_where_their_sets_conflict_never_come_near() {
-    let mut rng =
-        proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha);
-    let mut draw = |low: f32, high: f32| low + (high - low) * (rng.next_u32() as f32 / u32::MAX as f32);
+    let mut rng = proptest::test_runner::TestRng::deterministic_rng(
+        proptest::test_runner::RngAlgorithm::ChaCha,
+    );
+    let mut draw =
+        |low: f32, high: f32| low + (high - low) * (rng.next_u32() as f32 / u32::MAX as f32);
     let (mut nearest_m, mut stops, mut arrived) = (f32::INFINITY, 0, 0);
     for case in 0..if cfg!(debug_assertions) { 300 } else { 20_000 } {
         let mut fliers: StdVec<Flier> = (0..2)
@@ -221,7 +225,8 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                 flier.step(stop, 0.05);
                 stops += u32::from(stop);
             }
-            let apart_m = (fliers[0].at(fliers[0].along_m).0 - fliers[1].at(fliers[1].along_m).0).norm();
+            let apart_m =
+                (fliers[0].at(fliers[0].along_m).0 - fliers[1].at(fliers[1].along_m).0).norm();
             assert!(apart_m > APART_M - 0.1, "case {case}, {now_s} s: {apart_m} m");
             nearest_m = nearest_m.min(apart_m);
         }

@@ -1,8 +1,9 @@
-//! Which timed segments of two flights may come near each other: some in a row have a box and a capsule around them, and segments
-//! are compared only where those of two flights come near.
+//! Which timed segments of two flights may come near each other: some in a row have a box and a
+//! capsule around them, and segments are compared only where those of two flights come near.
 //!
-//! What it leaves out is never in conflict, and what it gives out comes in order: schedules are, bit by bit, those of a
-//! comparison of all with all. Cost: one pass over the own flight, and the straight parts or the blocks of the other × the own blocks.
+//! What it leaves out is never in conflict, and what it gives out comes in order: schedules are,
+//! bit by bit, those of a comparison of all with all. Cost: one pass over the own flight, and the
+//! straight parts or the blocks of the other × the own blocks.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -24,8 +25,8 @@ const MAX_GROUPS: usize = MAX_BLOCKS.div_ceil(BLOCKS_PER_GROUP);
 /// Most that rounding takes from a distance between places kilometres away, metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
-/// Most that rounding takes from the length of a block's segments, metres, and as a share of the path up to there: eight
-/// segments, each end rounded.
+/// Most that rounding takes from the length of a block's segments, metres, and as a share of the
+/// path up to there: eight segments, each end rounded.
 const LENGTH_ROUNDING_M: f32 = 0.01;
 const LENGTH_ROUNDING: f32 = 2e-6;
 
@@ -48,8 +49,8 @@ struct Block {
 }
 
 impl Block {
-    /// Around consecutive segments. No point of them is further beside the line from end to end than a curve as long can go:
-    /// half the minor axis of the ellipse about both ends.
+    /// Around consecutive segments. No point of them is further beside the line from end to end
+    /// than a curve as long can go: half the minor axis of the ellipse about both ends.
     fn around_segments(pieces: &[TimedSegment]) -> Self {
         let (first, last) = (&pieces[0], &pieces[pieces.len() - 1]);
         let mut block = Self::around_line(first.from, last.to);
@@ -70,7 +71,11 @@ impl Block {
 
     /// All of a box: it meets every line, and only the box limits it.
     fn filling(bounding_box: BoundingBox) -> Self {
-        Self { bounding_box, line: (bounding_box.0, bounding_box.1), lateral_extent_m: f32::INFINITY }
+        Self {
+            bounding_box,
+            line: (bounding_box.0, bounding_box.1),
+            lateral_extent_m: f32::INFINITY,
+        }
     }
 
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
@@ -124,8 +129,8 @@ impl BoundingBox {
     }
 }
 
-/// The blocks of one flight, and boxes around groups of them and around all. Boxes are as much wider as another flight's line must
-/// come near.
+/// The blocks of one flight, and boxes around groups of them and around all. Boxes are as much
+/// wider as another flight's line must come near.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<Block, MAX_BLOCKS>,
@@ -155,14 +160,17 @@ impl Blocks {
         self.whole = BoundingBox::AROUND_NOTHING;
         for blocks in self.blocks.chunks(BLOCKS_PER_GROUP) {
             let mut around = BoundingBox::AROUND_NOTHING;
-            blocks.iter().for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
+            blocks
+                .iter()
+                .for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
             self.whole.include(&around.0, &around.1);
             // Cannot overflow either.
             let _ = self.groups.push(around);
         }
     }
 
-    /// The straight parts of another flight that may come too near, in order, each with the blocks that it may come near to.
+    /// The straight parts of another flight that may come too near, in order, each with the blocks
+    /// that it may come near to.
     pub(super) fn parts_near<'f, const W: usize>(
         &'f self,
         cfg: &'f ScheduleConfig,
@@ -196,7 +204,8 @@ impl Blocks {
         self.blocks_near_block(&Block::around_line(from, to))
     }
 
-    /// The blocks that may come too near to these segments of another flight, which are at most [`SEGMENTS_PER_BLOCK`] in a row.
+    /// The blocks that may come too near to these segments of another flight, which are at most
+    /// [`SEGMENTS_PER_BLOCK`] in a row.
     pub(super) fn blocks_near(&self, pieces: &[TimedSegment]) -> Bits {
         if pieces.is_empty() { 0 } else { self.blocks_near_block(&Block::around_segments(pieces)) }
     }
@@ -212,7 +221,9 @@ impl Blocks {
                 continue;
             }
             for (bit, own) in blocks.iter().enumerate() {
-                if own.bounding_box.overlaps(&other.bounding_box) && own.lines_meet(other, self.reach_m) {
+                if own.bounding_box.overlaps(&other.bounding_box)
+                    && own.lines_meet(other, self.reach_m)
+                {
                     near |= 1 << (group * BLOCKS_PER_GROUP + bit);
                 }
             }
@@ -220,7 +231,8 @@ impl Blocks {
         near
     }
 
-    /// Puts out the indices of the segments of these blocks that may come too near to another flight on a straight line, in order.
+    /// Puts out the indices of the segments of these blocks that may come too near to another
+    /// flight on a straight line, in order.
     pub(super) fn segments_near_line(
         &self,
         near: Bits,
@@ -245,7 +257,8 @@ impl Blocks {
     }
 }
 
-/// The legs between the first waypoints at one height, and a box around them: they are first compared together.
+/// The legs between the first waypoints at one height, and a box around them: they are first
+/// compared together.
 fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
     let (first, rest) = waypoints.split_first()?;
     let (mut low, mut high) = (first.position, first.position);
@@ -295,8 +308,12 @@ mod tests {
     use crate::schedule::pieces::{cut_into_segments, is_conflict};
     use proptest::prelude::*;
 
-    const CFG: ScheduleConfig =
-        ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+    const CFG: ScheduleConfig = ScheduleConfig {
+        separation_m: 2.0,
+        parked_separation_m: 1.7,
+        cruise_mps: 2.0,
+        vertical_mps: 1.0,
+    };
 
     /// A place, and steps from there: which way, and whether straight on instead.
     type Steps = ((f32, f32), List<(f32, f32, f32, bool)>);
@@ -311,14 +328,25 @@ mod tests {
             let (from, from_m) = (at, along_m);
             at += way;
             along_m += way.norm();
-            TimedSegment { from, to: at, from_m, to_m: along_m, from_s: 0.0, to_s: 1.0, parked: false }
+            TimedSegment {
+                from,
+                to: at,
+                from_m,
+                to_m: along_m,
+                from_s: 0.0,
+                to_s: 1.0,
+                parked: false,
+            }
         };
         steps.iter().map(piece).collect()
     }
 
     fn steps() -> impl Strategy<Value = Steps> {
         let step = (-24.0f32..24.0, -24.0f32..24.0, -3.0f32..3.0, any::<bool>());
-        ((-3000.0f32..3000.0, -50.0f32..50.0), proptest::collection::vec(step, 1..MAX_TIMED_SEGMENTS))
+        (
+            (-3000.0f32..3000.0, -50.0f32..50.0),
+            proptest::collection::vec(step, 1..MAX_TIMED_SEGMENTS),
+        )
     }
 
     proptest! {

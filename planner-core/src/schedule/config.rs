@@ -5,8 +5,8 @@ use crate::{ConfigError, all_positive};
 /// Tunables of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduleConfig {
-    /// Distance kept between the paths of two vehicles that move: the safety distance and what both deviate from their
-    /// paths, metres.
+    /// Distance kept between the paths of two vehicles that move: the safety distance and what both
+    /// deviate from their paths, metres.
     pub separation_m: f32,
     /// Distance kept from a vehicle that stands on the ground, metres.
     pub parked_separation_m: f32,

@@ -1,5 +1,5 @@
-//! Which scheduled pieces come near a place: they are sorted into the cells of a square grid, so that a look around asks only
-//! the cells about it.
+//! Which scheduled pieces come near a place: they are sorted into the cells of a square grid, so
+//! that a look around asks only the cells about it.
 //!
 //! Cost: one sort to build; a look takes the pieces in the cells within reach.
 
@@ -28,7 +28,12 @@ pub(super) struct SegmentGrid {
 impl SegmentGrid {
     pub(super) const fn new() -> Self {
         // All zero; `sort_into_cells` sets the size before a piece is looked for.
-        Self { min: [0.0; 2], cell_m: 0.0, half_m: 0.0, starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1] }
+        Self {
+            min: [0.0; 2],
+            cell_m: 0.0,
+            half_m: 0.0,
+            starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
+        }
     }
 
     /// Sorts `pieces`, at most `u16::MAX` of them, into cells.
@@ -65,7 +70,8 @@ impl SegmentGrid {
         (((value - self.min[axis]) / self.cell_m) as usize).min(CELLS_PER_SIDE - 1)
     }
 
-    /// The pieces whose middle is so near that they may come within `apart_m` of `own`, and some more.
+    /// The pieces whose middle is so near that they may come within `apart_m` of `own`, and some
+    /// more.
     pub(super) fn candidates_near<'a>(
         &'a self,
         pieces: &'a [TimedSegment],
@@ -75,7 +81,10 @@ impl SegmentGrid {
         let reach_m = apart_m + half_length(own) + self.half_m;
         let middle = middle(own);
         let [columns, rows] = [0, 1].map(|axis| {
-            (self.cell_index(axis, middle[axis] - reach_m), self.cell_index(axis, middle[axis] + reach_m))
+            (
+                self.cell_index(axis, middle[axis] - reach_m),
+                self.cell_index(axis, middle[axis] + reach_m),
+            )
         });
         (rows.0..=rows.1).flat_map(move |row| {
             let from = self.starts[row * CELLS_PER_SIDE + columns.0];

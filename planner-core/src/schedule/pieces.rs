@@ -19,8 +19,8 @@ const MAX_SEGMENT_DOUBLINGS: usize = 10;
 /// has not left it.
 pub(super) const OFF_PAD_S: f32 = 0.05;
 
-/// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
-/// landing place to +∞.
+/// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the
+/// pad is held from −∞, the landing place to +∞.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimedSegment {
     pub(super) from: Point,
@@ -38,11 +38,13 @@ pub(super) struct TimedSegment {
 }
 
 impl<const W: usize> Flight<W> {
-    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`MAX_TIMED_SEGMENTS`].
+    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has
+    /// at most [`MAX_TIMED_SEGMENTS`].
     pub(crate) fn fit_segment_length(&mut self) {
         self.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_SEGMENT_DOUBLINGS {
-            // Each leg rounds its number of segments up: the path alone may show that they are too many.
+            // Each leg rounds its number of segments up: the path alone may show that they are too
+            // many.
             let too_many = self.path.length_m() > self.segment_m * (MAX_TIMED_SEGMENTS + 1) as f32;
             if !too_many && self.segment_count() <= MAX_TIMED_SEGMENTS {
                 break;
@@ -57,23 +59,27 @@ impl<const W: usize> Flight<W> {
         self.path.waypoints().last().filter(|_| self.task.leaves_pad()).map_or(0.0, landed_s)
     }
 
-    /// Timed segments that [`cut_into_segments`] makes of it, by the same lengths: as those are rounded.
+    /// Timed segments that [`cut_into_segments`] makes of it, by the same lengths: as those are
+    /// rounded.
     pub(crate) fn segment_count(&self) -> usize {
         let waypoints = self.path.waypoints();
         let legs = waypoints.windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
         let down_m = |waypoint: Option<&Waypoint>, m: f32| {
             waypoint.map_or(0.0, |w| libm::fabsf(w.position.z - (w.position.z - m)))
         };
-        let ends = [down_m(waypoints.first(), self.climb_m), down_m(waypoints.last(), self.descent_m)];
+        let ends =
+            [down_m(waypoints.first(), self.climb_m), down_m(waypoints.last(), self.descent_m)];
         let lengths = ends.into_iter().chain(legs);
-        let moving =
-            lengths.map(|length_m| segment_count(length_m, self.segment_m)).fold(0, u32::saturating_add);
+        let moving = lengths
+            .map(|length_m| segment_count(length_m, self.segment_m))
+            .fold(0, u32::saturating_add);
         let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.arrive_s).count();
         (moving as usize).saturating_add(2 + holds)
     }
 }
 
-/// A straight part of a flight: a stay, a leg, a stay. Either stay may be missing, and a leg without length has no segments.
+/// A straight part of a flight: a stay, a leg, a stay. Either stay may be missing, and a leg
+/// without length has no segments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPart {
     before: Option<TimedSegment>,
@@ -85,13 +91,15 @@ pub(super) struct StraightPart {
 }
 
 impl StraightPart {
-    /// Refuses a leg of more timed segments than `most`: nobody goes through thousands of millions of them.
+    /// Refuses a leg of more timed segments than `most`: nobody goes through thousands of millions
+    /// of them.
     pub(super) fn check_count(&self, segment_m: f32, most: usize) -> Result<(), ScheduleError> {
         let fits = segment_count(self.leg.length_m, segment_m) as usize <= most;
         if fits { Ok(()) } else { Err(ScheduleError::PiecesFull) }
     }
 
-    /// Gives out its timed segments of at most `segment_m`, in order. One copy of it: a board has little room.
+    /// Gives out its timed segments of at most `segment_m`, in order. One copy of it: a board has
+    /// little room.
     #[inline(never)]
     pub(super) fn for_each_segment(&self, segment_m: f32, tell: &mut dyn FnMut(TimedSegment)) {
         self.before.into_iter().for_each(&mut *tell);
@@ -100,11 +108,13 @@ impl StraightPart {
     }
 }
 
-/// Straight part `part` of a flight, which lands at `vertical_mps`: the pad and the climb come first, then each leg after what is
-/// held at its beginning, and the descent after the last. `None` beyond that.
+/// Straight part `part` of a flight, which lands at `vertical_mps`: the pad and the climb come
+/// first, then each leg after what is held at its beginning, and the descent after the last. `None`
+/// beyond that.
 ///
-/// A climb is flown in one go, and so are a descent and what follows it, the landing place. All segments of such a group are
-/// held from its beginning; each is free again when the vehicle has left it.
+/// A climb is flown in one go, and so are a descent and what follows it, the landing place. All
+/// segments of such a group are held from its beginning; each is free again when the vehicle has
+/// left it.
 pub(super) fn straight_part<const W: usize>(
     vertical_mps: f32,
     flight: &Flight<W>,
@@ -128,7 +138,10 @@ pub(super) fn straight_part<const W: usize>(
 }
 
 /// The ends of a straight part's leg, as [`straight_part`] has them.
-pub(super) fn line_of_part<const W: usize>(flight: &Flight<W>, part: usize) -> Option<(Point, Point)> {
+pub(super) fn line_of_part<const W: usize>(
+    flight: &Flight<W>,
+    part: usize,
+) -> Option<(Point, Point)> {
     let waypoints = flight.path.waypoints();
     let below = |place: Point, m: f32| place - Point::new(0.0, 0.0, m);
     let leaves = flight.task.leaves_pad();
@@ -152,7 +165,13 @@ fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightP
     let (from_m, to_m) = (-flight.climb_m, 0.0);
     if !flight.task.leaves_pad() {
         let before = Some(stay(pad, from_m, f32::NEG_INFINITY, f32::INFINITY));
-        return StraightPart { before, leg: Leg::climb(pad, pad, 0.0), from_m, to_m: from_m, after: None };
+        return StraightPart {
+            before,
+            leg: Leg::climb(pad, pad, 0.0),
+            from_m,
+            to_m: from_m,
+            after: None,
+        };
     }
     let leg = Leg::climb(pad, first.position, first.arrive_s);
     let (left_m, left_s) = leg.first_segment(flight.segment_m);
@@ -173,11 +192,16 @@ fn leg_part(begin: &Waypoint, next: &Waypoint) -> StraightPart {
     StraightPart { before: None, leg, from_m: begin.along_m, to_m: next.along_m, after: None }
 }
 
-fn descent_part<const W: usize>(flight: &Flight<W>, last: &Waypoint, vertical_mps: f32) -> StraightPart {
+fn descent_part<const W: usize>(
+    flight: &Flight<W>,
+    last: &Waypoint,
+    vertical_mps: f32,
+) -> StraightPart {
     let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
     let end_m = last.along_m + flight.descent_m;
     let landed_s = last.leave_s + flight.descent_m / vertical_mps;
-    let leg = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
+    let leg =
+        Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
     let landed = stay(ground, end_m, last.leave_s, f32::INFINITY);
     let after = Some(TimedSegment { from_m: last.along_m, ..landed });
     StraightPart { before: None, leg, from_m: last.along_m, to_m: end_m, after }
@@ -238,7 +262,12 @@ impl Leg {
     }
 
     /// Timed segments of the leg; `from_m` and `to_m` are its ends along the path.
-    pub(super) fn segments(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = TimedSegment> {
+    pub(super) fn segments(
+        self,
+        from_m: f32,
+        to_m: f32,
+        piece_m: f32,
+    ) -> impl Iterator<Item = TimedSegment> {
         let parts = segment_count(self.length_m, piece_m);
         let at = move |part: u32| {
             if part == parts {
@@ -247,14 +276,21 @@ impl Leg {
             }
             let share = part as f32 / parts as f32;
             let mix = |a: f32, b: f32| a + (b - a) * share;
-            (self.from + (self.to - self.from) * share, mix(from_m, to_m), mix(self.from_s, self.to_s))
+            (
+                self.from + (self.to - self.from) * share,
+                mix(from_m, to_m),
+                mix(self.from_s, self.to_s),
+            )
         };
         let mut begin = at(0);
         (0..parts).map(move |part| {
             let (to, to_m, to_s) = at(part + 1);
             let (from, start_m, start_s) = core::mem::replace(&mut begin, (to, to_m, to_s));
-            let (from_m, from_s) =
-                if self.stops == WaitingPlaces::Before { (from_m, self.from_s) } else { (start_m, start_s) };
+            let (from_m, from_s) = if self.stops == WaitingPlaces::Before {
+                (from_m, self.from_s)
+            } else {
+                (start_m, start_s)
+            };
             TimedSegment { from, to, from_m, to_m, from_s, to_s, parked: false }
         })
     }

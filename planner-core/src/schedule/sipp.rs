@@ -1,12 +1,14 @@
-//! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the earliest way past flights that are
-//! already scheduled, with waiting and stepping aside at nodes. Of the ways that arrive then, the one found leaves as late as it can.
+//! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the earliest way past
+//! flights that are already scheduled, with waiting and stepping aside at nodes. Of the ways that
+//! arrive then, the one found leaves as late as it can.
 //!
-//! A node's time falls into *safe intervals*, in which hovering there is clear of every scheduled piece. One search state
-//! is a node with one of its intervals; reaching it earlier is always better, so A* over these states finds the earliest
-//! arrival. Flying an edge is clear from departures outside the intervals that the pieces near it forbid.
+//! A node's time falls into *safe intervals*, in which hovering there is clear of every scheduled
+//! piece. One search state is a node with one of its intervals; reaching it earlier is always
+//! better, so A* over these states finds the earliest arrival. Flying an edge is clear from
+//! departures outside the intervals that the pieces near it forbid.
 //!
-//! Cost: states reached × their edges × scheduled pieces, each a cheap bound. When the states are used up the search
-//! ends without a way, as if there were none.
+//! Cost: states reached × their edges × scheduled pieces, each a cheap bound. When the states are
+//! used up the search ends without a way, as if there were none.
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
@@ -14,8 +16,8 @@ use libm::{fmaxf, fminf};
 use super::config::{ScheduleConfig, ScheduleError};
 use super::near::SegmentGrid;
 use super::pieces::{
-    Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, OFF_PAD_S, TimedSegment, WaitingPlaces, cut_into_segments,
-    is_conflict, segment_count,
+    Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, OFF_PAD_S, TimedSegment, WaitingPlaces,
+    cut_into_segments, is_conflict, segment_count,
 };
 use super::{Forbidden, add_forbidden_interval, first_allowed, last_allowed};
 use crate::flight::{Flight, Path};
@@ -42,10 +44,18 @@ struct SippState {
     from_s: f32,
 }
 
-const NO_STATE: SippState =
-    SippState { node: 0, next: 0, parent: 0, left_parent_s: 0.0, arrive_s: 0.0, until_s: 0.0, from_s: 0.0 };
+const NO_STATE: SippState = SippState {
+    node: 0,
+    next: 0,
+    parent: 0,
+    left_parent_s: 0.0,
+    arrive_s: 0.0,
+    until_s: 0.0,
+    from_s: 0.0,
+};
 
-/// Scratch for roadmaps of up to `N` nodes, as many states, and `P` scheduled pieces. All zero when new.
+/// Scratch for roadmaps of up to `N` nodes, as many states, and `P` scheduled pieces. All zero when
+/// new.
 pub struct SippWorkspace<const N: usize, const P: usize> {
     /// Times are absolute here; sorted into `cells`.
     pieces: Vec<TimedSegment, P>,
@@ -131,8 +141,8 @@ fn leg_from_start(from: Point, to: Point, duration_s: f32) -> Leg {
     Leg { from, to, length_m, from_s: 0.0, to_s: duration_s, stops: WaitingPlaces::Anywhere }
 }
 
-/// Finds the earliest way for `flight` (its climb, descent and length of timed segments are taken, its path and departure are
-/// written) that keeps clear of `scheduled`.
+/// Finds the earliest way for `flight` (its climb, descent and length of timed segments are taken,
+/// its path and departure are written) that keeps clear of `scheduled`.
 pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     view: &RoadmapView<'_>,
     route: &RouteQuery<'_>,
@@ -182,9 +192,15 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
             let there = view.node(edge.target);
             let duration_s = (there - here).length() / cfg.cruise_mps;
             ws.add_states(cfg, view, edge.target);
-            let hop = StateTransition { node: edge.target, parent: Some(state), leave_s, duration_s };
+            let hop =
+                StateTransition { node: edge.target, parent: Some(state), leave_s, duration_s };
             if ws.may_improve(&hop) {
-                ws.forbid_departures(cfg, &leg_from_start(here, there, duration_s), piece_m, leave_s);
+                ws.forbid_departures(
+                    cfg,
+                    &leg_from_start(here, there, duration_s),
+                    piece_m,
+                    leave_s,
+                );
                 ws.relax_intervals(&hop, left_s(&there));
             }
         }
@@ -204,8 +220,8 @@ fn check_inputs<const N: usize, const W: usize>(
     if usize::from(route.from.max(route.to)) >= view.node_count() {
         return Err(ScheduleError::BadIndex);
     }
-    let vertical =
-        [flight.climb_m, flight.descent_m].map(|length_m| segment_count(length_m, flight.segment_m) as usize);
+    let vertical = [flight.climb_m, flight.descent_m]
+        .map(|length_m| segment_count(length_m, flight.segment_m) as usize);
     let whole = flight.segment_m >= MAX_TIMED_SEGMENT_M && flight.segment_m.is_finite();
     if !whole || vertical[0].max(vertical[1]) > MAX_TIMED_SEGMENTS {
         return Err(ScheduleError::PiecesFull);
@@ -284,7 +300,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         sort::sort_by(&mut self.forbidden, |a, b| a.0.total_cmp(&b.0));
         let mut from_s = f32::NEG_INFINITY;
         for i in 0..=self.forbidden.len() {
-            let (low, high) = self.forbidden.get(i).copied().unwrap_or((f32::INFINITY, f32::INFINITY));
+            let (low, high) =
+                self.forbidden.get(i).copied().unwrap_or((f32::INFINITY, f32::INFINITY));
             if low > from_s && self.len < N {
                 let first = &mut self.first[usize::from(node)];
                 let state = SippState {
@@ -309,7 +326,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..stationary_segment(pad, true) };
         // The pad is held until the first part of the climb is behind the vehicle.
         let off_pad_s = fmaxf(up.first_segment(piece_m).1, OFF_PAD_S) + self.handover_s;
-        let needed_s = self.conflicting_segments(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+        let needed_s =
+            self.conflicting_segments(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
         needed_s - off_pad_s
     }
 
@@ -323,8 +341,10 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let ground = goal - Point::new(0.0, 0.0, descent_m);
         // The landing place is held from the beginning of the descent.
         let standing = stationary_segment(ground, true);
-        let after_s =
-            self.conflicting_segments(cfg, &standing).map(|q| q.to_s).fold(f32::NEG_INFINITY, fmaxf);
+        let after_s = self
+            .conflicting_segments(cfg, &standing)
+            .map(|q| q.to_s)
+            .fold(f32::NEG_INFINITY, fmaxf);
         if after_s == f32::INFINITY {
             return Err(ScheduleError::Blocked);
         }
@@ -341,16 +361,25 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             at = state.next;
             let leave_s = fmaxf(from_s, state.from_s - duration_s);
             let fits = leave_s <= until_s && leave_s + duration_s <= state.until_s;
-            if fits && leave_s + duration_s < state.arrive_s && self.heap.entry_index(index) != SETTLED {
+            if fits
+                && leave_s + duration_s < state.arrive_s
+                && self.heap.entry_index(index) != SETTLED
+            {
                 return true;
             }
         }
         false
     }
 
-    /// Collects the departures on which a flight along `leg_from_start` would meet a scheduled one, as far as they matter for leaving
-    /// between the two times of `leave_s`.
-    fn forbid_departures(&mut self, cfg: &ScheduleConfig, leg: &Leg, piece_m: f32, leave_s: (f32, f32)) {
+    /// Collects the departures on which a flight along `leg_from_start` would meet a scheduled one,
+    /// as far as they matter for leaving between the two times of `leave_s`.
+    fn forbid_departures(
+        &mut self,
+        cfg: &ScheduleConfig,
+        leg: &Leg,
+        piece_m: f32,
+        leave_s: (f32, f32),
+    ) {
         self.forbidden.clear();
         let whole = TimedSegment {
             from: leg.from,
@@ -365,7 +394,9 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let held_s = self.handover_s;
         for q in self.cells.candidates_near(&self.pieces, &whole, apart_m) {
             // A segment that ends before or begins after cannot even touch the times in question.
-            if q.to_s < leave_s.0 || q.from_s - held_s - leg.to_s > leave_s.1 || !is_conflict(cfg, &whole, q)
+            if q.to_s < leave_s.0
+                || q.from_s - held_s - leg.to_s > leave_s.1
+                || !is_conflict(cfg, &whole, q)
             {
                 continue;
             }
@@ -381,7 +412,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// Reaches every interval of the hop's node as early as it can be; from there the goal is at least `left_s` away.
+    /// Reaches every interval of the hop's node as early as it can be; from there the goal is at
+    /// least `left_s` away.
     fn relax_intervals(&mut self, hop: &StateTransition, left_s: f32) {
         let &StateTransition { node, parent, leave_s: (from_s, until_s), duration_s } = hop;
         let mut at = self.first[usize::from(node)];
@@ -393,7 +425,9 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
                 continue;
             }
             let leave_s = first_allowed(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));
-            let Some(leave_s) = leave_s.filter(|&t| t <= until_s && t + duration_s <= state.until_s) else {
+            let Some(leave_s) =
+                leave_s.filter(|&t| t <= until_s && t + duration_s <= state.until_s)
+            else {
                 continue;
             };
             let arrive_s = leave_s + duration_s;
@@ -407,8 +441,9 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     }
 }
 
-/// Writes the way that ends in a state, left for the descent at a time (`end`), labelled with seconds after take-off. Every wait is moved as near to
-/// the pad as the safe intervals allow: a vehicle that waits in the air blocks others, and its battery drains.
+/// Writes the way that ends in a state, left for the descent at a time (`end`), labelled with
+/// seconds after take-off. Every wait is moved as near to the pad as the safe intervals allow: a
+/// vehicle that waits in the air blocks others, and its battery drains.
 fn write_flight<const N: usize, const P: usize, const W: usize>(
     route: &RouteQuery<'_>,
     view: &RoadmapView<'_>,
@@ -438,7 +473,8 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         // Not before the way was found to be free: intervals that are merged for want of room may
         // swallow that time.
         let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
-        way.push((reached.node, left_s + duration_s, leave_s)).map_err(|_| ScheduleError::PiecesFull)?;
+        way.push((reached.node, left_s + duration_s, leave_s))
+            .map_err(|_| ScheduleError::PiecesFull)?;
         leave_s = left_s;
         if first {
             break;

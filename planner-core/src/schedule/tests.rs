@@ -7,8 +7,12 @@ use crate::Point;
 use crate::flight::{Path, Task};
 use proptest::prelude::*;
 
-const CFG: ScheduleConfig =
-    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+const CFG: ScheduleConfig = ScheduleConfig {
+    separation_m: 2.0,
+    parked_separation_m: 1.7,
+    cruise_mps: 2.0,
+    vertical_mps: 1.0,
+};
 
 fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
     let mut path = Path::new();
@@ -85,8 +89,8 @@ fn field_corners() -> impl Strategy<Value = std::vec::Vec<(f32, f32, f32)>> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
-    /// A departure is that of a comparison of all segments with all, to the bit, and neither flight has more gates for the other than
-    /// segments in conflict.
+    /// A departure is that of a comparison of all segments with all, to the bit, and neither flight
+    /// has more gates for the other than segments in conflict.
     #[test]
     fn departures_are_those_of_all_segments(
         own in (field_corners(), any::<bool>(), 0.0f32..40.0),

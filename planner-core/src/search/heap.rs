@@ -1,4 +1,5 @@
-//! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries always suffice.
+//! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries
+//! always suffice.
 
 /// Mark of a node that the search has not reached yet.
 const UNSEEN: u16 = 0;
@@ -10,8 +11,8 @@ const HEAP_ARITY: usize = 4;
 
 pub(crate) struct Heap<const N: usize> {
     len: usize,
-    /// Cost in the upper bits (non-negative f32, ordered as its bits), node in the lower sixteen: one comparison orders
-    /// by cost, then by node.
+    /// Cost in the upper bits (non-negative f32, ordered as its bits), node in the lower sixteen:
+    /// one comparison orders by cost, then by node.
     entries: [u64; N],
     /// Index into `entries` plus one, [`UNSEEN`] or [`SETTLED`].
     places: [u16; N],
@@ -25,7 +26,8 @@ fn node_of(entry: u64) -> usize {
     (entry & 0xffff) as usize
 }
 
-/// Index of the least entry. A full set is compared pairwise: selects, where branches would be mispredicted.
+/// Index of the least entry. A full set is compared pairwise: selects, where branches would be
+/// mispredicted.
 #[inline(always)]
 fn least_of(entries: &[u64]) -> usize {
     if let Ok([a, b, c, d]) = <&[u64; HEAP_ARITY]>::try_from(entries) {

@@ -14,11 +14,14 @@ use crate::roadmap::{Edge, RoadmapView};
 const CAPACITY: usize = 32;
 const REQUIRED_M: f32 = 1.0;
 
-/// Sparse random graphs, often in several pieces; about half the edges are too narrow for [`REQUIRED_M`].
+/// Sparse random graphs, often in several pieces; about half the edges are too narrow for
+/// [`REQUIRED_M`].
 fn graphs() -> impl Strategy<Value = (StdVec<Point>, StdVec<Edge>)> {
     (2u16..CAPACITY as u16).prop_flat_map(|n| {
-        let points = proptest::collection::vec((-9.0f32..9.0, -9.0f32..9.0, 0.0f32..9.0), usize::from(n));
-        let edges = proptest::collection::btree_map((0..n, 0..n), 0.5f32..2.0, 0..3 * usize::from(n));
+        let points =
+            proptest::collection::vec((-9.0f32..9.0, -9.0f32..9.0, 0.0f32..9.0), usize::from(n));
+        let edges =
+            proptest::collection::btree_map((0..n, 0..n), 0.5f32..2.0, 0..3 * usize::from(n));
         (points, edges).prop_map(|(points, edges)| {
             let nodes: StdVec<_> = points.iter().map(|&(x, y, z)| Point::new(x, y, z)).collect();
             let edges = edges
@@ -31,7 +34,10 @@ fn graphs() -> impl Strategy<Value = (StdVec<Point>, StdVec<Edge>)> {
 }
 
 /// All pairs by Floyd and Warshall, f64.
-fn brute_force(view: &RoadmapView<'_>, passable: impl Fn(u16, &HalfEdge) -> bool) -> StdVec<StdVec<f64>> {
+fn brute_force(
+    view: &RoadmapView<'_>,
+    passable: impl Fn(u16, &HalfEdge) -> bool,
+) -> StdVec<StdVec<f64>> {
     let n = view.node_count();
     let mut d = vec![vec![f64::INFINITY; n]; n];
     for (a, row) in d.iter_mut().enumerate() {
@@ -59,7 +65,8 @@ fn encode_either(nodes: &[Point], edges: &[Edge], landmarks: bool) -> StdVec<u8>
     }
 }
 
-/// The checker of paths: joins its ends over passable edges, visits no node twice, is as long as it says.
+/// The checker of paths: joins its ends over passable edges, visits no node twice, is as long as it
+/// says.
 fn check_path(view: &RoadmapView<'_>, path: &[u16], ends: (u16, u16), length: f32) {
     assert_eq!((path[0], path[path.len() - 1]), ends);
     let mut sum = 0.0f64;
@@ -160,7 +167,8 @@ fn a_search_that_cannot_answer_says_why() {
     assert_eq!(find(5, 2), Err(SearchError::BadNode(5)));
     assert_eq!(find(0, 5), Err(SearchError::BadNode(5)));
     let mut row = [0.0; 2];
-    let mut fill = |targets: &[u16]| dijkstra_row(&view, 0, targets, |_, _| true, &mut ws, &mut row);
+    let mut fill =
+        |targets: &[u16]| dijkstra_row(&view, 0, targets, |_, _| true, &mut ws, &mut row);
     assert_eq!(fill(&[1, 5]), Err(SearchError::BadNode(5)));
     assert_eq!(fill(&[1]), Err(SearchError::OutputLength));
     assert_eq!(fill(&[4, 1]), Ok(()));
@@ -175,7 +183,10 @@ fn a_row_without_targets_searches_nothing_and_repeated_targets_are_all_filled() 
     let bytes = square();
     let view = RoadmapView::parse(&bytes).unwrap();
     let mut ws = SearchWorkspace::<8>::new();
-    assert_eq!(dijkstra_row(&view, 0, &[], |_, _| panic!("an edge was asked"), &mut ws, &mut []), Ok(()));
+    assert_eq!(
+        dijkstra_row(&view, 0, &[], |_, _| panic!("an edge was asked"), &mut ws, &mut []),
+        Ok(())
+    );
     let mut row = [0.0; 3];
     assert_eq!(dijkstra_row(&view, 0, &[1, 0, 1], |_, _| true, &mut ws, &mut row), Ok(()));
     assert_eq!(row, [4.0, 0.0, 4.0]);

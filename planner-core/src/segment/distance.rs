@@ -1,11 +1,13 @@
 //! Distances from a segment to the obstacles of a map, in f32.
 //!
-//! All here is in cells relative to the grid's corner. The distance from a segment to a cube is the least of a convex,
-//! piecewise quadratic function of the place along the segment; its derivative is piecewise linear with breaks
-//! where the segment crosses one of the six face planes, so its zero is found by bisection over at most six
-//! breaks and one division: no iteration to convergence.
+//! All here is in cells relative to the grid's corner. The distance from a segment to a cube is the
+//! least of a convex, piecewise quadratic function of the place along the segment; its derivative
+//! is piecewise linear with breaks where the segment crosses one of the six face planes, so its
+//! zero is found by bisection over at most six breaks and one division: no iteration to
+//! convergence.
 //!
-//! Rounding: coordinates of up to n cells carry n · 2⁻²³, the distance a few times that; at 256 cells and 0.25 m under 0.1 mm.
+//! Rounding: coordinates of up to n cells carry n · 2⁻²³, the distance a few times that; at 256
+//! cells and 0.25 m under 0.1 mm.
 
 use core::ops::ControlFlow;
 
@@ -86,13 +88,15 @@ impl Segment {
     fn distance_to_faces(&self, dims: [u32; 3]) -> f32 {
         let end = self.a + self.d;
         (0..3)
-            .map(|axis| self.a[axis].min(end[axis]).min(dims[axis] as f32 - self.a[axis].max(end[axis])))
+            .map(|axis| {
+                self.a[axis].min(end[axis]).min(dims[axis] as f32 - self.a[axis].max(end[axis]))
+            })
             .fold(f32::INFINITY, f32::min)
     }
 
-    /// Calls `visit` with each word that may hold an obstacle within `reach` cells, its other cells cleared as far as
-    /// bounding boxes of the swept volume tell, and the minimum corner of its brick. `visit` may lower the reach. Of the
-    /// share `known` of the segment nothing is in reach.
+    /// Calls `visit` with each word that may hold an obstacle within `reach` cells, its other cells
+    /// cleared as far as bounding boxes of the swept volume tell, and the minimum corner of its
+    /// brick. `visit` may lower the reach. Of the share `known` of the segment nothing is in reach.
     fn visit_near_words(
         &self,
         grid: &VoxelGrid<'_>,
@@ -107,9 +111,11 @@ impl Segment {
         let strides = [1, bx, bx * by];
         // Along the longest axis no other coordinate changes faster.
         let slope = if self.d[axis_u] == 0.0 { Point::zeros() } else { self.d / self.d[axis_u] };
-        let (begin, end) = (self.a[axis_u] + self.d[axis_u] * known, self.a[axis_u] + self.d[axis_u]);
+        let (begin, end) =
+            (self.a[axis_u] + self.d[axis_u] * known, self.a[axis_u] + self.d[axis_u]);
         let (least, most) = if begin < end { (begin, end) } else { (end, begin) };
-        // A thousandth of a cell and the rounding of large coordinates more than the reach, so that no cell is lost.
+        // A thousandth of a cell and the rounding of large coordinates more than the reach, so that
+        // no cell is lost.
         let largest = self.a.amax() + self.d.amax();
         let slack = 1e-3 + largest * (8.0 * f32::EPSILON);
         let Some((first, last)) = cell_range(least, most, reach + slack, shape.dims[axis_u]) else {
@@ -145,7 +151,9 @@ impl Segment {
                     corner[axis_v] = (brick_v * 4) as f32;
                     corner[axis_w] = (brick_w * 4) as f32;
                     let bound = reach + BRICK_RADIUS;
-                    if self.distance_sq_to_point(&corner.add_scalar(2.0)) > bound * bound * (1.0 + 1e-5) {
+                    if self.distance_sq_to_point(&corner.add_scalar(2.0))
+                        > bound * bound * (1.0 + 1e-5)
+                    {
                         continue;
                     }
                     reach = visit(word, &corner)?;
@@ -156,9 +164,11 @@ impl Segment {
     }
 }
 
-/// First and last cell of an axis within `reach` of the stretch between two coordinates, or `None` beyond the grid.
+/// First and last cell of an axis within `reach` of the stretch between two coordinates, or `None`
+/// beyond the grid.
 fn cell_range(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
-    let (low, high) = if from < to { (from - reach, to + reach) } else { (to - reach, from + reach) };
+    let (low, high) =
+        if from < to { (from - reach, to + reach) } else { (to - reach, from + reach) };
     // A cast rounds towards zero: down, but for negative numbers, which are not in the grid.
     let first = (low as i32).max(0);
     let last = (high as i32).min(dim as i32 - 1);
@@ -184,9 +194,10 @@ fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point>
     })
 }
 
-/// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive and finite. The
-/// caller has checked that the ends are finite and near the grid, and where the clearance is less than `MIN_MISSED_CELLS`
-/// that nothing is touched. Of the share `known` of the segment from `a` the answer is known already, by far more than rounding.
+/// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive
+/// and finite. The caller has checked that the ends are finite and near the grid, and where the
+/// clearance is less than `MIN_MISSED_CELLS` that nothing is touched. Of the share `known` of the
+/// segment from `a` the answer is known already, by far more than rounding.
 pub(crate) fn is_farther_than(
     grid: &VoxelGrid<'_>,
     a: &Point,
@@ -200,14 +211,17 @@ pub(crate) fn is_farther_than(
         return false;
     }
     let square = reach * reach;
-    // Beyond the sphere around a cell nothing of it is in reach; inside the sphere within it something is.
+    // Beyond the sphere around a cell nothing of it is in reach; inside the sphere within it
+    // something is.
     let (never, always) = (reach + CELL_RADIUS, reach + 0.5);
     let (never, always) = (never * never * (1.0 + 1e-5), always * always * (1.0 - 1e-5));
     segment
         .visit_near_words(grid, known, reach, |word, brick| {
             for low in occupied_corners(word, brick) {
                 let to_center = segment.distance_sq_to_point(&low.add_scalar(0.5));
-                if to_center <= always || to_center <= never && segment.distance_sq_to_cell(&low) <= square {
+                if to_center <= always
+                    || to_center <= never && segment.distance_sq_to_cell(&low) <= square
+                {
                     return ControlFlow::Break(());
                 }
             }
@@ -216,11 +230,12 @@ pub(crate) fn is_farther_than(
         .is_continue()
 }
 
-/// Euclidean distance from the segment to the nearest obstacle, metres, at most `max_m`; 0 where it touches one, where an
-/// end is not finite or more than [`crate::voxel::MAX_DIM`] cells beyond the grid, and where `max_m` is NaN or not positive.
+/// Euclidean distance from the segment to the nearest obstacle, metres, at most `max_m`; 0 where it
+/// touches one, where an end is not finite or more than [`crate::voxel::MAX_DIM`] cells beyond the
+/// grid, and where `max_m` is NaN or not positive.
 ///
-/// The reach is doubled from one cell up to `max_m`, so that a segment near a wall costs little: work grows with
-/// the cube of what is returned, not of `max_m`.
+/// The reach is doubled from one cell up to `max_m`, so that a segment near a wall costs little:
+/// work grows with the cube of what is returned, not of `max_m`.
 pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32) -> f32 {
     let shape = grid.shape();
     let (Some(from), Some(to)) = (snap(shape, a), snap(shape, b)) else {
@@ -265,7 +280,8 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     }
 }
 
-/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 as in [`segment_clearance`].
+/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 as in
+/// [`segment_clearance`].
 pub fn point_clearance(grid: &VoxelGrid<'_>, p: &Point, max_m: f32) -> f32 {
     segment_clearance(grid, p, p, max_m)
 }

@@ -14,7 +14,8 @@ pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
 /// A point in units of 2⁻¹⁴ cell from the grid's minimum corner.
 pub type Snapped = [i32; 3];
 
-/// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells beyond the grid.
+/// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells
+/// beyond the grid.
 #[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     /// Largest coordinate that is snapped, in cells.
@@ -31,8 +32,9 @@ pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     Some(out)
 }
 
-/// How far, in cells along each axis, [`snap`] may move a point that lies within `cells` cells of the grid's minimum
-/// corner: half a lattice step, and half an ulp for each of the subtraction and the division.
+/// How far, in cells along each axis, [`snap`] may move a point that lies within `cells` cells of
+/// the grid's minimum corner: half a lattice step, and half an ulp for each of the subtraction and
+/// the division.
 pub fn snap_error_cells(cells: f32) -> f32 {
     0.5 / ONE_CELL as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
 }

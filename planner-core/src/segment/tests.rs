@@ -1,4 +1,5 @@
-//! The segment queries against brute force: distances in f64 to every occupied cell, by another route.
+//! The segment queries against brute force: distances in f64 to every occupied cell, by another
+//! route.
 
 extern crate std;
 
@@ -40,8 +41,9 @@ fn random_words(rng: &mut Pcg32, shape: &GridShape, share: f32) -> Vec<u64> {
     words
 }
 
-/// Distance from a segment to a box in f64: the least over the places where, for each choice of "below, inside or
-/// above" on each axis, the sum of squares that choice stands for is least. One of the 27 is the true one.
+/// Distance from a segment to a box in f64: the least over the places where, for each choice of
+/// "below, inside or above" on each axis, the sum of squares that choice stands for is least. One
+/// of the 27 is the true one.
 fn brute_distance(a: [f64; 3], b: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {
     let at = |t: f64| {
         (0..3)
@@ -81,17 +83,21 @@ fn brute_distance(a: [f64; 3], b: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f6
     if enter <= leave { best.min(at(enter)).sqrt() } else { best.sqrt() }
 }
 
-/// Least distance in cells to any occupied cell, each grown by `grow` cells, and to the outside if that is blocked.
+/// Least distance in cells to any occupied cell, each grown by `grow` cells, and to the outside if
+/// that is blocked.
 fn brute_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, grow: f64) -> f64 {
     let shape = grid.shape();
     let cells = |p: &Point| {
-        [0, 1, 2].map(|i| (f64::from(p[i]) - f64::from(shape.min[i])) / f64::from(shape.resolution_m))
+        [0, 1, 2]
+            .map(|i| (f64::from(p[i]) - f64::from(shape.min[i])) / f64::from(shape.resolution_m))
     };
     let (a, b) = (cells(a), cells(b));
     let mut best = f64::INFINITY;
     if grid.outside() == Outside::Blocked {
         for i in 0..3 {
-            best = best.min(a[i].min(b[i]) - grow).min(f64::from(shape.dims[i]) - a[i].max(b[i]) - grow);
+            best = best
+                .min(a[i].min(b[i]) - grow)
+                .min(f64::from(shape.dims[i]) - a[i].max(b[i]) - grow);
         }
     }
     for i in 0..shape.dims[0] {
@@ -99,7 +105,12 @@ fn brute_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, grow: f64) -> f64
             for k in 0..shape.dims[2] {
                 if grid.is_occupied([i, j, k]) {
                     let low = [i, j, k].map(f64::from);
-                    best = best.min(brute_distance(a, b, low.map(|c| c - grow), low.map(|c| c + 1.0 + grow)));
+                    best = best.min(brute_distance(
+                        a,
+                        b,
+                        low.map(|c| c - grow),
+                        low.map(|c| c + 1.0 + grow),
+                    ));
                 }
             }
         }
@@ -121,8 +132,8 @@ fn lattice_step(rng: &mut Pcg32, shape: &GridShape) -> Point {
     Point::from_fn(|_, _| (below(rng, 49) as f32 - 24.0) / 8.0 * shape.resolution_m)
 }
 
-/// Ends on the lattice of 1/8 cell: anywhere, along an axis or in a plane, on faces and edges of cells, or through a corner
-/// or an edge of a cell with both ends off it.
+/// Ends on the lattice of 1/8 cell: anywhere, along an axis or in a plane, on faces and edges of
+/// cells, or through a corner or an edge of a cell with both ends off it.
 fn lattice_segment(rng: &mut Pcg32, shape: &GridShape) -> (Point, Point) {
     let mut a = lattice_point(rng, shape);
     let mut b = lattice_point(rng, shape);
@@ -167,9 +178,14 @@ fn lattice_segments_agree_with_brute_force_exactly() {
         let grid = VoxelGrid::new(shape, outside, &words).unwrap();
         for _ in 0..1000 {
             let (a, b) = lattice_segment(&mut rng, &shape);
-            // Corners on the lattice cannot be nearer than 1e-4 cells to a line through lattice points this near.
+            // Corners on the lattice cannot be nearer than 1e-4 cells to a line through lattice
+            // points this near.
             let touches = brute_clearance(&grid, &a, &b, 0.0) < 1e-7;
-            assert_eq!(segment_is_clear(&grid, &a, &b, 0.0), !touches, "seed {seed}: {a:?} to {b:?}");
+            assert_eq!(
+                segment_is_clear(&grid, &a, &b, 0.0),
+                !touches,
+                "seed {seed}: {a:?} to {b:?}"
+            );
             assert_eq!(
                 segment_is_clear(&grid, &b, &a, 0.0),
                 !touches,
@@ -178,11 +194,15 @@ fn lattice_segments_agree_with_brute_force_exactly() {
             blocked += i32::from(touches);
         }
     }
-    assert!((15_000..45_000).contains(&blocked), "{blocked} of 60000 blocked: the sample says little");
+    assert!(
+        (15_000..45_000).contains(&blocked),
+        "{blocked} of 60000 blocked: the sample says little"
+    );
 }
 
-/// 40 000 segments with any f32 ends: right wherever the true distance is not within 2e-5 cells of touching, which is
-/// [`snap_error_cells`] of a grid this small, along each of two or three axes, and the segment's shift at most.
+/// 40 000 segments with any f32 ends: right wherever the true distance is not within 2e-5 cells of
+/// touching, which is [`snap_error_cells`] of a grid this small, along each of two or three axes,
+/// and the segment's shift at most.
 #[test]
 fn any_segments_agree_with_brute_force() {
     let band = f64::from(snap_error_cells(16.0)) * 3.0_f64.sqrt();
@@ -211,11 +231,14 @@ fn any_segments_agree_with_brute_force() {
             }
         }
     }
-    assert!((8_000..32_000).contains(&blocked) && undecided < 40, "{blocked} blocked, {undecided} undecided");
+    assert!(
+        (8_000..32_000).contains(&blocked) && undecided < 40,
+        "{blocked} blocked, {undecided} undecided"
+    );
 }
 
-/// With a clearance: 20 000 segments, right unless the distance is within 1e-4 cells of the clearance; and the
-/// distance itself to 1e-4 cells.
+/// With a clearance: 20 000 segments, right unless the distance is within 1e-4 cells of the
+/// clearance; and the distance itself to 1e-4 cells.
 #[test]
 fn clearances_agree_with_brute_force() {
     let mut blocked = 0;
@@ -237,12 +260,17 @@ fn clearances_agree_with_brute_force() {
             let clearance = [0.125, 0.5, 1.0, 2.0][below(&mut rng, 4) as usize];
             let clear = segment_is_clear(&grid, &a, &b, clearance * shape.resolution_m);
             if (truth - f64::from(clearance)).abs() > 1e-4 {
-                assert_eq!(clear, truth > f64::from(clearance), "seed {seed}: {a:?} to {b:?} at {truth}");
+                assert_eq!(
+                    clear,
+                    truth > f64::from(clearance),
+                    "seed {seed}: {a:?} to {b:?} at {truth}"
+                );
             }
             blocked += i32::from(!clear);
             let max = [0.5, 3.0, 40.0][below(&mut rng, 3) as usize];
-            let found =
-                f64::from(segment_clearance(&grid, &a, &b, max * shape.resolution_m) / shape.resolution_m);
+            let found = f64::from(
+                segment_clearance(&grid, &a, &b, max * shape.resolution_m) / shape.resolution_m,
+            );
             let expected = truth.min(f64::from(max));
             assert!(
                 (found - expected).abs() < 1e-4,
@@ -266,7 +294,8 @@ fn touching_at_the_clearance_is_blocked() {
         let (a, b) = (Point::new(2.6, 1.0, z), Point::new(2.6, 4.0, z));
         assert_eq!(segment_is_clear(&grid, &a, &b, 0.5), clear, "z = {z}");
     }
-    // Beside an edge of it, diagonally: 0.3 and 0.4 m make 0.5 m, but for the rounding of the decimals.
+    // Beside an edge of it, diagonally: 0.3 and 0.4 m make 0.5 m, but for the rounding of the
+    // decimals.
     let beside = |dx: f32, dz: f32| {
         segment_clearance(
             &grid,

@@ -1,22 +1,30 @@
-//! The exact check: a walk along the longest axis over the bricks that a segment may touch, in integers.
+//! The exact check: a walk along the longest axis over the bricks that a segment may touch, in
+//! integers.
 
 use super::lanes::lane_mask;
 use super::lattice::{FRACTION_BITS, MAX_SNAPPED, ONE_CELL, Snapped};
 use crate::voxel::{Outside, VoxelGrid};
 
-/// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact; an end beyond
-/// [`MAX_SNAPPED`] counts as touching.
+/// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle.
+/// Exact; an end beyond [`MAX_SNAPPED`] counts as touching.
 pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -> bool {
     snapped_rest_touches(grid, a, b, 0.0)
 }
 
-/// As [`snapped_segment_touches`] for a segment whose first part, the share `known` of it from `a`, is known to touch nothing.
+/// As [`snapped_segment_touches`] for a segment whose first part, the share `known` of it from `a`,
+/// is known to touch nothing.
 #[inline]
-pub(crate) fn snapped_rest_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped, known: f32) -> bool {
+pub(crate) fn snapped_rest_touches(
+    grid: &VoxelGrid<'_>,
+    a: &Snapped,
+    b: &Snapped,
+    known: f32,
+) -> bool {
     let dims = grid.shape().dims;
     if grid.outside() == Outside::Blocked {
-        let inside =
-            |p: &Snapped| (0..3).all(|axis| p[axis] > 0 && p[axis] < (dims[axis] as i32) << FRACTION_BITS);
+        let inside = |p: &Snapped| {
+            (0..3).all(|axis| p[axis] > 0 && p[axis] < (dims[axis] as i32) << FRACTION_BITS)
+        };
         if !inside(a) || !inside(b) {
             return true;
         }
@@ -51,7 +59,8 @@ struct Walk<'g, const U: usize, const V: usize, const W: usize> {
     slack: i32,
 }
 
-/// The cells of one axis that a stretch of the segment may touch, clipped to the grid; empty if `first > last`.
+/// The cells of one axis that a stretch of the segment may touch, clipped to the grid; empty if
+/// `first > last`.
 #[derive(Clone, Copy)]
 struct Span {
     first: i32,
@@ -89,11 +98,15 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     #[inline(always)]
     fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
         let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        // A thousandth and a cell less than known, against the rounding of `known` and of this product.
+        // A thousandth and a cell less than known, against the rounding of `known` and of this
+        // product.
         let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE_CELL).max(0);
         // Along U upwards, so that the walk has one direction.
-        let ((a, b), (start, end)) =
-            if d[U] < 0 { ((*b, *a), (b[U], a[U] - skip)) } else { ((*a, *b), (a[U] + skip, b[U])) };
+        let ((a, b), (start, end)) = if d[U] < 0 {
+            ((*b, *a), (b[U], a[U] - skip))
+        } else {
+            ((*a, *b), (a[U] + skip, b[U]))
+        };
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
         // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate by 2⁻²² of the length, and two units.
         let per_u = if d[U] == 0 { 0.0 } else { (1 << 30) as f32 / d[U] as f32 };
@@ -135,13 +148,14 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
             let row = brick * self.strides[U];
             for brick_w in span_w.first >> 2..=span_w.last >> 2 {
                 for brick_v in span_v.first >> 2..=span_v.last >> 2 {
-                    let word =
-                        self.words[(row + brick_v * self.strides[V] + brick_w * self.strides[W]) as usize];
+                    let word = self.words
+                        [(row + brick_v * self.strides[V] + brick_w * self.strides[W]) as usize];
                     if word == 0 {
                         continue;
                     }
-                    let near =
-                        word & lane_mask(V, span_v.lanes(brick_v)) & lane_mask(W, span_w.lanes(brick_w));
+                    let near = word
+                        & lane_mask(V, span_v.lanes(brick_v))
+                        & lane_mask(W, span_w.lanes(brick_w));
                     if near != 0 && self.brick_touches(near, brick, brick_v, brick_w) {
                         return true;
                     }
@@ -166,8 +180,10 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
             if cells == 0 {
                 continue;
             }
-            cells &= lane_mask(V, Span::new(last_v, v, self.slack, self.dims[V]).lanes_if_met(brick_v));
-            cells &= lane_mask(W, Span::new(last_w, w, self.slack, self.dims[W]).lanes_if_met(brick_w));
+            cells &=
+                lane_mask(V, Span::new(last_v, v, self.slack, self.dims[V]).lanes_if_met(brick_v));
+            cells &=
+                lane_mask(W, Span::new(last_w, w, self.slack, self.dims[W]).lanes_if_met(brick_w));
             while cells != 0 {
                 let bit = cells.trailing_zeros() as i32;
                 cells &= cells - 1;
@@ -185,8 +201,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     }
 }
 
-/// Whether a segment meets a closed cell: the six separating axes, in integers. Coordinates stay below 1.5 · 2³⁰, so the
-/// two products and their difference below 2⁶³.
+/// Whether a segment meets a closed cell: the six separating axes, in integers. Coordinates stay
+/// below 1.5 · 2³⁰, so the two products and their difference below 2⁶³.
 #[inline(always)]
 fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
     /// Half a cell, in units of a snapped coordinate.

@@ -1,8 +1,9 @@
 //! ArduCopter's AUTO: an uploaded mission.
 //!
-//! It is entered only with a mission, on the ground armed only with one that begins with a take-off; it is not armed in.
-//! On the ground it waits for MISSION_START, as nobody raises a throttle; in the air it continues at once. It looks where it
-//! flies (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. A return and a landing are flown within AUTO.
+//! It is entered only with a mission, on the ground armed only with one that begins with a
+//! take-off; it is not armed in. On the ground it waits for MISSION_START, as nobody raises a
+//! throttle; in the air it continues at once. It looks where it flies (`WP_YAW_BEHAVIOR` 2),
+//! whatever heading an item has. A return and a landing are flown within AUTO.
 
 use planner_core::Point;
 
@@ -29,7 +30,8 @@ impl Copter {
 
     /// MISSION_START.
     pub(super) fn start_mission(&mut self, platform: &mut Platform) -> bool {
-        let starts = self.can_enter_auto(platform) && self.set_mode(Mode::Auto, &platform.sensors());
+        let starts =
+            self.can_enter_auto(platform) && self.set_mode(Mode::Auto, &platform.sensors());
         self.auto.may_lift |= starts && self.armed;
         starts
     }
@@ -100,8 +102,12 @@ impl Copter {
                 }
                 self.auto.stay = Some(at);
                 let reference = &self.reference;
-                let (up, rate) =
-                    interpolate_height(&self.auto.from, &at, &reference.position, &reference.velocity);
+                let (up, rate) = interpolate_height(
+                    &self.auto.from,
+                    &at,
+                    &reference.position,
+                    &reference.velocity,
+                );
                 let heading = self.auto.heading.unwrap_or(f32::NAN);
                 let velocity = Point::new(0.0, 0.0, rate);
                 Goal { heading, velocity, ..Goal::hold(Point::new(at.x, at.y, up)) }
@@ -111,7 +117,8 @@ impl Copter {
                 Goal::hold(Point::new(stay.x, stay.y, up))
             }
             Some(MissionLeg::Land { at: Some([east, north]) })
-                if libm::hypotf(east - sensors.position.x, north - sensors.position.y) > ARRIVED_M
+                if libm::hypotf(east - sensors.position.x, north - sensors.position.y)
+                    > ARRIVED_M
                     && !sensors.touching =>
             {
                 let up = self.auto.stay.map_or(at.z, |stay| stay.z);

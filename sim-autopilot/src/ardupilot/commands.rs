@@ -1,4 +1,5 @@
-//! ArduCopter's answers: commands and their acks, modes by SET_MODE, message intervals and stream requests.
+//! ArduCopter's answers: commands and their acks, modes by SET_MODE, message intervals and stream
+//! requests.
 
 use super::setpoint::Goal;
 use super::{Copter, Mode, STREAMS};
@@ -26,7 +27,12 @@ const DATA_STREAMS: [(u8, &[u32]); 8] = [
 
 impl Copter {
     /// Takes a command and acknowledges it.
-    pub(crate) fn handle_command(&mut self, platform: &mut Platform, from: Sender, command: &Command) {
+    pub(crate) fn handle_command(
+        &mut self,
+        platform: &mut Platform,
+        from: Sender,
+        command: &Command,
+    ) {
         let sensors = platform.sensors();
         let result = match command.id {
             176 => self.change_mode(platform, command.param[0] as u8, command.param[1] as u32),
@@ -104,7 +110,8 @@ impl Copter {
         let sensors = platform.sensors();
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let changes_mode = command.param[1] as u32 & 1 != 0;
-        let guided = self.mode == Mode::Guided || changes_mode && self.set_mode(Mode::Guided, &sensors);
+        let guided =
+            self.mode == Mode::Guided || changes_mode && self.set_mode(Mode::Guided, &sensors);
         if !guided || !to.iter().all(|x| x.is_finite()) {
             return if guided { DENIED } else { FAILED };
         }
@@ -113,8 +120,13 @@ impl Copter {
     }
 }
 
-/// Takes REQUEST_DATA_STREAM: the way ground stations asked before SET_MESSAGE_INTERVAL. It is not answered.
-pub(crate) fn handle_stream_request(platform: &mut Platform, from: Sender, fields: &PayloadReader<'_>) {
+/// Takes REQUEST_DATA_STREAM: the way ground stations asked before SET_MESSAGE_INTERVAL. It is not
+/// answered.
+pub(crate) fn handle_stream_request(
+    platform: &mut Platform,
+    from: Sender,
+    fields: &PayloadReader<'_>,
+) {
     let (rate_hz, stream, start) = (fields.u16(0), fields.u8(4), fields.u8(5) != 0);
     let interval_us = if start && rate_hz > 0 { 1_000_000 / u32::from(rate_hz.min(50)) } else { 0 };
     let now_us = platform.time_us;

@@ -16,8 +16,8 @@ const TAKEN_OFF_M: f32 = 0.12;
 /// until then, m/s². First the throttle creeps past hover; the controllers wind up meanwhile and
 /// then kick.
 const LIFT_OFF_PROFILE: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
-/// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts: the speed decays with
-/// 7.5 / 5 s.
+/// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts:
+/// the speed decays with 7.5 / 5 s.
 const BRAKE_MPS2: f32 = 7.5;
 /// A leg of the return ends within this distance of its target, metres.
 const ARRIVED_M: f32 = 0.5;
@@ -45,10 +45,15 @@ impl Copter {
         self.reference.advance(&goal, &tuning, dt);
         // Without a position there is nothing to hold across.
         let across = self.position_known(sensors.now_us);
-        let (p, v, a) = (self.reference.position, self.reference.velocity, self.reference.acceleration);
-        let position =
-            Point::new(if across { p.x } else { f32::NAN }, if across { p.y } else { f32::NAN }, p.z);
-        // ArduPilot's derivative acts on the error, not on what is measured: what the reference shall do is added back.
+        let (p, v, a) =
+            (self.reference.position, self.reference.velocity, self.reference.acceleration);
+        let position = Point::new(
+            if across { p.x } else { f32::NAN },
+            if across { p.y } else { f32::NAN },
+            p.z,
+        );
+        // ArduPilot's derivative acts on the error, not on what is measured: what the reference
+        // shall do is added back.
         let d = 1.0 + tuning.gains.velocity_d[0];
         if sensors.touching && v.z < 0.0 {
             // The reference does not run on below the ground.
@@ -68,7 +73,10 @@ impl Copter {
     /// Acceleration up while it leaves the ground; NaN once it has.
     fn lift_off_acceleration(&self, now_us: u64) -> f32 {
         let since_s = now_us.saturating_sub(self.since.lifted_us) as f32 * 1e-6;
-        LIFT_OFF_PROFILE.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
+        LIFT_OFF_PROFILE
+            .iter()
+            .find(|(until_s, _)| since_s < *until_s)
+            .map_or(f32::NAN, |&(_, up)| up)
     }
 
     pub(super) fn take_off_goal(&mut self) -> Goal {
@@ -86,7 +94,8 @@ impl Copter {
     fn guided_goal(&mut self, now_us: u64, dt: f32) -> Goal {
         let age_us = now_us.saturating_sub(self.goal_us);
         if self.goal.expires && age_us > micros_from_s(self.tuning.guided_timeout_s) {
-            self.goal = Goal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
+            self.goal =
+                Goal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
             self.goal.heading_rate = f32::NAN;
         }
         if let Some(position) = &mut self.goal.position {
@@ -95,12 +104,14 @@ impl Copter {
         self.goal
     }
 
-    /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and `WPNAV_SPEED_DN` at most
-    /// (`Mode::land_run_vertical_control`): without a rangefinder it knows no other ground.
+    /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and
+    /// `WPNAV_SPEED_DN` at most (`Mode::land_run_vertical_control`): without a rangefinder it knows
+    /// no other ground.
     pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> Goal {
         let tuning = &self.tuning;
         let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);
-        let rate = approach_rate(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
+        let rate =
+            approach_rate(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
         let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
         Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
     }

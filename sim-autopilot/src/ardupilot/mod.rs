@@ -1,4 +1,5 @@
-//! ArduCopter 4.6's state machine: arming, modes, take-off, Guided, failsafes and landing, as it was seen to behave.
+//! ArduCopter 4.6's state machine: arming, modes, take-off, Guided, failsafes and landing, as it
+//! was seen to behave.
 //!
 //! | state | leaves it |
 //! |---|---|
@@ -8,8 +9,8 @@
 //! | flying | the ground, touched for 1.6 s without a demand to climb |
 //! | landed | in LAND and RTL disarms 0.4 s later, else after `DISARM_DELAY` |
 //!
-//! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever. Times are microseconds since
-//! boot and arguments; nothing here reads a clock.
+//! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever.
+//! Times are microseconds since boot and arguments; nothing here reads a clock.
 
 mod auto;
 mod auto_state;
@@ -215,7 +216,8 @@ impl Copter {
             autopilot: AutopilotKind::Ardupilot,
             custom_mode: self.mode.number(),
             intended_mode: self.mode.number(),
-            // Custom, stabilised, manual input; with the guided flag in every mode that has a position.
+            // Custom, stabilised, manual input; with the guided flag in every mode that has a
+            // position.
             flags: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
             system_status: match self.failsafe {
                 Some(_) => 5,
@@ -264,7 +266,8 @@ impl Copter {
 
     /// A new goal in Guided: it ends a take-off.
     fn fly_to(&mut self, goal: Goal, sensors: &SensorReadings) {
-        if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some() {
+        if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some()
+        {
             self.reference = Reference::new(sensors.position, sensors.velocity);
         }
         (self.goal, self.goal_us) = (goal, sensors.now_us);
@@ -344,11 +347,13 @@ impl Copter {
         if mode == self.mode {
             return;
         }
-        // Land continues with the reference of a controller that was running, the others start theirs.
+        // Land continues with the reference of a controller that was running, the others start
+        // theirs.
         let runs = self.mode.needs_position() && !self.landed;
         if mode != Mode::Land || !runs {
             self.reference = Reference::new(sensors.position, sensors.velocity);
-            self.reference.acceleration = if self.landed { Point::zeros() } else { sensors.acceleration };
+            self.reference.acceleration =
+                if self.landed { Point::zeros() } else { sensors.acceleration };
             self.starts = !self.landed;
         }
         self.mode = mode;
@@ -359,7 +364,8 @@ impl Copter {
 
     /// NAV_TAKEOFF to a height in the mission frame.
     fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> bool {
-        let possible = self.armed && self.landed && self.mode == Mode::Guided && up > sensors.position.z;
+        let possible =
+            self.armed && self.landed && self.mode == Mode::Guided && up > sensors.position.z;
         if possible {
             let since_us = self.takeoff.map_or(sensors.now_us, |takeoff| takeoff.since_us);
             self.takeoff = Some(TakeOff { since_us, up });
@@ -369,7 +375,12 @@ impl Copter {
     }
 
     /// One step: timers, failsafes, phases, and the demand of the mode.
-    pub fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> ControlDemand {
+    pub fn update(
+        &mut self,
+        platform: &mut Platform,
+        sensors: &SensorReadings,
+        dt_s: f32,
+    ) -> ControlDemand {
         let now_us = sensors.now_us;
         self.send_progress_messages(platform, now_us);
         if self.armed {
@@ -399,14 +410,21 @@ impl Copter {
         let demand = self.demand(sensors, dt_s);
         let climbing = demand.velocity.z > 0.05;
         self.detect_landing(sensors, climbing);
-        let integral =
-            if core::mem::take(&mut self.starts) { IntegralAction::Match } else { IntegralAction::Keep };
+        let integral = if core::mem::take(&mut self.starts) {
+            IntegralAction::Match
+        } else {
+            IntegralAction::Keep
+        };
         ControlDemand { lift: true, integral, demand }
     }
 
     /// Motors off or idle.
     fn idle_command(&self) -> ControlDemand {
-        ControlDemand { lift: false, integral: IntegralAction::Clear, demand: self.tuning.empty_demand() }
+        ControlDemand {
+            lift: false,
+            integral: IntegralAction::Clear,
+            demand: self.tuning.empty_demand(),
+        }
     }
 
     /// Origin and position, each once.
@@ -429,7 +447,8 @@ impl Copter {
         if self.failsafe.is_some() || self.landed {
             return;
         }
-        let silent = |at: u64| since(at) >= micros_from_s(self.tuning.gcs_timeout_s + GCS_REACTION_S);
+        let silent =
+            |at: u64| since(at) >= micros_from_s(self.tuning.gcs_timeout_s + GCS_REACTION_S);
         if self.tuning.gcs_failsafe && self.gcs_us.is_some_and(silent) {
             self.failsafe = Some(Failsafe::GroundStation);
             platform.send_text(4, "GCS Failsafe");
@@ -437,7 +456,10 @@ impl Copter {
         } else if sensors.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
             self.failsafe = Some(Failsafe::Battery);
             platform.send_text(4, "Battery 1 is low");
-            self.force_mode(if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl }, sensors);
+            self.force_mode(
+                if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl },
+                sensors,
+            );
         }
     }
 

@@ -1,6 +1,7 @@
 //! ArduCopter's flight modes, and what each needs.
 
-/// ArduCopter's flight modes, as far as the simulation flies them. The number is HEARTBEAT's `custom_mode`.
+/// ArduCopter's flight modes, as far as the simulation flies them. The number is HEARTBEAT's
+/// `custom_mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Sticks, which nobody holds: throttle low, it sinks.

@@ -1,8 +1,9 @@
-//! The reference the position controller follows: a point that moves to where the mode wants it within the limits on
-//! speed, acceleration and jerk, as ArduPilot's `shape_pos_vel_accel` moves it (`AP_Math/control.cpp`).
+//! The reference the position controller follows: a point that moves to where the mode wants it
+//! within the limits on speed, acceleration and jerk, as ArduPilot's `shape_pos_vel_accel` moves it
+//! (`AP_Math/control.cpp`).
 //!
-//! The reference knows nothing of the vehicle: what is asked for is reached smoothly, and a velocity that is no longer asked
-//! for is braked as smoothly.
+//! The reference knows nothing of the vehicle: what is asked for is reached smoothly, and a
+//! velocity that is no longer asked for is braked as smoothly.
 
 use planner_core::Point;
 
@@ -88,12 +89,19 @@ mod tests {
             let before = reference;
             reference.advance(&goal, &tuning, dt);
             fastest = fastest.max(reference.velocity.xy().norm());
-            assert!(reference.acceleration.xy().norm() < 2.5 * 1.01 && reference.acceleration.z.abs() < 1.01);
+            assert!(
+                reference.acceleration.xy().norm() < 2.5 * 1.01
+                    && reference.acceleration.z.abs() < 1.01
+            );
             assert!((reference.acceleration - before.acceleration).xy().norm() < 5.01 * dt);
             assert!(reference.velocity.z < 2.51);
         }
         // The recording: 20 m flown at 5.4 m/s at most.
         assert!((4.8..6.2).contains(&fastest), "fastest {fastest}");
-        assert!((reference.position - Point::new(12.0, 16.0, 10.0)).norm() < 0.02, "{}", reference.position);
+        assert!(
+            (reference.position - Point::new(12.0, 16.0, 10.0)).norm() < 0.02,
+            "{}",
+            reference.position
+        );
     }
 }

@@ -1,8 +1,9 @@
-//! What Guided flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as ArduCopter reads them
-//! (`GCS_MAVLINK_Copter::handle_message_set_position_target_*`).
+//! What Guided flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as ArduCopter reads
+//! them (`GCS_MAVLINK_Copter::handle_message_set_position_target_*`).
 //!
-//! An axis left out leaves out its whole vector. What asks for nothing, for a frame it does not know, for force, or for
-//! acceleration alone (which ArduCopter would fly and this does not) is not refused: it stops.
+//! An axis left out leaves out its whole vector. What asks for nothing, for a frame it does not
+//! know, for force, or for acceleration alone (which ArduCopter would fly and this does not) is not
+//! refused: it stops.
 
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -73,7 +74,8 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
         ned += platform.frame.ned_from_enu(&platform.sensors().position.cast::<f64>());
     }
     let position = platform.frame.enu_from_ned(&ned).cast::<f32>();
-    let rate = |at| platform.frame.enu_velocity_from_ned(&turned(read_vector(fields, at))).cast::<f32>();
+    let rate =
+        |at| platform.frame.enu_velocity_from_ned(&turned(read_vector(fields, at))).cast::<f32>();
     goal_from_fields(fields, position, rate(16), rate(28))
 }
 
@@ -93,7 +95,12 @@ pub fn read_global_int(fields: &PayloadReader<'_>, platform: &Platform) -> Goal 
         return Goal::STOP;
     }
     let rate = |at| platform.frame.enu_velocity_from_ned(&read_vector(fields, at)).cast::<f32>();
-    goal_from_fields(fields, platform.frame.enu_from_geodetic(&asked).cast::<f32>(), rate(16), rate(28))
+    goal_from_fields(
+        fields,
+        platform.frame.enu_from_geodetic(&asked).cast::<f32>(),
+        rate(16),
+        rate(28),
+    )
 }
 
 fn read_vector(fields: &PayloadReader<'_>, at: usize) -> Vector3<f64> {
@@ -110,8 +117,9 @@ fn goal_from_fields(
     let given = |bits: u16| mask & bits == 0;
     let has = (given(MASK_POSITION), given(MASK_VELOCITY), given(MASK_ACCELERATION));
     let sound = |v: &Point| v.iter().all(|x| x.is_finite());
-    let usable =
-        (!has.0 || sound(&position)) && (!has.1 || sound(&velocity)) && (!has.2 || sound(&acceleration));
+    let usable = (!has.0 || sound(&position))
+        && (!has.1 || sound(&velocity))
+        && (!has.2 || sound(&acceleration));
     if !usable || (mask & MASK_FORCE != 0 && has.2) {
         return Goal::STOP;
     }
@@ -128,7 +136,9 @@ fn goal_from_fields(
     };
     let acceleration = if has.2 { acceleration } else { Point::zeros() };
     match has {
-        (true, true, _) => Goal { position: Some(position), velocity, acceleration, expires: true, ..goal },
+        (true, true, _) => {
+            Goal { position: Some(position), velocity, acceleration, expires: true, ..goal }
+        }
         (false, true, _) => Goal { velocity, acceleration, expires: true, ..goal },
         (true, false, false) => Goal { position: Some(position), ..goal },
         _ => Goal::STOP,

@@ -1,4 +1,5 @@
-//! What ArduCopter says unasked beside its streams: texts, the origin when it is set, and stray parameters.
+//! What ArduCopter says unasked beside its streams: texts, the origin when it is set, and stray
+//! parameters.
 
 use super::Copter;
 use crate::platform::Platform;

@@ -54,7 +54,8 @@ proptest! {
         }
     }
 
-    /// Frames between noise, cut anywhere, are all found, once what looked like a start has been given up.
+    /// Frames between noise, cut anywhere, are all found, once what looked like a start has been
+    /// given up.
     #[test]
     fn no_noise_hides_a_frame(
         frames in vec((vec(prop_oneof![Just(V1_START), Just(V2_START), any::<u8>()], 0..20), any_frame()), 1..8),

@@ -5,8 +5,8 @@ use planner_core::frames::Geodetic;
 use super::{Mode, Px4};
 use crate::command::{
     ACCEPTED, ARM_FORCE, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, TEMPORARILY_REJECTED, UNSUPPORTED,
-    accepted_or_rejected, message_id,
+    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, TEMPORARILY_REJECTED,
+    UNSUPPORTED, accepted_or_rejected, message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
@@ -15,11 +15,18 @@ use crate::wire::PayloadReader;
 
 impl Px4 {
     /// Takes a command and acknowledges it.
-    pub(crate) fn handle_command(&mut self, platform: &mut Platform, from: Sender, command: &Command) {
+    pub(crate) fn handle_command(
+        &mut self,
+        platform: &mut Platform,
+        from: Sender,
+        command: &Command,
+    ) {
         let result = match command.id {
-            // DO_SET_MODE is acknowledged twice: that it was understood, then whether the mode changed.
+            // DO_SET_MODE is acknowledged twice: that it was understood, then whether the mode
+            // changed.
             DO_SET_MODE => {
-                let mode = mode_of(command.param[0] as u8, command.param[1] as u8, command.param[2] as u8);
+                let mode =
+                    mode_of(command.param[0] as u8, command.param[1] as u8, command.param[2] as u8);
                 platform.acknowledge(from, DO_SET_MODE, ACCEPTED);
                 self.pending_mode = Some((from, mode));
                 return;
@@ -39,7 +46,9 @@ impl Px4 {
             }
             179 if platform.handle_set_home(command) => ACCEPTED,
             179 => DENIED,
-            193 if command.param[0] == 0.0 => accepted_or_rejected(self.change_mode(platform, Mode::Hold)),
+            193 if command.param[0] == 0.0 => {
+                accepted_or_rejected(self.change_mode(platform, Mode::Hold))
+            }
             193 => TEMPORARILY_REJECTED,
             300 => self.start_mission(platform),
             245 => ACCEPTED,
@@ -119,7 +128,8 @@ impl Px4 {
     }
 
     fn take_off(&mut self, platform: &Platform, command: &Command) -> u8 {
-        // The altitude is above the sea; how high that is in the mission frame depends on where it is asked for.
+        // The altitude is above the sea; how high that is in the mission frame depends on where it
+        // is asked for.
         let up = if command.z.is_finite() && command.z != 0.0 {
             let base = if command.relative { platform.home.alt_m } else { 0.0 };
             let here = platform.frame.geodetic_from_enu(platform.vehicle.position());
@@ -136,7 +146,12 @@ impl Px4 {
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let sensors = platform.sensors();
         self.commander.set_cruise(command.param[0]);
-        accepted_or_rejected(self.commander.reposition(&to, command.param[3], &sensors, &self.tuning))
+        accepted_or_rejected(self.commander.reposition(
+            &to,
+            command.param[3],
+            &sensors,
+            &self.tuning,
+        ))
     }
 }
 

@@ -1,4 +1,5 @@
-//! PX4 as a whole: the commander, the parameters, a mode change that is under way, and what it says when a failsafe begins.
+//! PX4 as a whole: the commander, the parameters, a mode change that is under way, and what it says
+//! when a failsafe begins.
 
 use super::params::{self, Tuning};
 use super::setpoint;
@@ -14,8 +15,9 @@ use crate::vehicle::VehicleLimits;
 use crate::wire::PayloadReader;
 
 const COMMAND_LONG: u32 = 76;
-/// DO_GIMBAL_MANAGER_CONFIGURE and DO_GIMBAL_MANAGER_PITCHYAW as they were recorded when a failsafe began: takes control of the
-/// gimbal, points it ahead, gives it up. To component 0, so to everybody; nobody answers.
+/// DO_GIMBAL_MANAGER_CONFIGURE and DO_GIMBAL_MANAGER_PITCHYAW as they were recorded when a failsafe
+/// began: takes control of the gimbal, points it ahead, gives it up. To component 0, so to
+/// everybody; nobody answers.
 const GIMBAL: [(u16, [f32; 5]); 3] = [
     (1001, [1.0, 1.0, -1.0, -1.0, 0.0]),
     (1000, [f32::NAN, f32::NAN, f32::NAN, f32::NAN, 2.0]),
@@ -39,15 +41,25 @@ impl Px4 {
     /// PX4 as it boots, with the airframe's limits in its parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
         let params = params::default_params(system_id, limits);
-        Self { commander: Commander::new(), tuning: Tuning::new(&params), params, pending_mode: None }
+        Self {
+            commander: Commander::new(),
+            tuning: Tuning::new(&params),
+            params,
+            pending_mode: None,
+        }
     }
 
     /// One step. A requested mode is decided now: a setpoint that came just behind the command
     /// counts.
-    pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> ControlDemand {
+    pub(crate) fn update(
+        &mut self,
+        platform: &mut Platform,
+        sensors: &SensorReadings,
+    ) -> ControlDemand {
         self.commander.set_mission_ready(platform.has_mission());
         if let Some((from, mode)) = self.pending_mode.take() {
-            let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sensors, &self.tuning));
+            let changed =
+                mode.is_some_and(|mode| self.commander.set_mode(mode, sensors, &self.tuning));
             platform.acknowledge(from, DO_SET_MODE, accepted_or_rejected(changed));
         }
         self.fly_mission(platform, sensors);

@@ -102,7 +102,12 @@ impl Commander {
     }
 
     /// Demand to hold a place, which is approached as the automatic modes approach it across.
-    fn approach_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: &Demand) -> Demand {
+    fn approach_demand(
+        &mut self,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+        held: &Demand,
+    ) -> Demand {
         self.glide.advance(sensors.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
         let SmoothedApproach { position, ramps: [east, north], .. } = self.glide;
         let up = f32::NAN;
@@ -116,7 +121,12 @@ impl Commander {
 
     /// Demand of an item of the mission. Without a heading the vehicle looks where it flies
     /// (`MPC_YAW_MODE` 0).
-    fn mission_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
+    fn mission_demand(
+        &mut self,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+        held: Demand,
+    ) -> Demand {
         match self.mission.leg {
             Some(MissionLeg::TakeOff { up }) => {
                 self.hold.z = up;
@@ -131,15 +141,21 @@ impl Commander {
                     self.hold_heading = libm::atan2f(off.x, off.y);
                 }
                 self.hold = at;
-                let (up, rate) =
-                    interpolate_height(&self.mission.from, &at, &sensors.position, &sensors.velocity);
+                let (up, rate) = interpolate_height(
+                    &self.mission.from,
+                    &at,
+                    &sensors.position,
+                    &sensors.velocity,
+                );
                 let (position, velocity) = (Point::new(at.x, at.y, up), Point::new(0.0, 0.0, rate));
                 Demand { position, velocity, heading: self.hold_heading, ..held }
             }
             Some(MissionLeg::Land { at }) => {
                 if let Some([east, north]) = at {
                     (self.hold.x, self.hold.y) = (east, north);
-                    if libm::hypotf(east - sensors.position.x, north - sensors.position.y) > ARRIVED_M {
+                    if libm::hypotf(east - sensors.position.x, north - sensors.position.y)
+                        > ARRIVED_M
+                    {
                         return Demand { position: self.hold, ..held };
                     }
                 }
@@ -149,21 +165,29 @@ impl Commander {
         }
     }
 
-    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`, these heights
-    /// above home; and crawls (`MPC_LAND_CRWL`) once a distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the
-    /// rate is smooth (`MPC_JERK_AUTO`).
-    fn landing_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
+    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`,
+    /// then `MPC_LAND_SPEED`, these heights above home; and crawls (`MPC_LAND_CRWL`) once a
+    /// distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the rate is
+    /// smooth (`MPC_JERK_AUTO`).
+    fn landing_demand(
+        &mut self,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+        held: Demand,
+    ) -> Demand {
         let [high, low] = tuning.land_slow_below;
         let height = sensors.position.z - sensors.home.z;
         let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
-        let mut sink = MAX_LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
+        let mut sink =
+            MAX_LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
         if sensors.distance - sensors.velocity.z * GROUND_DISTANCE_LAG_S < tuning.land_crawl_below {
             sink = CRAWL_SHARE * tuning.land_crawl_speed;
         }
         let descent = match &mut self.descent {
             Some((at_us, ramp)) => {
-                let dt =
-                    sensors.now_us.saturating_sub(core::mem::replace(at_us, sensors.now_us)) as f32 * 1e-6;
+                let dt = sensors.now_us.saturating_sub(core::mem::replace(at_us, sensors.now_us))
+                    as f32
+                    * 1e-6;
                 ramp.advance(sink, tuning.auto_acceleration_down, tuning.auto_jerk, dt);
                 *ramp
             }
@@ -184,7 +208,8 @@ impl Commander {
     }
 
     fn return_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
-        let away = libm::hypotf(sensors.home.x - sensors.position.x, sensors.home.y - sensors.position.y);
+        let away =
+            libm::hypotf(sensors.home.x - sensors.position.x, sensors.home.y - sensors.position.y);
         if let ReturnLeg::Climb { up } = &mut self.leg
             && up.is_nan()
         {

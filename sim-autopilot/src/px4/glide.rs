@@ -1,4 +1,5 @@
-//! How PX4's automatic modes stop and go to a point across (`PositionSmoothing`, `Navigator::preproject_stop_point`).
+//! How PX4's automatic modes stop and go to a point across (`PositionSmoothing`,
+//! `Navigator::preproject_stop_point`).
 
 use planner_core::Point;
 
@@ -12,14 +13,15 @@ const BRAKING_DELAY_S: f32 = 0.6;
 /// Longest time since the last step of the mode that counts, seconds.
 const MAX_STEP_S: f32 = 0.1;
 
-/// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is. With 1.85 m/s recorded vehicles went 0.9 m in the first
-/// second and 1.1 to 1.7 m in all.
+/// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is.
+/// With 1.85 m/s recorded vehicles went 0.9 m in the first second and 1.1 to 1.7 m in all.
 pub fn stopping_point(velocity: &Point) -> Point {
     let speed = libm::hypotf(velocity.x, velocity.y);
     Point::new(velocity.x, velocity.y, 0.0) * (speed / (2.0 * AUTO_ACCEL_MPS2) + BRAKING_DELAY_S)
 }
 
-/// A point that is flown to a target across: it starts as the vehicle is and obeys the limits of the automatic modes.
+/// A point that is flown to a target across: it starts as the vehicle is and obeys the limits of
+/// the automatic modes.
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothedApproach {
     at_us: u64,
@@ -59,7 +61,9 @@ mod tests {
 
     #[test]
     fn it_arrives_where_it_shall_from_any_speed_and_stays() {
-        for (speed, cruise) in [(0.0, 5.0), (0.3, 5.0), (1.85, 5.0), (4.0, 5.0), (8.0, 5.0), (0.5, 0.3)] {
+        for (speed, cruise) in
+            [(0.0, 5.0), (0.3, 5.0), (1.85, 5.0), (4.0, 5.0), (8.0, 5.0), (0.5, 0.3)]
+        {
             let velocity = Point::new(0.6 * speed, -0.8 * speed, 0.0);
             let target = stopping_point(&velocity) + Point::new(1.0, 2.0, 0.0);
             let mut glide = SmoothedApproach::new(0, &Point::zeros(), &velocity);
@@ -67,11 +71,17 @@ mod tests {
                 let before = glide.ramps.map(|ramp| ramp.change);
                 glide.advance(step * 4000, &target, cruise, 4.0);
                 for (ramp, before) in glide.ramps.iter().zip(before) {
-                    assert!((ramp.change - before).abs() <= 4.0 * 0.004 + 1e-5, "{speed}: {glide:?}");
+                    assert!(
+                        (ramp.change - before).abs() <= 4.0 * 0.004 + 1e-5,
+                        "{speed}: {glide:?}"
+                    );
                     assert!(ramp.change.abs() <= 3.0 + 1e-5, "{speed}: {glide:?}");
                 }
             }
-            assert!((glide.position - target).xy().norm() < 0.02, "{speed}: {glide:?}, to {target}");
+            assert!(
+                (glide.position - target).xy().norm() < 0.02,
+                "{speed}: {glide:?}, to {target}"
+            );
         }
     }
 }

@@ -8,8 +8,9 @@
 //! | flying | `LNDMC_TRIG_TIME` on the ground with a demand to sink lands it |
 //! | landed | a demand to climb; `COM_DISARM_LAND` disarms |
 //!
-//! In Offboard, setpoints missing for `COM_OF_LOSS_T` start the failsafe `COM_OBL_RC_ACT`; the first setpoint after that
-//! ends it. Times are microseconds since boot and arguments; nothing here reads a clock.
+//! In Offboard, setpoints missing for `COM_OF_LOSS_T` start the failsafe `COM_OBL_RC_ACT`; the
+//! first setpoint after that ends it. Times are microseconds since boot and arguments; nothing here
+//! reads a clock.
 
 mod flight;
 mod glide;
@@ -34,11 +35,13 @@ use super::shaping::JerkLimitedRate;
 /// Delay of the failsafe after `COM_OF_LOSS_T`, seconds: 1.23 s seen at most, and gaps of 1.25 s
 /// trip it.
 const LOSS_REACTION_S: f32 = 0.15;
-/// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3 s seen, before it lifts.
+/// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3
+/// s seen, before it lifts.
 const IN_AIR_SHARE: f32 = 0.31;
-/// Least commanded sink with which the land detector reports a landing, m/s: 1.1 times the default of
-/// `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). It reads the velocity of the setpoint only, so at a
-/// demand to stay PX4 reports itself in the air, on the ground too, however far below the demand lies.
+/// Least commanded sink with which the land detector reports a landing, m/s: 1.1 times the default
+/// of `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). It reads the velocity of the setpoint only, so
+/// at a demand to stay PX4 reports itself in the air, on the ground too, however far below the
+/// demand lies.
 const MIN_LAND_RATE_MPS: f32 = 0.275;
 /// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
 const CRAWL_SHARE: f32 = 0.75;
@@ -181,7 +184,11 @@ impl Commander {
             (true, Some(_)) => 5,
             (true, None) => 4,
             // A disarmed vehicle whose mode could not run says 0, not STANDBY.
-            (false, _) if mode == Mode::Offboard && !self.is_setpoint_stream_fresh(now_us, tuning) => 0,
+            (false, _)
+                if mode == Mode::Offboard && !self.is_setpoint_stream_fresh(now_us, tuning) =>
+            {
+                0
+            }
             (false, _) => 3,
         };
         let flags = if mode.is_auto() {
@@ -260,8 +267,8 @@ impl Commander {
         true
     }
 
-    /// Enters the mode and returns true; an armed vehicle enters only a mode that can run. The second COMMAND_ACK of DO_SET_MODE
-    /// carries the result.
+    /// Enters the mode and returns true; an armed vehicle enters only a mode that can run. The
+    /// second COMMAND_ACK of DO_SET_MODE carries the result.
     pub fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
@@ -346,13 +353,16 @@ impl Commander {
         match self.phase {
             FlightPhase::Ground => {
                 integral = IntegralAction::Clear;
-                if wants_up && now.saturating_sub(self.armed_us) >= micros_from_s(tuning.spool_up_s) {
+                if wants_up && now.saturating_sub(self.armed_us) >= micros_from_s(tuning.spool_up_s)
+                {
                     self.phase = FlightPhase::Ramp { since_us: now };
                 }
             }
             FlightPhase::Ramp { since_us } => {
-                let progress = now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
-                // The climb limit starts where it cancels hover thrust (`TakeoffHandling::updateRamp`).
+                let progress =
+                    now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
+                // The climb limit starts where it cancels hover thrust
+                // (`TakeoffHandling::updateRamp`).
                 let floor = -crate::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
                 let limit = floor + progress * (demand.climb_max - floor);
                 if self.landed && progress >= IN_AIR_SHARE {
@@ -370,16 +380,21 @@ impl Commander {
             FlightPhase::Flying => {
                 // PX4's own crawl is flown slower here than it commands (`CRAWL_SHARE`).
                 let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_SHARE };
-                self.detect_landing(sensors, -demand.velocity.z >= share * MIN_LAND_RATE_MPS, tuning);
+                self.detect_landing(
+                    sensors,
+                    -demand.velocity.z >= share * MIN_LAND_RATE_MPS,
+                    tuning,
+                );
             }
         }
         ControlDemand { lift: self.phase != FlightPhase::Ground, integral, demand }
     }
 
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
-        let stream_lost =
-            self.intended_mode == Mode::Offboard && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
-        let battery_out = sensors.battery < tuning.battery_critical && !self.intended_mode.ends_with_flight();
+        let stream_lost = self.intended_mode == Mode::Offboard
+            && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
+        let battery_out =
+            sensors.battery < tuning.battery_critical && !self.intended_mode.ends_with_flight();
         let action = if !self.position_ok {
             (self.intended_mode != Mode::Land).then_some(Mode::Land)
         } else if stream_lost {

@@ -51,7 +51,10 @@ impl Mode {
 
     /// The mode of a main and a sub mode.
     pub fn from_main_sub(main: u8, sub: u8) -> Option<Self> {
-        MODES.iter().find(|&&(_, m, s)| m == main && (s == sub || main != 4)).map(|&(mode, ..)| mode)
+        MODES
+            .iter()
+            .find(|&&(_, m, s)| m == main && (s == sub || main != 4))
+            .map(|&(mode, ..)| mode)
     }
 
     /// Whether a disarmed vehicle leaves the mode for the one before.

@@ -1,4 +1,5 @@
-//! The parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few that act.
+//! The parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few
+//! that act.
 
 use planner_core::Point;
 
@@ -178,10 +179,21 @@ impl Tuning {
         Self {
             gains: Gains {
                 position: [params.f32_value("MPC_XY_P"), params.f32_value("MPC_Z_P")],
-                velocity_p: [params.f32_value("MPC_XY_VEL_P_ACC"), params.f32_value("MPC_Z_VEL_P_ACC")],
-                velocity_i: [params.f32_value("MPC_XY_VEL_I_ACC"), params.f32_value("MPC_Z_VEL_I_ACC")],
-                velocity_d: [params.f32_value("MPC_XY_VEL_D_ACC"), params.f32_value("MPC_Z_VEL_D_ACC")],
-                tilt_tan: libm::tanf(params.f32_value("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians()),
+                velocity_p: [
+                    params.f32_value("MPC_XY_VEL_P_ACC"),
+                    params.f32_value("MPC_Z_VEL_P_ACC"),
+                ],
+                velocity_i: [
+                    params.f32_value("MPC_XY_VEL_I_ACC"),
+                    params.f32_value("MPC_Z_VEL_I_ACC"),
+                ],
+                velocity_d: [
+                    params.f32_value("MPC_XY_VEL_D_ACC"),
+                    params.f32_value("MPC_Z_VEL_D_ACC"),
+                ],
+                tilt_tan: libm::tanf(
+                    params.f32_value("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians(),
+                ),
                 heading_rate_max: params.f32_value("MPC_YAWRAUTO_MAX").to_radians(),
             },
             speed_max: params.f32_value("MPC_XY_VEL_MAX"),
@@ -208,7 +220,9 @@ impl Tuning {
             return_height: params.f32_value("RTL_RETURN_ALT"),
             return_descend_height: params.f32_value("RTL_DESCEND_ALT"),
             return_min_distance: params.f32_value("RTL_MIN_DIST"),
-            return_cone_tan: libm::tanf((params.i32_value("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians()),
+            return_cone_tan: libm::tanf(
+                (params.i32_value("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians(),
+            ),
             low_battery_action: params.i32_value("COM_LOW_BAT_ACT"),
             battery_critical: params.f32_value("BAT_CRIT_THR"),
             battery_low: params.f32_value("BAT_LOW_THR"),
@@ -230,20 +244,32 @@ mod tests {
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
         let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
-        for value in [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height] {
-            assert!(value > 0.0);
-        }
         for value in
-            [t.auto_up, t.auto_down, t.takeoff_speed, t.takeoff_ramp_s, t.takeoff_height, t.land_trigger_s]
+            [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height]
         {
             assert!(value > 0.0);
         }
-        for value in [t.land_crawl_speed, t.land_crawl_below, t.auto_jerk, t.auto_acceleration_down] {
+        for value in [
+            t.auto_up,
+            t.auto_down,
+            t.takeoff_speed,
+            t.takeoff_ramp_s,
+            t.takeoff_height,
+            t.land_trigger_s,
+        ] {
             assert!(value > 0.0);
         }
-        for value in
-            [t.disarm_land_s, t.disarm_preflight_s, t.return_descend_height, t.battery_low, t.return_cone_tan]
+        for value in [t.land_crawl_speed, t.land_crawl_below, t.auto_jerk, t.auto_acceleration_down]
         {
+            assert!(value > 0.0);
+        }
+        for value in [
+            t.disarm_land_s,
+            t.disarm_preflight_s,
+            t.return_descend_height,
+            t.battery_low,
+            t.return_cone_tan,
+        ] {
             assert!(value > 0.0);
         }
         assert_eq!((t.offboard_loss_action, t.low_battery_action), (0, 0));

@@ -1,8 +1,8 @@
 //! What Offboard flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as PX4 reads them
 //! (`MavlinkReceiver::handle_message_set_position_target_*`).
 //!
-//! Each axis left out by the mask is NaN. A message that asks for nothing, or in a frame PX4 does not know, is not an
-//! error: it just does not count, and the stream of those that count runs dry.
+//! Each axis left out by the mask is NaN. A message that asks for nothing, or in a frame PX4 does
+//! not know, is not an error: it just does not count, and the stream of those that count runs dry.
 
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
@@ -58,7 +58,8 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) ->
     let mut velocity = read_masked_vector(fields, 16, mask >> 3);
     let mut acceleration = read_masked_vector(fields, 28, mask >> 6);
     if frame == FRAME_BODY_NED {
-        // PX4 turns velocity and acceleration by the heading and takes no position in the body's frame.
+        // PX4 turns velocity and acceleration by the heading and takes no position in the body's
+        // frame.
         position = Vector3::repeat(f64::NAN);
         velocity = rotated_by_heading(velocity, context.heading);
         acceleration = rotated_by_heading(acceleration, context.heading);
@@ -115,7 +116,8 @@ fn rotated_by_heading(v: Vector3<f64>, heading: f32) -> Vector3<f64> {
     Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 }
 
-/// Maps a NED vector to ENU by `map`, axis by axis as far as it is given: north and east only together, down alone.
+/// Maps a NED vector to ENU by `map`, axis by axis as far as it is given: north and east only
+/// together, down alone.
 fn map_keeping_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
     let across = ned.x.is_finite() && ned.y.is_finite();
     let mapped = map(&ned.map(|x| if x.is_finite() { x } else { 0.0 }));
@@ -139,7 +141,8 @@ fn setpoint_from_fields(
         return None;
     }
     let velocity = map_keeping_nan(velocity, |ned| context.frame.enu_velocity_from_ned(ned));
-    let acceleration = map_keeping_nan(acceleration, |ned| context.frame.enu_velocity_from_ned(ned));
+    let acceleration =
+        map_keeping_nan(acceleration, |ned| context.frame.enu_velocity_from_ned(ned));
     let any = |v: &Vector3<f64>| v.iter().any(|x| x.is_finite());
     if !any(&position) && !any(&velocity) && !any(&acceleration) {
         return None;

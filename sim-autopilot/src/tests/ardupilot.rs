@@ -1,4 +1,5 @@
-//! One test for each thing ArduCopter 4.6 was seen to do: here how it flies, in `protocol` what it says and answers.
+//! One test for each thing ArduCopter 4.6 was seen to do: here how it flies, in `protocol` what it
+//! says and answers.
 
 mod protocol;
 
@@ -38,7 +39,9 @@ impl Bench {
     }
 
     pub(super) fn texts(&self) -> Vec<String> {
-        let text = |f: &Frame| String::from_utf8_lossy(&f.padded()[1..51]).trim_end_matches('\0').to_owned();
+        let text = |f: &Frame| {
+            String::from_utf8_lossy(&f.padded()[1..51]).trim_end_matches('\0').to_owned()
+        };
         self.of(253).map(|(_, frame)| text(frame)).collect()
     }
 
@@ -86,7 +89,10 @@ fn it_flies_the_sequence_that_was_seen_to_fly() {
         bench.run(0.05);
     }
     let done = bench.now() - start;
-    assert!(bench.landed_state() == 2 && (8.9..9.8).contains(&done), "landed_state 2 after {done} s");
+    assert!(
+        bench.landed_state() == 2 && (8.9..9.8).contains(&done),
+        "landed_state 2 after {done} s"
+    );
     bench.run(1.0);
     assert_eq!(bench.heartbeat(), (4, 0xD9, 4));
     assert!((bench.at().z - 10.3).abs() < 0.15, "at {}", bench.at());
@@ -125,7 +131,11 @@ fn guided_is_accepted_before_the_estimator_is_ready_and_arming_refused() {
     bench.run(3.0);
     assert_eq!(bench.mode(GUIDED), [0]);
     assert_eq!(bench.arm(), [4]);
-    assert!(bench.texts().iter().any(|text| text.contains("Need Position Estimate")), "{:?}", bench.texts());
+    assert!(
+        bench.texts().iter().any(|text| text.contains("Need Position Estimate")),
+        "{:?}",
+        bench.texts()
+    );
     bench.run(1.0);
     assert_eq!(bench.heartbeat(), (4, 0x59, 3));
 }
@@ -216,7 +226,11 @@ fn a_velocity_is_held_three_seconds_then_it_brakes() {
     let stopped = slower + bench.until(3.0, |a| a.true_state().velocity.norm() < 0.2);
     assert!((4.0..4.8).contains(&stopped), "below 0.2 m/s after {stopped} s");
     bench.run(2.0);
-    assert_eq!((bench.heartbeat().0, bench.texts().len()), (4, texts), "still Guided, without a word");
+    assert_eq!(
+        (bench.heartbeat().0, bench.texts().len()),
+        (4, texts),
+        "still Guided, without a word"
+    );
 }
 
 #[test]
@@ -346,7 +360,11 @@ fn return_climbs_comes_home_and_lands() {
         highest = highest.max(a.true_state().position.z);
         !a.true_state().armed
     });
-    assert!(bench.at().xy().norm() < 0.7 && highest > 14.0, "landed at {}, {highest} m", bench.at());
+    assert!(
+        bench.at().xy().norm() < 0.7 && highest > 14.0,
+        "landed at {}, {highest} m",
+        bench.at()
+    );
 }
 
 #[test]

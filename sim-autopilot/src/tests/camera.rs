@@ -6,7 +6,8 @@ use crate::camera::Photo;
 const DIGICAM: u16 = 203;
 const DISTANCE: u16 = 206;
 
-/// The offsets of latitude, longitude and index in what each firmware says about a picture, and its first index.
+/// The offsets of latitude, longitude and index in what each firmware says about a picture, and its
+/// first index.
 fn layout(personality: AutopilotKind) -> (u32, [usize; 3], u32) {
     match personality {
         AutopilotKind::Px4 => (263, [12, 16, 44], 0),
@@ -25,7 +26,8 @@ fn hovering(personality: AutopilotKind) -> Bench {
 /// What was said about pictures: index and place in the mission frame, metres east and north.
 fn said(bench: &Bench, personality: AutopilotKind) -> Vec<(u32, [f64; 2])> {
     let (id, [lat, lon, index], _) = layout(personality);
-    let long = |b: &[u8; 255], at: usize| i32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]);
+    let long =
+        |b: &[u8; 255], at: usize| i32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]);
     let world = Config::default().world_origin;
     bench
         .of(id)
@@ -74,7 +76,8 @@ fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
         assert_eq!(said.len(), photos.len());
         for (k, ((index, place), photo)) in said.iter().zip(&photos).enumerate() {
             assert_eq!(*index, first + k as u32);
-            let off = (place[0] - f64::from(photo.position.x)).hypot(place[1] - f64::from(photo.position.y));
+            let off = (place[0] - f64::from(photo.position.x))
+                .hypot(place[1] - f64::from(photo.position.y));
             assert!(off < 0.02, "{personality:?}: {off} m off");
         }
         assert_eq!(bench.autopilot.take_photos(), [], "they are handed over once");
@@ -94,7 +97,11 @@ fn without_a_picture_at_once_px4_begins_with_one_and_ardupilot_does_not() {
         bench.command(DISTANCE, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         bench.run(0.1);
         bench.command(DISTANCE, [20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(fly_north(&mut bench, 0.0, 12.0).len(), count - 2, "{personality:?}: 13 m are not 20");
+        assert_eq!(
+            fly_north(&mut bench, 0.0, 12.0).len(),
+            count - 2,
+            "{personality:?}: 13 m are not 20"
+        );
     }
 }
 
@@ -164,7 +171,10 @@ fn it_turns_to_a_commanded_yaw_the_short_way_at_a_bounded_rate() {
                     fastest = fastest.max(truth.heading_rate.abs());
                 }
                 let truth = bench.autopilot.true_state();
-                assert!(vehicle::wrap_pi(truth.heading_rad - yaw).abs() < 0.02, "{personality:?} {yaw}");
+                assert!(
+                    vehicle::wrap_pi(truth.heading_rad - yaw).abs() < 0.02,
+                    "{personality:?} {yaw}"
+                );
                 assert!(fastest <= 1.001 * most, "{personality:?}: {fastest} rad/s of {most}");
                 assert!(turned < way + 0.1, "{personality:?}: turned {turned} for {way}");
             }

@@ -3,7 +3,8 @@
 use super::*;
 use crate::camera::Photo;
 
-/// An item: command, frame, parameters 1 to 4, metres east and north of the mission origin (or parameters 5 and 6), height.
+/// An item: command, frame, parameters 1 to 4, metres east and north of the mission origin (or
+/// parameters 5 and 6), height.
 type Plan<'a> = &'a [(u16, u8, [f32; 4], [f32; 2], f32)];
 
 const RELATIVE: u8 = 3;
@@ -39,7 +40,8 @@ impl Bench {
             }
             let world = Config::default().world_origin;
             let geodetic = frames::enu_to_geodetic(&world, &Point::new(place[0], place[1], 0.0));
-            let scaled = [geodetic.lat_deg, geodetic.lon_deg].map(|degrees| (degrees * 1e7).round() as i32);
+            let scaled =
+                [geodetic.lat_deg, geodetic.lon_deg].map(|degrees| (degrees * 1e7).round() as i32);
             let whole = if *frame == NONE { place.map(|value| value as i32) } else { scaled };
             payload[16..20].copy_from_slice(&whole[0].to_le_bytes());
             payload[20..24].copy_from_slice(&whole[1].to_le_bytes());
@@ -86,16 +88,24 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         let at = bench.autopilot.true_state().position;
         assert!(at.xy().norm() < 1.0, "{personality:?} came down at {at}");
         let photos = bench.autopilot.take_photos();
-        assert_eq!(photos.len(), 6, "{personality:?}: at 0, 10, 20, 30, 40 m and one more: {photos:?}");
+        assert_eq!(
+            photos.len(),
+            6,
+            "{personality:?}: at 0, 10, 20, 30, 40 m and one more: {photos:?}"
+        );
         let (lane, last): (&[Photo], Photo) = (&photos[..5], photos[5]);
         for (k, photo) in lane.iter().enumerate() {
-            // Around the lane, as near as waypoints are passed; later by what is flown between two looks.
+            // Around the lane, as near as waypoints are passed; later by what is flown between two
+            // looks.
             let off = photo.position - Point::new(0.0, 20.0, 8.3);
             assert!(off.y.abs() < 2.1 && off.z.abs() < 0.9, "{personality:?}: {off}");
             let along = off.x - 10.0 * k as f32;
             assert!((-2.1..2.3).contains(&along), "{personality:?}: {along}");
         }
-        assert!((last.position - Point::new(43.0, 30.0, 10.3)).norm() < 2.2, "{personality:?} {last:?}");
+        assert!(
+            (last.position - Point::new(43.0, 30.0, 10.3)).norm() < 2.2,
+            "{personality:?} {last:?}"
+        );
         if personality == AutopilotKind::Px4 {
             assert!(
                 photos.iter().all(|p| (p.heading_rad - 1.57).abs() < 0.22),
@@ -178,7 +188,8 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
     assert_eq!(bench.arm(), [1]);
     let mut bench = Bench::armed();
     assert_eq!((bench.start(), bench.mode(3.0)), (vec![4], vec![4]), "ArduPilot: FAILED");
-    // ArduPilot, armed on the ground, wants a take-off first, and without MISSION_START stays there.
+    // ArduPilot, armed on the ground, wants a take-off first, and without MISSION_START stays
+    // there.
     bench.upload(&[(16, RELATIVE, [0.0; 4], [9.0, 9.0], 9.0)]);
     assert_eq!(bench.mode(3.0), [4]);
     assert!(bench.texts().iter().any(|text| text == "Auto: Missing Takeoff Cmd"));
@@ -205,7 +216,10 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
         assert_eq!(bench.reached().len(), 6, "{personality:?}");
         let truth = *bench.autopilot.true_state();
         let off = truth.position - Point::new(9.0, 0.0, 5.3);
-        assert!(truth.armed && off.norm() < 0.3, "{personality:?}: after the last item it stays: {off}");
+        assert!(
+            truth.armed && off.norm() < 0.3,
+            "{personality:?}: after the last item it stays: {off}"
+        );
         assert_eq!(bench.autopilot.take_photos(), []);
     }
 }

@@ -10,16 +10,26 @@ fn it_floods_at_once_at_px4s_rates() {
     let known = bench.received.len();
     assert!(known > 20);
     bench.run(9.9);
-    for (id, rate) in
-        [(30, 100.0), (105, 50.0), (331, 30.0), (111, 10.0), (4, 1.0), (0, 1.0), (33, 50.0), (245, 5.0)]
-    {
+    for (id, rate) in [
+        (30, 100.0),
+        (105, 50.0),
+        (331, 30.0),
+        (111, 10.0),
+        (4, 1.0),
+        (0, 1.0),
+        (33, 50.0),
+        (245, 5.0),
+    ] {
         let seen = bench.of(id).count() as f64 / 10.0;
         assert!((seen - rate).abs() <= 0.05 * rate + 0.1, "message {id}: {seen} Hz, not {rate}");
     }
     let counters = bench.framer.counters();
     assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0));
     assert!(counters.unknown >= 9, "GNSS_INTEGRITY is in no dialect here: {counters:?}");
-    assert!([8, 380, 410, 411, 436].iter().all(|&id| bench.of(id).count() >= 2), "newer than many dialects");
+    assert!(
+        [8, 380, 410, 411, 436].iter().all(|&id| bench.of(id).count() >= 2),
+        "newer than many dialects"
+    );
     assert!(bench.of(253).next().is_none(), "no STATUSTEXT on this link");
 }
 
@@ -28,7 +38,8 @@ fn sequence_numbers_have_no_gap() {
     let mut bench = Bench::new();
     bench.run(5.0);
     // Those of unknown id are skipped.
-    let gap = |pair: &[(f64, Frame)]| u32::from(pair[1].1.sequence.wrapping_sub(pair[0].1.sequence)) - 1;
+    let gap =
+        |pair: &[(f64, Frame)]| u32::from(pair[1].1.sequence.wrapping_sub(pair[0].1.sequence)) - 1;
     let gaps: u32 = bench.received.windows(2).map(gap).sum();
     assert!(gaps <= bench.framer.counters().unknown, "{gaps} numbers are missing");
 }
@@ -44,7 +55,12 @@ fn ned_is_about_its_own_ekf_origin() {
     let truth = frames::enu_to_geodetic(&world, &bench.autopilot.true_state().position);
     let expected = frames::geodetic_to_ned(AutopilotKind::Px4.projection(), &ekf, &truth);
     for (k, at) in [4, 8, 12].into_iter().enumerate() {
-        assert!((said(at) - expected[k]).abs() < 0.01, "axis {k}: {} for {}", said(at), expected[k]);
+        assert!(
+            (said(at) - expected[k]).abs() < 0.01,
+            "axis {k}: {} for {}",
+            said(at),
+            expected[k]
+        );
     }
     assert!(expected.x > 600.0 && expected.y < -1100.0);
 }
@@ -67,7 +83,8 @@ fn the_origin_comes_once_on_change_and_on_request() {
 #[test]
 fn commands_are_answered_as_px4_answers_them() {
     let mut bench = Bench::new();
-    let ask = |bench: &mut Bench, id, a: f32, b: f32| bench.command(id, [a, b, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let ask =
+        |bench: &mut Bench, id, a: f32, b: f32| bench.command(id, [a, b, 0.0, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(ask(&mut bench, 12_345, 0.0, 0.0), [3], "unknown command");
     assert_eq!(ask(&mut bench, 511, 9999.0, 1e5), [4], "bad message id");
     assert_eq!(ask(&mut bench, 511, 30.0, 1e5), [0]);
@@ -80,7 +97,9 @@ fn commands_are_answered_as_px4_answers_them() {
     let before = bench.of(30).count();
     bench.run(5.0);
     assert!((45..=55).contains(&(bench.of(30).count() - before)), "ATTITUDE at 10 Hz");
-    for (id, param, message) in [(512, 148.0, 148), (520, 1.0, 148), (519, 1.0, 300), (512, 242.0, 242)] {
+    for (id, param, message) in
+        [(512, 148.0, 148), (520, 1.0, 148), (519, 1.0, 300), (512, 242.0, 242)]
+    {
         let before = bench.of(message).count();
         assert_eq!(ask(&mut bench, id, param, 0.0), [0], "command {id}");
         assert!(bench.of(message).count() > before, "message {message}");
@@ -99,8 +118,9 @@ fn parameters_are_listed_read_and_set_bytewise() {
     let mut bench = Bench::new();
     bench.send(21, &[1, 1]);
     bench.run(2.0);
-    let total =
-        usize::from(u16::from_le_bytes(bench.of(22).next().unwrap().1.padded()[4..6].try_into().unwrap()));
+    let total = usize::from(u16::from_le_bytes(
+        bench.of(22).next().unwrap().1.padded()[4..6].try_into().unwrap(),
+    ));
     assert_eq!(bench.of(22).count(), total);
     bench.set_param("COM_OBL_RC_ACT", f32::from_bits(5), 6);
     let b = bench.of(22).last().unwrap().1.padded();
@@ -132,7 +152,10 @@ fn ping_and_timesync_are_answered() {
     payload[8] = 77;
     bench.send(111, &payload);
     let b = bench.of(111).last().unwrap().1.padded();
-    assert_eq!(i64::from_le_bytes(b[..8].try_into().unwrap()), bench.autopilot.time_us() as i64 * 1000);
+    assert_eq!(
+        i64::from_le_bytes(b[..8].try_into().unwrap()),
+        bench.autopilot.time_us() as i64 * 1000
+    );
     assert_eq!(b[8], 77);
 }
 
@@ -155,7 +178,8 @@ fn every_port_has_its_own_streams() {
             let mut buffer = [0; 4096];
             let len = autopilot.poll_transmit_from(port, &mut buffer);
             let mut bytes = &buffer[..len];
-            while let Some(frame) = framers[port].next(Instant::from_micros(autopilot.time_us()), &mut bytes)
+            while let Some(frame) =
+                framers[port].next(Instant::from_micros(autopilot.time_us()), &mut bytes)
             {
                 attitudes[port] += usize::from(frame.message_id == 30);
             }

@@ -1,13 +1,15 @@
-//! How nearly a simulated autopilot flies what a real one flew: recorded setpoints and commands are replayed into it, and where it
-//! believes to be is compared with the recorded *estimate*, from arming to disarming.
+//! How nearly a simulated autopilot flies what a real one flew: recorded setpoints and commands are
+//! replayed into it, and where it believes to be is compared with the recorded *estimate*, from
+//! arming to disarming.
 //!
-//! Two things of a PX4 recording are no property of the autopilot. The wandering of its estimate moves the vehicle: a replay
-//! imposes the recorded errors (estimate minus truth) on the simulated estimate, or those of another flight, or flies without any
-//! ([`Estimator`]). And the companion answered that wandering in the accelerations it sent: a replay either sends those, or what the
+//! Two things of a PX4 recording are no property of the autopilot. The wandering of its estimate
+//! moves the vehicle: a replay imposes the recorded errors (estimate minus truth) on the simulated
+//! estimate, or those of another flight, or flies without any ([`Estimator`]). And the companion
+//! answered that wandering in the accelerations it sent: a replay either sends those, or what the
 //! same law sends beside the simulated vehicle ([`Correction`]).
 //!
-//! The recordings are `data/flights/*.csv` of the shared data, described by the README beside them. Positions are NED
-//! metres about the vehicle's EKF origin, times are seconds of the wall clock.
+//! The recordings are `data/flights/*.csv` of the shared data, described by the README beside them.
+//! Positions are NED metres about the vehicle's EKF origin, times are seconds of the wall clock.
 
 mod read;
 mod recording;
@@ -53,19 +55,21 @@ pub enum Estimator<'a> {
 
 /// Whose estimate the accelerations of the replayed setpoints answer.
 ///
-/// The companion of the recordings added to each setpoint of PX4 an acceleration back to its reference, in proportion to what the
-/// *recorded* estimate was beside it. What a real estimator wandered is in those accelerations: replayed as they are, they push a
-/// vehicle that did not wander.
+/// The companion of the recordings added to each setpoint of PX4 an acceleration back to its
+/// reference, in proportion to what the *recorded* estimate was beside it. What a real estimator
+/// wandered is in those accelerations: replayed as they are, they push a vehicle that did not
+/// wander.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Correction {
     /// The recorded one: the setpoints as they were sent.
     Recorded,
-    /// The simulated one: the same law about the vehicle that flies now. Nothing of the recorded estimate is left.
+    /// The simulated one: the same law about the vehicle that flies now. Nothing of the recorded
+    /// estimate is left.
     Simulated,
 }
 
-/// What a plain flight may differ by under the recorded errors, its setpoints as they were sent, RMS metres; `None` where a person
-/// or a failsafe took the vehicle.
+/// What a plain flight may differ by under the recorded errors, its setpoints as they were sent,
+/// RMS metres; `None` where a person or a failsafe took the vehicle.
 pub fn allowed_m(recording: &Recording) -> Option<f64> {
     match recording.run.as_str() {
         "a_demo" => Some(0.45),
@@ -76,7 +80,9 @@ pub fn allowed_m(recording: &Recording) -> Option<f64> {
             2 => None,
             _ => Some(0.15),
         },
-        "ap_b_demo" | "ap_b_lobby" | "ap_c1_demo" | "apx_rearm_lobby" | "apx_landearly_lobby" => Some(0.15),
+        "ap_b_demo" | "ap_b_lobby" | "ap_c1_demo" | "apx_rearm_lobby" | "apx_landearly_lobby" => {
+            Some(0.15)
+        }
         _ => None,
     }
 }
@@ -101,7 +107,9 @@ impl Recording {
     fn tracking(&self) -> Vec<(f64, Vector3<f64>)> {
         let mut later = self.setpoints.as_slice();
         let mut errors = Vec::new();
-        for seen in self.estimate.iter().filter(|s| s.t_s >= self.follow_s.0 && s.t_s < self.follow_s.1) {
+        for seen in
+            self.estimate.iter().filter(|s| s.t_s >= self.follow_s.0 && s.t_s < self.follow_s.1)
+        {
             while later.len() > 1 && later[1].t_s <= seen.t_s {
                 later = &later[1..];
             }
@@ -111,7 +119,8 @@ impl Recording {
         errors
     }
 
-    /// How differently another recorded flight of the same mission kept to its setpoints: RMS, metres.
+    /// How differently another recorded flight of the same mission kept to its setpoints: RMS,
+    /// metres.
     pub fn spread(&self, other: &Self) -> f64 {
         let (own, others) = (self.tracking(), other.tracking());
         let (mut squares, mut n, mut at) = (0.0, 0_u32, 0);
@@ -127,15 +136,17 @@ impl Recording {
         (squares / f64::from(n)).sqrt()
     }
 
-    /// How far errors of the estimate alone move a replay: RMS, metres. So far a replay without them is off the recording, however
-    /// well the autopilot is simulated.
+    /// How far errors of the estimate alone move a replay: RMS, metres. So far a replay without
+    /// them is off the recording, however well the autopilot is simulated.
     pub fn moved(&self, errors: Estimator<'_>, correction: Correction) -> f64 {
-        let [with, without] = [errors, Estimator::Perfect].map(|errors| self.replay(errors, correction));
+        let [with, without] =
+            [errors, Estimator::Perfect].map(|errors| self.replay(errors, correction));
         Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm())).rms
     }
 
-    /// How much the estimates of two flights erred alike across at the same times: coefficient of correlation. PX4's SIH draws the
-    /// noise of its sensors from `rand()` without a seed: it repeats in another flight, unless threads drew in another order.
+    /// How much the estimates of two flights erred alike across at the same times: coefficient of
+    /// correlation. PX4's SIH draws the noise of its sensors from `rand()` without a seed: it
+    /// repeats in another flight, unless threads drew in another order.
     pub fn err_alike(&self, other: &Self) -> f64 {
         let (own, others) = (self.errors(), other.errors());
         let mut later = others.as_slice();
@@ -149,11 +160,13 @@ impl Recording {
             }
         }
         let n = pairs.len() as f64;
-        let mean = |of: &dyn Fn(&(Across, Across)) -> Across| pairs.iter().map(of).sum::<Across>() / n;
+        let mean =
+            |of: &dyn Fn(&(Across, Across)) -> Across| pairs.iter().map(of).sum::<Across>() / n;
         let (a, b) = (mean(&|p| p.0), mean(&|p| p.1));
         let product = |of: &dyn Fn(&(Across, Across)) -> f64| pairs.iter().map(of).sum::<f64>();
         let both = product(&|p| (p.0 - a).dot(&(p.1 - b)));
-        both / (product(&|p| (p.0 - a).norm_squared()) * product(&|p| (p.1 - b).norm_squared())).sqrt()
+        both / (product(&|p| (p.0 - a).norm_squared()) * product(&|p| (p.1 - b).norm_squared()))
+            .sqrt()
     }
 
     /// Replays and compares.

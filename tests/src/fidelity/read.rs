@@ -28,8 +28,12 @@ fn message(text: &str) -> Option<Message> {
     // What asks for streams changes no flight.
     let flies = matches!(command, 20 | 21 | 22 | 176 | 400);
     match from {
-        "companion" if flies && !after.contains("/0") => Some(Message::Command(1, 191, command, params)),
-        "gcs" if flies && after.contains("component 1") => Some(Message::Command(255, 190, command, params)),
+        "companion" if flies && !after.contains("/0") => {
+            Some(Message::Command(1, 191, command, params))
+        }
+        "gcs" if flies && after.contains("component 1") => {
+            Some(Message::Command(255, 190, command, params))
+        }
         _ => None,
     }
 }
@@ -45,7 +49,8 @@ impl Events {
     fn take(&mut self, t_s: f64, text: &str, recording: &mut Recording) {
         if let Some(place) = text.strip_prefix("autopilot origin ") {
             let numbers: Vec<f64> = place.split(' ').filter_map(|n| n.parse().ok()).collect();
-            recording.origin = Geodetic { lat_deg: numbers[0], lon_deg: numbers[1], alt_m: numbers[2] };
+            recording.origin =
+                Geodetic { lat_deg: numbers[0], lon_deg: numbers[1], alt_m: numbers[2] };
         }
         if text.contains("Stabilize") {
             recording.autopilot = AutopilotKind::Ardupilot;
@@ -72,10 +77,9 @@ impl Events {
         let mut words = ack.split(' ');
         let command: u16 = words.next().and_then(|w| w.parse().ok()).expect("an ack's command");
         let result: u8 = words.nth(1).and_then(|w| w.parse().ok()).expect("an ack's result");
-        let first = self
-            .asked
-            .iter()
-            .position(|(_, message)| matches!(message, Message::Command(_, _, id, _) if *id == command));
+        let first = self.asked.iter().position(
+            |(_, message)| matches!(message, Message::Command(_, _, id, _) if *id == command),
+        );
         if let Some(first) = first {
             let (at_s, message) = self.asked.remove(first);
             if result == 0 {
@@ -119,7 +123,9 @@ pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
             "estimate" => {
                 recording.estimate.push(Sample { t_s, position: vector(3), velocity: vector(6) });
             }
-            "truth" => recording.truth.push(Sample { t_s, position: vector(3), velocity: vector(6) }),
+            "truth" => {
+                recording.truth.push(Sample { t_s, position: vector(3), velocity: vector(6) })
+            }
             "setpoint" => {
                 let f32s = |k: usize| [0, 1, 2].map(|axis| number(k + axis) as f32);
                 recording.setpoints.push(Setpoint {

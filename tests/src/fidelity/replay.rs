@@ -2,7 +2,8 @@
 
 use companion::link::frame::{self, Header};
 use mavlink::dialects::ardupilotmega::{
-    MavFrame, MavParamType, PARAM_SET_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    MavFrame, MavParamType, PARAM_SET_DATA, PositionTargetTypemask,
+    SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -14,11 +15,13 @@ use super::{Correction, Estimator};
 /// Simulated seconds for each second of the wall clock: PX4's SIH was recorded 0.4 to 1.1 % slow.
 const PX4_CLOCK: f64 = 0.9925;
 const STEP_S: f64 = 0.004;
-/// Simulated time before the first record, seconds: ArduCopter has booted and has its position by then.
+/// Simulated time before the first record, seconds: ArduCopter has booted and has its position by
+/// then.
 const WARM_UP_S: f64 = 8.0;
 const COMMAND_LONG: (u32, u8) = (76, 152);
-/// The law of the companion that was recorded (8314848, `guidance::correction`): acceleration for each metre and for each m/s beside
-/// the reference, 1/s² and 1/s, and its bound, m/s². Of the recorded estimate it gives the recorded accelerations to 0.02 m/s².
+/// The law of the companion that was recorded (8314848, `guidance::correction`): acceleration for
+/// each metre and for each m/s beside the reference, 1/s² and 1/s, and its bound, m/s². Of the
+/// recorded estimate it gives the recorded accelerations to 0.02 m/s².
 const HOLD_PER_S2: f64 = 3.0;
 const DAMP_PER_S: f64 = 1.5;
 const HOLD_MOST_MPS2: f64 = 1.5;
@@ -28,8 +31,9 @@ const CHANGE_MOST_MPS2: f64 = 2.0;
 impl Recording {
     /// Where it stood before it armed, by its estimate, NED.
     fn start(&self) -> Vector3<f64> {
-        let before =
-            || self.estimate.iter().filter(|s| s.t_s < self.armed_s.0 && s.t_s > self.armed_s.0 - 1.0);
+        let before = || {
+            self.estimate.iter().filter(|s| s.t_s < self.armed_s.0 && s.t_s > self.armed_s.0 - 1.0)
+        };
         before().map(|s| s.position).sum::<Vector3<f64>>() / before().count().max(1) as f64
     }
 
@@ -46,7 +50,8 @@ impl Recording {
         }
     }
 
-    /// What the estimator had wrong, estimated minus true: ENU metres and m/s at the times of the truth.
+    /// What the estimator had wrong, estimated minus true: ENU metres and m/s at the times of the
+    /// truth.
     pub fn errors(&self) -> Vec<(f64, Point, Point)> {
         let enu = |v: Vector3<f64>| Point::new(v.y as f32, v.x as f32, -v.z as f32);
         let mut errors = Vec::new();
@@ -67,15 +72,18 @@ impl Recording {
         errors
     }
 
-    /// The error of the position where the replay starts without one: as [`Self::start`] takes it, or the first.
+    /// The error of the position where the replay starts without one: as [`Self::start`] takes it,
+    /// or the first.
     fn zero(&self, errors: &[(f64, Point, Point)]) -> Point {
-        let before = || errors.iter().filter(|e| e.0 < self.armed_s.0 && e.0 > self.armed_s.0 - 1.0);
+        let before =
+            || errors.iter().filter(|e| e.0 < self.armed_s.0 && e.0 > self.armed_s.0 - 1.0);
         let first = errors.first().map_or(Point::zeros(), |e| e.1);
         let n = before().count();
         if n > 0 { before().map(|e| e.1).sum::<Point>() / n as f32 } else { first }
     }
 
-    /// Flies the recorded setpoints and commands: estimates at the times of the recorded ones from arming to disarming.
+    /// Flies the recorded setpoints and commands: estimates at the times of the recorded ones from
+    /// arming to disarming.
     ///
     /// # Panics
     /// None for a recording that was read.
@@ -119,7 +127,9 @@ impl Recording {
                     last_setpoint = Some(*setpoint);
                     feed_setpoint(&mut autopilot, &sent, &mut sequence);
                 }
-                while let Some((t_s, position, velocity)) = errors.next_if(|e| due_us(e.0) <= now_us) {
+                while let Some((t_s, position, velocity)) =
+                    errors.next_if(|e| due_us(e.0) <= now_us)
+                {
                     let (was_s, was) = core::mem::replace(&mut last, (*t_s, *position));
                     let rate = (position.z - was.z) / (t_s - was_s).max(0.02) as f32;
                     let rate = if t_s - was_s < 0.2 { rate } else { 0.0 };
@@ -139,8 +149,9 @@ fn ned(enu: &Point) -> Vector3<f64> {
     Vector3::new(f64::from(enu.y), f64::from(enu.x), -f64::from(enu.z))
 }
 
-/// Gives a setpoint the acceleration across that the recorded companion would have sent beside the simulated vehicle: the change of
-/// its reference's speed, and the way back to it. Where it sent none (on the ground, under a pilot) there is none.
+/// Gives a setpoint the acceleration across that the recorded companion would have sent beside the
+/// simulated vehicle: the change of its reference's speed, and the way back to it. Where it sent
+/// none (on the ground, under a pilot) there is none.
 fn corrected(setpoint: &mut Setpoint, last: &Setpoint, autopilot: &Autopilot) {
     let [north, east, _] = setpoint.acceleration;
     if north == 0.0 && east == 0.0 {

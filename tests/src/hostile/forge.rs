@@ -1,4 +1,5 @@
-//! Frames forged from random numbers: fields random and at their bounds, some of a message that would be believed.
+//! Frames forged from random numbers: fields random and at their bounds, some of a message that
+//! would be believed.
 
 use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
@@ -51,7 +52,8 @@ impl Flight {
                 false => self.fill_intent(payload, entropy, how),
             };
         }
-        let length = LENGTHS.iter().find(|(known, _)| *known == id).map_or(255, |(_, length)| *length);
+        let length =
+            LENGTHS.iter().find(|(known, _)| *known == id).map_or(255, |(_, length)| *length);
         for word in payload[..length].chunks_mut(4) {
             let bits = entropy.bits();
             let value = match bits % 8 {
@@ -102,16 +104,17 @@ impl Flight {
                 payload[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
                 let geodetic = frames::enu_to_geodetic(&ORIGIN, &self.autopilot.position);
                 let origin = self.companion.telemetry().ekf_origin.unwrap_or(ORIGIN);
-                let ned = frames::geodetic_to_ned(self.autopilot.kind.projection(), &origin, &geodetic)
-                    .cast::<f32>();
+                let ned =
+                    frames::geodetic_to_ned(self.autopilot.kind.projection(), &origin, &geodetic)
+                        .cast::<f32>();
                 for (axis, shift) in [(0, 0), (1, 3), (2, 5)] {
                     let value = ned[axis] + near(shift, how);
                     payload[4 + 4 * axis..8 + 4 * axis].copy_from_slice(&value.to_le_bytes());
                 }
             }
             33 if how & 1 == 0 => {
-                let place =
-                    self.autopilot.position + Point::new(near(0, how), near(3, how), near(5, how)) * 4.0;
+                let place = self.autopilot.position
+                    + Point::new(near(0, how), near(3, how), near(5, how)) * 4.0;
                 let geodetic = frames::enu_to_geodetic(&ORIGIN, &place);
                 payload[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
                 payload[4..8].copy_from_slice(&((geodetic.lat_deg * 1e7) as i32).to_le_bytes());

@@ -1,6 +1,8 @@
-//! A light autopilot: PX4 or ArduCopter as far as a companion sees it, and a vehicle with a lag and bounded acceleration.
+//! A light autopilot: PX4 or ArduCopter as far as a companion sees it, and a vehicle with a lag and
+//! bounded acceleration.
 //!
-//! It is not the simulated autopilot of `host-sim`, which is truer and slower. ENU metres, steps of [`STEP_S`].
+//! It is not the simulated autopilot of `host-sim`, which is truer and slower. ENU metres, steps of
+//! [`STEP_S`].
 
 mod flight;
 mod inbox;

@@ -24,7 +24,8 @@ pub(super) fn place_of(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
 
 /// The frame with the lie in it; none where it does not concern it.
 pub(super) fn forge(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
-    let header = Header { system: frame.system, component: frame.component, sequence: frame.sequence };
+    let header =
+        Header { system: frame.system, component: frame.component, sequence: frame.sequence };
     let mut out = [0; MAX_FRAME_LEN];
     if let Some(mut data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
         let (mut place, mut velocity) = place_of(&data);
@@ -54,7 +55,12 @@ pub(super) fn forge(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
     }
     let mut payload = [0; 133];
     let length = intent.encode(&mut payload);
-    let length =
-        frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..length], &mut out);
+    let length = frame::encode_raw(
+        header,
+        TUNNEL_DATA::ID,
+        TUNNEL_DATA::EXTRA_CRC,
+        &payload[..length],
+        &mut out,
+    );
     Some(out[..length].to_vec())
 }

@@ -14,7 +14,8 @@ use crate::setpoints::{Limits, SetpointCheck};
 
 /// No vehicle leaves this box, metres: minimum and maximum corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
-/// A vehicle that has heard no other vehicle for so long is deaf, seconds: it has stopped, and lands after 20 s.
+/// A vehicle that has heard no other vehicle for so long is deaf, seconds: it has stopped, and
+/// lands after 20 s.
 const DEAF_S: f32 = 20.0;
 /// A vehicle that is faster is not stopped, m/s.
 const MOVES_MPS: f32 = 0.7;

@@ -1,7 +1,8 @@
-//! Meetings: two to six whole companions, each with a light autopilot, on a radio that loses and delays.
+//! Meetings: two to six whole companions, each with a light autopilot, on a radio that loses and
+//! delays.
 //!
-//! A meeting follows from its seed. [`fly`] flies it and says what went wrong; [`oracle`] is the judge. Nothing here uses the
-//! safety filter's code.
+//! A meeting follows from its seed. [`fly`] flies it and says what went wrong; [`oracle`] is the
+//! judge. Nothing here uses the safety filter's code.
 
 pub mod autopilot;
 pub mod dice;
@@ -251,10 +252,13 @@ impl<'a> World<'a> {
             match event {
                 Event::PlanRequested(_) => self.plan(i),
                 Event::StateChanged { from, to, text, .. } => {
-                    self.members[i].blocked += u32::from((from, to) == (State::Follow, State::Blocked));
+                    self.members[i].blocked +=
+                        u32::from((from, to) == (State::Follow, State::Blocked));
                     self.say(i, &format!("{from:?} → {to:?} {text}"));
                 }
-                Event::RestartRequested | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
+                Event::RestartRequested
+                | Event::WaitsForStart { .. }
+                | Event::FlownAround { .. } => {}
             }
         }
     }
@@ -338,13 +342,18 @@ impl<'a> World<'a> {
         let mut arrived = 0;
         for (i, member) in self.members.iter().enumerate() {
             setpoints.merge(&member.autopilot.check.stats);
-            unfit.extend(member.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())));
-            if (member.autopilot.armed || member.autopilot.is_airborne()) && !self.is_caught_above_another(i)
+            unfit.extend(
+                member.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())),
+            );
+            if (member.autopilot.armed || member.autopilot.is_airborne())
+                && !self.is_caught_above_another(i)
             {
                 stuck.push((i, member.companion.state()));
             }
             let goal = landing(&scene.vehicles[i].plan);
-            arrived += usize::from(goal.is_some_and(|goal| (goal - member.autopilot.position).norm() < 0.7));
+            arrived += usize::from(
+                goal.is_some_and(|goal| (goal - member.autopilot.position).norm() < 0.7),
+            );
         }
         Outcome {
             seed: scene.seed,
@@ -363,7 +372,12 @@ impl<'a> World<'a> {
             arrived,
             filter_stops: self.members.iter().map(|member| member.stops).sum(),
             longest_stop_s: self.members.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
-            most_blocked: self.members.iter().map(|member| member.blocked).max().unwrap_or_default(),
+            most_blocked: self
+                .members
+                .iter()
+                .map(|member| member.blocked)
+                .max()
+                .unwrap_or_default(),
             trace: self.trace.unwrap_or_default(),
         }
     }

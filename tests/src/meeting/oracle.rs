@@ -1,14 +1,15 @@
-//! The judge of a meeting. It computes the sets of the safety filter by their definition, from the messages that a
-//! vehicle received and from the truth, and none of it with the companion's code.
+//! The judge of a meeting. It computes the sets of the safety filter by their definition, from the
+//! messages that a vehicle received and from the truth, and none of it with the companion's code.
 //!
-//! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by what the vehicle lags. In a landing
-//!   the column to the floor.
-//! - *A neighbour's set*: heard within 1 s, the points it reports from its last position, as far as its speed takes it in
-//!   its age + 0.1 s and in a stop after that; off these points, its velocity, widened by ½·a·age²; older, a ball. A column
-//!   to the floor while it climbs, descends or lands.
+//! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by what the
+//!   vehicle lags. In a landing the column to the floor.
+//! - *A neighbour's set*: heard within 1 s, the points it reports from its last position, as far as
+//!   its speed takes it in its age + 0.1 s and in a stop after that; off these points, its
+//!   velocity, widened by ½·a·age²; older, a ball. A column to the floor while it climbs, descends
+//!   or lands.
 //!
-//! A violation of the safety distance is a failure if a stop of each vehicle, begun at the first step at which its sets
-//! came too near, would have kept the distance.
+//! A violation of the safety distance is a failure if a stop of each vehicle, begun at the first
+//! step at which its sets came too near, would have kept the distance.
 
 use companion::link::intent::{GROUNDED, Intent, LANDED};
 use planner_core::Point;
@@ -28,7 +29,8 @@ const FRESH_S: f32 = 1.0;
 const GROWS_S: f32 = 3.0;
 /// Sets that come apart for no longer than this stay one approach, steps.
 const GAP_STEPS: usize = 40;
-/// A stop has to keep this much more than the distance to count as one that would have kept it, metres.
+/// A stop has to keep this much more than the distance to count as one that would have kept it,
+/// metres.
 const SURE_M: f32 = 0.05;
 
 /// What a vehicle last heard of another.
@@ -58,7 +60,11 @@ pub fn distance(p: (Point, Point), q: (Point, Point)) -> f32 {
     let onto = |at: Point, (from, to): (Point, Point)| {
         let along = to - from;
         let length_sq = along.norm_squared();
-        let share = if length_sq > 0.0 { ((at - from).dot(&along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
+        let share = if length_sq > 0.0 {
+            ((at - from).dot(&along) / length_sq).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         from + along * share
     };
     let ends = [p.0, p.1].map(|end| (end - onto(end, q)).norm());
@@ -88,8 +94,9 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
     let mut left_m = reach(speed, age_s + 0.1);
     let mut set = Set { segments: vec![(position, position)], radius_m: 0.0 };
     let next = intent.and_then(|i| i.points.iter().find(|p| (*p - position).norm() > 0.05));
-    let on_points =
-        next.is_some_and(|next| speed < 0.3 || velocity.dot(&(next - position).normalize()) > 0.7 * speed);
+    let on_points = next.is_some_and(|next| {
+        speed < 0.3 || velocity.dot(&(next - position).normalize()) > 0.7 * speed
+    });
     if let (true, Some(intent)) = (on_points, intent) {
         let mut from = position;
         for to in &intent.points {
@@ -131,7 +138,9 @@ impl Set {
     /// Distance to another set.
     pub fn distance(&self, other: &Self) -> f32 {
         let pairs = self.segments.iter().flat_map(|p| other.segments.iter().map(move |q| (*p, *q)));
-        pairs.map(|(p, q)| distance(p, q)).fold(f32::INFINITY, f32::min) - self.radius_m - other.radius_m
+        pairs.map(|(p, q)| distance(p, q)).fold(f32::INFINITY, f32::min)
+            - self.radius_m
+            - other.radius_m
     }
 }
 
@@ -186,7 +195,8 @@ pub struct Oracle {
     count: usize,
     tracks: Vec<Vec<Seen>>,
     approaches: Vec<Option<Approach>>,
-    /// For each pair that is too near: since when, warned since when, and the nearest step and distance.
+    /// For each pair that is too near: since when, warned since when, and the nearest step and
+    /// distance.
     near: Vec<Option<Near>>,
     /// What went wrong.
     pub violations: Vec<Violation>,
@@ -249,7 +259,8 @@ impl Oracle {
                     self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
                 }
                 if a < b {
-                    // Carried off unheard, by its pilot or its autopilot, it is nowhere that its companion's silence allows.
+                    // Carried off unheard, by its pilot or its autopilot, it is nowhere that its
+                    // companion's silence allows.
                     let carried = |from: usize, to: usize| {
                         heard(from, to).position.is_some_and(|(place, _, _, at_s)| {
                             now_s - at_s > GROWS_S
@@ -308,8 +319,11 @@ impl Oracle {
                 let known = self.approaches[from * self.count + to];
                 known.filter(|known| step - known.last <= GAP_STEPS).map(|known| known.since)
             };
-            self.near[at] =
-                Some(Near { warned: [warned(a, b), warned(b, a)], nearest: step, least_m: apart_m });
+            self.near[at] = Some(Near {
+                warned: [warned(a, b), warned(b, a)],
+                nearest: step,
+                least_m: apart_m,
+            });
         } else if apart_m > SAFETY_M + APART_M {
             self.end_near(a, b);
         }
@@ -340,10 +354,12 @@ impl Oracle {
     /// Where a vehicle would be if it had begun to stop at `warned`.
     fn stopped(&self, vehicle: usize, warned: Option<usize>, step: usize) -> Point {
         let track = &self.tracks[vehicle];
-        let Some(warned) = warned.filter(|warned| *warned < step) else { return track[step].position };
+        let Some(warned) = warned.filter(|warned| *warned < step) else {
+            return track[step].position;
+        };
         if track[warned..=step].iter().any(|seen| !seen.own || (seen.deaf && seen.lands)) {
-            // Somebody else took it: its companion could not have stopped it. Nor could a vehicle stay up for good that
-            // hears no other vehicle any more.
+            // Somebody else took it: its companion could not have stopped it. Nor could a vehicle
+            // stay up for good that hears no other vehicle any more.
             return track[step].position;
         }
         let speed = track[warned].velocity.norm();
@@ -361,7 +377,8 @@ impl Oracle {
             let part = (pair[1].position - pair[0].position).norm();
             if part >= left_m {
                 return pair[0].position
-                    + (pair[1].position - pair[0].position) * if part > 0.0 { left_m / part } else { 0.0 };
+                    + (pair[1].position - pair[0].position)
+                        * if part > 0.0 { left_m / part } else { 0.0 };
             }
             left_m -= part;
         }
@@ -373,7 +390,8 @@ impl Oracle {
         let first = near.warned.iter().flatten().min().copied().unwrap_or(near.nearest);
         let mut kept_m = f32::INFINITY;
         for step in first..=near.nearest {
-            let apart = self.stopped(a, near.warned[0], step) - self.stopped(b, near.warned[1], step);
+            let apart =
+                self.stopped(a, near.warned[0], step) - self.stopped(b, near.warned[1], step);
             kept_m = kept_m.min(apart.norm());
         }
         let seconds = |step: usize| step as f32 * STEP_S;

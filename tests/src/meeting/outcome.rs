@@ -139,7 +139,11 @@ impl std::fmt::Display for Summary {
                 f,
                 "{name}: {} meetings, {} too near although a stop would have kept apart, {} too near unavoidably, {} \
                  with a touch by own motion, {} stuck",
-                self.meetings[at], self.too_near[at], self.unavoidable[at], self.touches[at], self.stuck[at]
+                self.meetings[at],
+                self.too_near[at],
+                self.unavoidable[at],
+                self.touches[at],
+                self.stuck[at]
             )?;
         }
         writeln!(f, "{} with a touch of a vehicle that was carried off unheard", self.unforeseen)?;

@@ -16,7 +16,8 @@ pub(super) fn around(request: &DetourRequest, keep: &[KeepOutZone], own: &Plan) 
         keep.iter().all(|k| {
             let now_m = oracle::distance((here, here), (k.from, k.to));
             let apart_m = k.radius_m.min((now_m - 0.002).max(0.0));
-            let solid = if k.kind == ZoneKind::Descending { (k.from, k.from) } else { (k.from, k.to) };
+            let solid =
+                if k.kind == ZoneKind::Descending { (k.from, k.from) } else { (k.from, k.to) };
             oracle::distance((from, to), solid) >= apart_m
         })
     };
@@ -35,11 +36,12 @@ pub(super) fn around(request: &DetourRequest, keep: &[KeepOutZone], own: &Plan) 
                 }
             }
         }
-        let rests =
-            |at: &Point| keep.iter().all(|k| oracle::distance((*at, *at), (k.from, k.to)) >= k.radius_m);
-        let way = ways
-            .into_iter()
-            .find(|way| way.windows(2).all(|leg| clear(leg[0], leg[1])) && way.last().is_some_and(rests))?;
+        let rests = |at: &Point| {
+            keep.iter().all(|k| oracle::distance((*at, *at), (k.from, k.to)) >= k.radius_m)
+        };
+        let way = ways.into_iter().find(|way| {
+            way.windows(2).all(|leg| clear(leg[0], leg[1])) && way.last().is_some_and(rests)
+        })?;
         return along(&way, own, request.descent_m);
     }
     ways.push(vec![here, last]);

@@ -1,4 +1,5 @@
-//! Random meetings: which vehicle flies from where to where, by which plan, and what happens to them.
+//! Random meetings: which vehicle flies from where to where, by which plan, and what happens to
+//! them.
 
 mod happenings;
 mod passing;
@@ -13,8 +14,8 @@ use planner_core::schedule::{self, ScheduleWorkspace};
 use self::happenings::happenings;
 pub use self::passing::{PASSINGS, passing};
 pub use self::types::{
-    CLIMB_MPS, CRUISE_MPS, GATES, Happening, LIMIT_S, Lie, PLATFORM_M, Plan, SAFETY_M, SCHEDULE, START_S,
-    Scene, VEHICLES, Vehicle, WAYPOINTS, What,
+    CLIMB_MPS, CRUISE_MPS, GATES, Happening, LIMIT_S, Lie, PLATFORM_M, Plan, SAFETY_M, SCHEDULE,
+    START_S, Scene, VEHICLES, Vehicle, WAYPOINTS, What,
 };
 use self::ways::{KINDS, Shape, fits, flight, pads, way};
 use super::autopilot::{Catch, Failsafe};
@@ -49,7 +50,8 @@ pub fn scene(seed: u64) -> Scene {
     (0..).find_map(|draw| drawn(seed, draw)).expect("some draw has room for two")
 }
 
-/// The scene of a seed in which something catches a vehicle, at any time of its flight, and nothing else happens.
+/// The scene of a seed in which something catches a vehicle, at any time of its flight, and nothing
+/// else happens.
 pub fn caught(seed: u64) -> Scene {
     let mut scene = scene(seed);
     let mut dice = Dice::new(seed ^ 0xCA06);
@@ -87,8 +89,13 @@ fn drawn(seed: u64, draw: u64) -> Option<Scene> {
                 continue;
             }
             if on_plan {
-                let earliest =
-                    schedule::earliest_departure(&SCHEDULE, &next, 0.0, flights.iter(), &mut workspace);
+                let earliest = schedule::earliest_departure(
+                    &SCHEDULE,
+                    &next,
+                    0.0,
+                    flights.iter(),
+                    &mut workspace,
+                );
                 let Ok(depart_s) = earliest else { continue };
                 if depart_s > LATEST_S {
                     continue;
@@ -104,7 +111,8 @@ fn drawn(seed: u64, draw: u64) -> Option<Scene> {
     if flights.len() < 2 {
         return None;
     }
-    let vehicles = (0..flights.len()).map(|i| vehicle(&flights, i, on_plan, &mut workspace, &mut dice));
+    let vehicles =
+        (0..flights.len()).map(|i| vehicle(&flights, i, on_plan, &mut workspace, &mut dice));
     let vehicles: Vec<_> = vehicles.collect();
     let happenings = happenings(&vehicles, &mut dice);
     let delay = if dice.chance(0.5) { dice.real(0.0, 0.15) } else { dice.real(0.0, 0.9) };

@@ -1,15 +1,17 @@
 //! Every way in which a small fleet can lose vehicles and messages, searched breadth first.
 //!
-//! What vehicles decide is decided by the code that flies: [`Fleet`] and the messages that it makes and takes in. A tick is
-//! 7.5 s: the lease of 20 s is 3 ticks, the silence of 45 s is 6, and a lost vehicle counts as down as soon as it is silent. In
-//! a tick each vehicle takes in what reached it of what the others sent in the tick before (so much is a message late, and what
-//! it says of others is older still), decides, and photographs its next waypoint. A vehicle stands within a tick after its lease
-//! has run out, and lands after three. One clock may be a tick slow, and right again, at any time. A vehicle may die, or leave
-//! and say so. Each flies as fast as it may, or only to where it promised to hold: all mixtures of these are searched.
+//! What vehicles decide is decided by the code that flies: [`Fleet`] and the messages that it makes
+//! and takes in. A tick is 7.5 s: the lease of 20 s is 3 ticks, the silence of 45 s is 6, and a
+//! lost vehicle counts as down as soon as it is silent. In a tick each vehicle takes in what
+//! reached it of what the others sent in the tick before (so much is a message late, and what it
+//! says of others is older still), decides, and photographs its next waypoint. A vehicle stands
+//! within a tick after its lease has run out, and lands after three. One clock may be a tick slow,
+//! and right again, at any time. A vehicle may die, or leave and say so. Each flies as fast as it
+//! may, or only to where it promised to hold: all mixtures of these are searched.
 //!
 //! - One owner: no two vehicles may yet photograph the same waypoint.
-//! - Nothing is left out: whatever came before, where messages arrive from now on and some vehicle flies on, all is
-//!   photographed in the end, and the fleet comes to rest.
+//! - Nothing is left out: whatever came before, where messages arrive from now on and some vehicle
+//!   flies on, all is photographed in the end, and the fleet comes to rest.
 //!
 //! Planted errors must be found. `FLOCKMATE_MODEL=4` searches more; see `docs/safety.md`.
 
@@ -21,7 +23,8 @@ use links::partitions;
 use model::{FleetModel, Flight, MOST, Planted, Radio, SETTLES, State};
 use stateright::{Checker, Model};
 
-/// Searches until nothing new is reached, or each property has a counterexample. What was found, by property.
+/// Searches until nothing new is reached, or each property has a counterexample. What was found, by
+/// property.
 fn search(model: FleetModel) -> Vec<&'static str> {
     let FleetModel { count, radio, losses, slow, planted, .. } = model;
     let checker = model.checker().spawn_bfs().join();
@@ -77,7 +80,8 @@ fn four_vehicles_with_partitions() {
 #[test]
 fn stretches_with_any_messages_lost() {
     let stretches = |count, radio, losses, slow| {
-        let model = FleetModel { losses, slow, most: 1, ..FleetModel::new(count, radio, Planted::Nothing) };
+        let model =
+            FleetModel { losses, slow, most: 1, ..FleetModel::new(count, radio, Planted::Nothing) };
         assert_eq!(search(model), Vec::<&str>::new());
     };
     for slow in [None, Some(0), Some(1)] {
@@ -105,7 +109,8 @@ fn planted_errors_are_found() {
     }
 }
 
-/// Of two halves the one with the lowest id continues; else the larger one does. It photographs all, and the others land.
+/// Of two halves the one with the lowest id continues; else the larger one does. It photographs
+/// all, and the others land.
 #[test]
 fn of_parts_for_ever_one_goes_on() {
     for count in 2..=MOST {
@@ -126,10 +131,13 @@ fn of_parts_for_ever_one_goes_on() {
                 let flies = vehicle.flight == Flight::Flies;
                 assert_eq!(flies, wins(part(rank)), "{links:?}: {vehicle:?}");
             }
-            let taken =
-                (0..count).fold(0, |bits, rank| bits | known.vehicles[state.vehicles[rank] as usize].taken);
+            let taken = (0..count)
+                .fold(0, |bits, rank| bits | known.vehicles[state.vehicles[rank] as usize].taken);
             let all = (0..count).any(|rank| wins(part(rank)));
-            assert!(!all || taken.count_ones() as usize == model.whole.len(), "{links:?}: {taken:b}");
+            assert!(
+                !all || taken.count_ones() as usize == model.whole.len(),
+                "{links:?}: {taken:b}"
+            );
         }
     }
 }

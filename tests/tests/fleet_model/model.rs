@@ -77,7 +77,8 @@ pub struct Vehicle {
     pub stands: bool,
     /// Waypoints that it has photographed.
     pub taken: u32,
-    /// For how many ticks it has not heard each other one, where [`Planted::PresentAlone`] asks for that.
+    /// For how many ticks it has not heard each other one, where [`Planted::PresentAlone`] asks for
+    /// that.
     pub silent: [u8; MOST],
 }
 
@@ -136,7 +137,8 @@ pub struct FleetModel {
     /// Whose clock may be slow.
     pub slow: Option<usize>,
     pub planted: Planted,
-    /// So many waypoints of its part are a vehicle's path: of a longer one that is the first stretch.
+    /// So many waypoints of its part are a vehicle's path: of a longer one that is the first
+    /// stretch.
     pub most: usize,
     pub limits: FleetTimeouts,
     /// What the links may change to.
@@ -188,7 +190,8 @@ impl FleetModel {
 
     /// Up to where on its part it flies, in waypoints.
     fn end(&self, vehicle: &Vehicle) -> u16 {
-        let promise = vehicle.fleet.commitment_dm().filter(|_| self.planted != Planted::PromiseBroken);
+        let promise =
+            vehicle.fleet.commitment_dm().filter(|_| self.planted != Planted::PromiseBroken);
         promise.map_or(u16::MAX, |dm| dm / WAYPOINT_DM)
     }
 
@@ -260,7 +263,8 @@ impl FleetModel {
         let waypoint = self.path(&vehicle).0;
         let waypoint =
             waypoint.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
-        let promised = vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
+        let promised =
+            vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
         let advances = choice.advances || !vehicle.stands || promised;
         if let Some(waypoint) = waypoint.filter(|_| advances && self.flies(&vehicle)) {
             vehicle.taken |= 1 << waypoint;
@@ -275,7 +279,8 @@ impl FleetModel {
         roster.hash = 0;
         for rank in (0..self.count).filter(|rank| *rank != vehicle.rank) {
             let silent = &mut vehicle.silent[rank];
-            *silent = if vehicle.hears >> rank & 1 != 0 { 0 } else { (*silent + 1).min(SILENT as u8) };
+            *silent =
+                if vehicle.hears >> rank & 1 != 0 { 0 } else { (*silent + 1).min(SILENT as u8) };
             if u64::from(*silent) == SILENT {
                 roster.entries[rank].status = roster.entries[rank].status.max(MemberStatus::Left);
             }
@@ -343,18 +348,22 @@ impl FleetModel {
             Radio::Any => 0..1usize << senders.len(),
             Radio::Links(_) | Radio::Parts(_) => (1 << senders.len()) - 1..1 << senders.len(),
         };
-        let clocks: &[bool] = if self.slow == Some(vehicle.rank) { &[false, true] } else { &[false] };
+        let clocks: &[bool] =
+            if self.slow == Some(vehicle.rank) { &[false, true] } else { &[false] };
         for subset in subsets.filter(|_| vehicle.flight != Flight::Dead) {
             let arrived = (0..senders.len()).filter(|k| subset >> k & 1 != 0).map(|k| senders[k]);
-            let messages: Vec<(usize, Message)> =
-                arrived.map(|from| (from, known.messages[reach[from] as usize - 1].clone())).collect();
-            let heard: Vec<(usize, &Message)> = messages.iter().map(|(from, m)| (*from, m)).collect();
+            let messages: Vec<(usize, Message)> = arrived
+                .map(|from| (from, known.messages[reach[from] as usize - 1].clone()))
+                .collect();
+            let heard: Vec<(usize, &Message)> =
+                messages.iter().map(|(from, m)| (*from, m)).collect();
             for &slow in clocks {
                 for leaves in [false, true] {
                     if leaves && vehicle.flight == Flight::Down {
                         continue;
                     }
-                    let next = self.step(&vehicle, &heard, Choice { advances: false, slow, leaves });
+                    let next =
+                        self.step(&vehicle, &heard, Choice { advances: false, slow, leaves });
                     all.push((self.number(known, next), u8::from(leaves)));
                 }
             }
@@ -397,7 +406,8 @@ impl FleetModel {
                         .filter(|from| reach[*from] != 0)
                         .map(|from| (from, known.messages[reach[from] as usize - 1].clone()))
                         .collect();
-                    let heard: Vec<(usize, &Message)> = messages.iter().map(|(from, m)| (*from, m)).collect();
+                    let heard: Vec<(usize, &Message)> =
+                        messages.iter().map(|(from, m)| (*from, m)).collect();
                     let vehicle = known.vehicles[at as usize].clone();
                     let number = self.number(known, self.step(&vehicle, &heard, BEST));
                     known.best.insert((at, reach), number);
@@ -421,8 +431,9 @@ impl FleetModel {
                     (0..self.count).any(|rank| f(&known.vehicles[state.vehicles[rank] as usize]))
                 };
                 let flies = all(&|vehicle| vehicle.flight == Flight::Flies);
-                let taken = (0..self.count)
-                    .fold(0, |bits, rank| bits | known.vehicles[state.vehicles[rank] as usize].taken);
+                let taken = (0..self.count).fold(0, |bits, rank| {
+                    bits | known.vehicles[state.vehicles[rank] as usize].taken
+                });
                 if flies && taken.count_ones() as usize != self.whole.len() {
                     return false;
                 }

@@ -1,7 +1,8 @@
 //! The page of all distances and speeds that the code on board decides by: docs/margins.md.
 //!
-//! Every `const` of planner-core and companion whose name ends in a unit: its value, what it is for (its doc comment), and the
-//! files that use it. A name has one value: two of one name are an error.
+//! Every `const` of planner-core and companion whose name ends in a unit: its value, what it is for
+//! (its doc comment), and the files that use it. A name has one value: two of one name are an
+//! error.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -49,7 +50,9 @@ pub fn wrong() -> Result<Vec<String>> {
                 continue;
             }
             let name = item.ident.to_string();
-            let Some((_, unit)) = UNITS.into_iter().find(|(end, _)| name.ends_with(end)) else { continue };
+            let Some((_, unit)) = UNITS.into_iter().find(|(end, _)| name.ends_with(end)) else {
+                continue;
+            };
             if let Some(other) = names.insert(name.clone(), file.clone()) {
                 wrong.push(format!("{file}: {name} is the name of another one in {other}"));
             }
@@ -75,7 +78,9 @@ pub fn wrong() -> Result<Vec<String>> {
     if env::var_os("FLOCKMATE_WRITE").is_some() {
         fs::write(PAGE, &page)?;
     } else if fs::read_to_string(PAGE).ok().as_deref() != Some(&page) {
-        wrong.push(format!("{PAGE} is not that of the sources: FLOCKMATE_WRITE=1 cargo xtask structure"));
+        wrong.push(format!(
+            "{PAGE} is not that of the sources: FLOCKMATE_WRITE=1 cargo xtask structure"
+        ));
     }
     Ok(wrong)
 }
@@ -127,8 +132,10 @@ fn page(found: &BTreeMap<(String, String), Distance>) -> String {
     let mut before = "";
     for ((file, name), distance) in found {
         if file != before {
-            let _ =
-                write!(page, "\n`{file}`\n\n| name | value | unit | is | used in |\n|---|---|---|---|---|\n");
+            let _ = write!(
+                page,
+                "\n`{file}`\n\n| name | value | unit | is | used in |\n|---|---|---|---|---|\n"
+            );
             before = file;
         }
         let Distance { value, unit, reason, users } = distance;

@@ -12,7 +12,8 @@ const PASSED_ON: usize = 6;
 
 /// Every set of files that import each other: the imports within it.
 pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
-    let imports: Vec<BTreeSet<usize>> = (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
+    let imports: Vec<BTreeSet<usize>> =
+        (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
     let reach: Vec<BTreeSet<usize>> = (0..imports.len()).map(|at| reached(&imports, at)).collect();
     let mut seen: BTreeSet<usize> = BTreeSet::new();
     let mut found = Vec::new();
@@ -30,8 +31,9 @@ pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
 
 fn edges(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> Vec<String> {
     let name = |file: usize| tree.sources[file].path.display().to_string();
-    let of =
-        |from: usize| cycle.iter().filter(move |to| imports[from].contains(to)).map(move |to| (from, *to));
+    let of = |from: usize| {
+        cycle.iter().filter(move |to| imports[from].contains(to)).map(move |to| (from, *to))
+    };
     cycle
         .iter()
         .flat_map(|from| of(*from))
@@ -54,7 +56,8 @@ fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
     let source = &tree.sources[at];
     let mut paths = Paths { module: source.module.clone(), found: Vec::new() };
     source.items.iter().for_each(|item| paths.visit_item(item));
-    let files = paths.found.iter().filter_map(|(module, path)| resolve(tree, module, path, PASSED_ON));
+    let files =
+        paths.found.iter().filter_map(|(module, path)| resolve(tree, module, path, PASSED_ON));
     files.filter(|file| *file != at).collect()
 }
 
@@ -80,12 +83,15 @@ impl Visit<'_> for Paths {
     fn visit_item_use(&mut self, item: &ItemUse) {
         let passes_on = !matches!(item.vis, Visibility::Inherited);
         if !passes_on {
-            flatten(&item.tree, &mut Vec::new(), &mut |path, _| self.found.push((self.module.clone(), path)));
+            flatten(&item.tree, &mut Vec::new(), &mut |path, _| {
+                self.found.push((self.module.clone(), path))
+            });
         }
     }
 
     fn visit_path(&mut self, path: &syn::Path) {
-        let path_names: Vec<String> = path.segments.iter().map(|part| part.ident.to_string()).collect();
+        let path_names: Vec<String> =
+            path.segments.iter().map(|part| part.ident.to_string()).collect();
         if path_names.len() > 1 {
             self.found.push((self.module.clone(), path_names));
         }
@@ -135,18 +141,25 @@ fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) ->
             tree.modules.contains_key(&whole[..=module.len()]).then_some(whole)?
         }
     };
-    let length = (0..=whole.len()).rev().find(|length| tree.modules.contains_key(&whole[..*length]))?;
+    let length =
+        (0..=whole.len()).rev().find(|length| tree.modules.contains_key(&whole[..*length]))?;
     let file = tree.modules[&whole[..length]];
     match whole.get(length) {
-        Some(name) if passed_on > 0 => {
-            Some(passed(tree, &tree.sources[file], &whole[..length], name, passed_on).unwrap_or(file))
-        }
+        Some(name) if passed_on > 0 => Some(
+            passed(tree, &tree.sources[file], &whole[..length], name, passed_on).unwrap_or(file),
+        ),
         _ => Some(file),
     }
 }
 
 /// The file behind a `pub use` of this name.
-fn passed(tree: &Tree, source: &Source, module: &[String], name: &str, left: usize) -> Option<usize> {
+fn passed(
+    tree: &Tree,
+    source: &Source,
+    module: &[String],
+    name: &str,
+    left: usize,
+) -> Option<usize> {
     let mut behind = None;
     for item in &source.items {
         let Item::Use(item) = item else { continue };

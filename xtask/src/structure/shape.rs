@@ -17,7 +17,8 @@ const ARGUMENTS: usize = 6;
 const SETTINGS: &str = "settings: a field for each parameter that acts";
 const DRAWS: &str = "what is drawn follows from the order of the draws, which one body shows";
 
-const FIRMWARE: &str = "what the firmware remembers; each file of its folder changes what is its own";
+const FIRMWARE: &str =
+    "what the firmware remembers; each file of its folder changes what is its own";
 
 const MESSAGE: &str = "one match on the message id: an arm for each message";
 
@@ -25,7 +26,11 @@ const AT_LIMITS: &str = "one call after the other, each at its limits";
 
 /// Exceptions: file, name and reason.
 const EXCEPTIONS: &[(&str, &str, &str)] = &[
-    ("companion/src/autopilot/telemetry.rs", "Telemetry", "a telemetry record: what the autopilot said last"),
+    (
+        "companion/src/autopilot/telemetry.rs",
+        "Telemetry",
+        "a telemetry record: what the autopilot said last",
+    ),
     ("companion/src/autopilot/telemetry.rs", "handle_frame", MESSAGE),
     ("companion/src/companion/frames.rs", "handle_frame", MESSAGE),
     (
@@ -33,7 +38,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "guard_inputs",
         "a line for each fact that a guard of the table asks for",
     ),
-    ("companion/src/companion/steps.rs", "run_action", "one match: an arm for each action of the table"),
+    (
+        "companion/src/companion/steps.rs",
+        "run_action",
+        "one match: an arm for each action of the table",
+    ),
     ("companion/src/config.rs", "Config", SETTINGS),
     (
         "companion/src/guidance.rs",
@@ -55,7 +64,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "first_conflict",
         "one look at a neighbour, in the order of docs/safety.md",
     ),
-    ("companion/src/guidance/filter/look.rs", "filter", "one decision, in the order of docs/safety.md"),
+    (
+        "companion/src/guidance/filter/look.rs",
+        "filter",
+        "one decision, in the order of docs/safety.md",
+    ),
     (
         "companion/src/guidance/raw.rs",
         "next_raw_point",
@@ -73,10 +86,18 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "a record: a field for each fact that a guard of the table asks for",
     ),
     ("companion/src/mission/guard.rs", "is_met", "one match: an arm for each guard"),
-    ("companion/src/planner/coverage.rs", "plan_flights", "the steps of a coverage plan, in their order"),
+    (
+        "companion/src/planner/coverage.rs",
+        "plan_flights",
+        "the steps of a coverage plan, in their order",
+    ),
     ("companion/src/services/ftp.rs", "begin_request", "one match: an arm for each operation"),
     ("companion/src/storage/mission_file.rs", "parse", "the file, in the order of its parts"),
-    ("companion/src/storage/store/jobs.rs", "poll_request", "one match: an arm for each state of a job"),
+    (
+        "companion/src/storage/store/jobs.rs",
+        "poll_request",
+        "one match: an arm for each state of a job",
+    ),
     (
         "companion/src/swarm/detour.rs",
         "Detours",
@@ -94,7 +115,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("firmware/src/calls/limits_routes.rs", "call_detours", AT_LIMITS),
     ("sim-autopilot/src/ardupilot/params.rs", "Tuning", SETTINGS),
     ("sim-autopilot/src/px4/params.rs", "Tuning", SETTINGS),
-    ("host-sim/src/commands/companion.rs", "run", "the loop of a shell, in the order of the drain contract"),
+    (
+        "host-sim/src/commands/companion.rs",
+        "run",
+        "the loop of a shell, in the order of the drain contract",
+    ),
     ("sim-autopilot/src/ardupilot/mod.rs", "Copter", FIRMWARE),
     ("sim-autopilot/src/px4/mod.rs", "Commander", FIRMWARE),
     (
@@ -104,7 +129,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     ("host-sim/src/coverage/export.rs", "flight_items", "the items of a mission in their order"),
     ("tests/src/bin/deconfliction/cases.rs", "all", "a table of cases, a few lines each"),
-    ("tests/src/meeting/autopilot.rs", "Autopilot", "the whole state of a vehicle and its autopilot, flat"),
+    (
+        "tests/src/meeting/autopilot.rs",
+        "Autopilot",
+        "the whole state of a vehicle and its autopilot, flat",
+    ),
     ("tests/src/meeting/scene/happenings.rs", "happenings", DRAWS),
     ("tests/src/meeting/scene/ways.rs", "way", DRAWS),
     ("tests/src/swarms.rs", "drawn", DRAWS),
@@ -128,16 +157,21 @@ struct Shape {
 impl Shape {
     fn judge(&mut self, name: &str, count: usize, most: usize, of: &str) {
         if count > most {
-            let exception =
-                EXCEPTIONS.iter().find(|(file, exception, _)| *file == self.file && *exception == name);
+            let exception = EXCEPTIONS
+                .iter()
+                .find(|(file, exception, _)| *file == self.file && *exception == name);
             let reason = exception.map(|(_, _, reason)| *reason);
-            self.found.push((format!("{}: {name} has {count} {of}, more than {most}", self.file), reason));
+            self.found.push((
+                format!("{}: {name} has {count} {of}, more than {most}", self.file),
+                reason,
+            ));
         }
     }
 
     fn function(&mut self, signature: &Signature, lines: usize) {
         let name = signature.ident.to_string();
-        let arguments = signature.inputs.iter().filter(|input| matches!(input, FnArg::Typed(_))).count();
+        let arguments =
+            signature.inputs.iter().filter(|input| matches!(input, FnArg::Typed(_))).count();
         self.judge(&name, lines, LINES, "lines");
         self.judge(&name, arguments, ARGUMENTS, "arguments");
     }

@@ -51,10 +51,15 @@ impl Tree {
     fn read(&mut self, path: &Path, folder: &Path, module: &[String]) -> Result<()> {
         let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
-        let items: Vec<Item> = file.items.into_iter().filter(|item| !is_test(attributes(item))).collect();
+        let items: Vec<Item> =
+            file.items.into_iter().filter(|item| !is_test(attributes(item))).collect();
         let at = self.sources.len();
         self.modules.insert(module.to_vec(), at);
-        self.sources.push(Source { path: path.to_owned(), module: module.to_vec(), items: items.clone() });
+        self.sources.push(Source {
+            path: path.to_owned(),
+            module: module.to_vec(),
+            items: items.clone(),
+        });
         self.read_modules(&items, path, folder, module, at)
     }
 
@@ -79,7 +84,8 @@ impl Tree {
             let named = path_attribute(&child.attrs).map(|named| path.with_file_name(named));
             let places = [folder.join(format!("{name}.rs")), folder.join(&name).join("mod.rs")];
             let found = named.or_else(|| places.into_iter().find(|place| place.exists()));
-            let found = found.with_context(|| format!("{}: no file of mod {name}", path.display()))?;
+            let found =
+                found.with_context(|| format!("{}: no file of mod {name}", path.display()))?;
             self.read(&found, &folder.join(&name), &inner)?;
         }
         Ok(())
@@ -107,7 +113,9 @@ fn is_test(attributes: &[Attribute]) -> bool {
 fn path_attribute(attributes: &[Attribute]) -> Option<String> {
     attributes.iter().find_map(|attribute| {
         let syn::Meta::NameValue(pair) = &attribute.meta else { return None };
-        let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. }) = &pair.value else { return None };
+        let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. }) = &pair.value else {
+            return None;
+        };
         pair.path.is_ident("path").then(|| text.value())
     })
 }

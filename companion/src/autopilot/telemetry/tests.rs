@@ -1,4 +1,5 @@
-//! The autopilot's frame about random EKF origins: a place of the mission survives it, or the origin is not used.
+//! The autopilot's frame about random EKF origins: a place of the mission survives it, or the
+//! origin is not used.
 
 extern crate std;
 
@@ -32,7 +33,12 @@ fn heard(
 }
 
 /// Whether places about the mission's origin come back as they were sent, metres off at most.
-fn worst_m(telemetry: &Telemetry, kind: AutopilotKind, origin: &Geodetic, places: &[Point]) -> Option<f64> {
+fn worst_m(
+    telemetry: &Telemetry,
+    kind: AutopilotKind,
+    origin: &Geodetic,
+    places: &[Point],
+) -> Option<f64> {
     let ekf_origin = telemetry.ekf_origin?;
     let off = places.iter().map(|place| {
         let ned = telemetry.to_ned(origin, place).expect("an origin is known").cast::<f64>();
@@ -79,13 +85,19 @@ fn a_far_origin_takes_the_place_of_none_in_flight_and_leaves_none_on_the_ground(
         let (mut telemetry, _) = heard(AutopilotKind::Px4, origin, near.0, near.1, near.2);
         telemetry.armed = armed;
         telemetry.update_origin_trust();
-        let far = GPS_GLOBAL_ORIGIN_DATA { latitude: 410_000_000, longitude: near.1, altitude: near.2 };
+        let far =
+            GPS_GLOBAL_ORIGIN_DATA { latitude: 410_000_000, longitude: near.1, altitude: near.2 };
         let change = telemetry.handle_frame(Instant::ZERO, &origin, &frame(&far, 1));
         match armed {
             true => {
-                assert_eq!((change, telemetry.ekf_origin.is_some()), (TelemetryChange::OriginDoubted, true));
+                assert_eq!(
+                    (change, telemetry.ekf_origin.is_some()),
+                    (TelemetryChange::OriginDoubted, true)
+                );
             }
-            false => assert_eq!((change, telemetry.ekf_origin), (TelemetryChange::OriginFar(111), None)),
+            false => {
+                assert_eq!((change, telemetry.ekf_origin), (TelemetryChange::OriginFar(111), None))
+            }
         }
     }
 }

@@ -30,17 +30,28 @@ fn flies_guided_from_silence_to_the_goal() {
     let mut bench = Bench::ardupilot(config());
     bench.until(State::Ready, 6.0);
     for stream in ardupilot::STREAMS {
-        assert!(bench.commands.contains(&(511, f32::from(stream.0), stream.1, 0.0)), "stream {}", stream.0);
+        assert!(
+            bench.commands.contains(&(511, f32::from(stream.0), stream.1, 0.0)),
+            "stream {}",
+            stream.0
+        );
     }
     bench.start();
     bench.until(State::TakeOff, 10.0);
     let before = bench.setpoints.len();
     assert!(before >= 20, "a second of setpoints before Guided");
     bench.until(State::Climb, 6.0);
-    assert_eq!(bench.setpoints.len(), before, "a setpoint before the lift-off would cancel the take-off");
+    assert_eq!(
+        bench.setpoints.len(),
+        before,
+        "a setpoint before the lift-off would cancel the take-off"
+    );
     bench.until(State::Done, 60.0);
     assert_eq!(numbers(&bench), [176, 400, 22, 176]);
-    assert!(bench.commands.contains(&(176, 1.0, 4.0, 0.0)) && bench.commands.contains(&(176, 1.0, 9.0, 0.0)));
+    assert!(
+        bench.commands.contains(&(176, 1.0, 4.0, 0.0))
+            && bench.commands.contains(&(176, 1.0, 9.0, 0.0))
+    );
     // Home lies two metres below the pad; the climb is 1.5 m.
     assert!((bench.takeoff_m - 3.5).abs() < 0.01, "take-off to {} m above home", bench.takeoff_m);
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
@@ -94,7 +105,8 @@ fn a_pilot_is_never_fought_and_gets_the_current_position_back() {
     let asked = numbers(&bench).len();
     bench.enu += Point::new(0.0, 0.3, 0.0);
     bench.run(3.0);
-    // The stream that still runs takes effect at once when Guided is entered: it must hold the place.
+    // The stream that still runs takes effect at once when Guided is entered: it must hold the
+    // place.
     bench.mode = ardupilot::GUIDED;
     let at = bench.enu;
     bench.run(3.0);

@@ -1,5 +1,6 @@
-//! What interrupts a division, at random: whatever happens, a vehicle flies no part that is not its own any more, and an order of
-//! a person's outlasts the division. Vehicle 78 leaves; 77 agrees to everything, and its radio comes and goes.
+//! What interrupts a division, at random: whatever happens, a vehicle flies no part that is not its
+//! own any more, and an order of a person's outlasts the division. Vehicle 78 leaves; 77 agrees to
+//! everything, and its radio comes and goes.
 
 extern crate std;
 use std::format;
@@ -18,7 +19,8 @@ use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use crate::{Link, RosterEntry};
 
 /// Vehicle 77, where it is in no way.
-const FAR_AWAY: Option<(Point, u8, f32, u32)> = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
+const FAR_AWAY: Option<(Point, u8, f32, u32)> =
+    Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
 
 /// A place ahead on the vehicle's path, at this height.
 fn ahead(b: &Bench, height_m: f32) -> Point {
@@ -50,8 +52,15 @@ pub(super) fn own_roster(b: &Bench) -> RosterReport {
 pub(super) fn bytes(roster: &RosterReport, sequence: u8) -> Vec<u8> {
     let (mut payload, mut out) = ([0; roster::MAX_LEN], [0; MAX_FRAME_LEN]);
     let len = roster.encode(&mut payload);
-    let header = Header { system: roster.system_id, component: crate::COMPANION_COMPONENT, sequence };
-    let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], &mut out);
+    let header =
+        Header { system: roster.system_id, component: crate::COMPANION_COMPONENT, sequence };
+    let n = frame::encode_raw(
+        header,
+        TUNNEL_DATA::ID,
+        TUNNEL_DATA::EXTRA_CRC,
+        &payload[..len],
+        &mut out,
+    );
     out[..n].to_vec()
 }
 
@@ -80,11 +89,19 @@ impl Other {
             _ => RosterReport { hash: mine.hash, ..mine.clone() },
         };
         if known.divisions == mine.divisions {
-            known.entries[1] =
-                RosterReportEntry { commitment_dm: Some(50), holds: true, agrees: true, ..known.entries[1] };
+            known.entries[1] = RosterReportEntry {
+                commitment_dm: Some(50),
+                holds: true,
+                agrees: true,
+                ..known.entries[1]
+            };
             known.entries[2].status = MemberStatus::Left;
             let own = mine.entries[0];
-            if known.divisions == 0 && mine.hash != 0 && own.holds && own.status == MemberStatus::Alive {
+            if known.divisions == 0
+                && mine.hash != 0
+                && own.holds
+                && own.status == MemberStatus::Alive
+            {
                 self.counts_after = self.counts_after.saturating_sub(1);
             }
             if known.divisions == 0 && mine.hash != 0 && own.holds && self.counts_after == 0 {
@@ -147,7 +164,11 @@ impl Watch {
 
     fn happen(&mut self, b: &mut Bench, what: Happens) {
         use Happens::*;
-        self.log.push(format!("{:.2} s {:?}: {what:?}", b.now.as_micros() as f64 * 1e-6, b.state()));
+        self.log.push(format!(
+            "{:.2} s {:?}: {what:?}",
+            b.now.as_micros() as f64 * 1e-6,
+            b.state()
+        ));
         let order = |b: &mut Bench, command, param1| {
             b.acks.clear();
             b.command(command, param1, SYSTEM, crate::COMPANION_COMPONENT);
@@ -223,7 +244,8 @@ proptest::proptest! {
             if matches!(b.state(), PilotReturned | Paused) {
                 watch.happen(&mut b, Happens::Resume);
             }
-            // Its pilot gave it back while the autopilot was silent: whose it is, a person has to say.
+            // Its pilot gave it back while the autopilot was silent: whose it is, a person has to
+            // say.
             if b.state() == Aborted && b.armed && second == 40 {
                 watch.happen(&mut b, Happens::Land);
             }
@@ -251,7 +273,8 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
     }
 }
 
-/// Its part may yet be another's: above its pad a vehicle waits while one that takes part is silent.
+/// Its part may yet be another's: above its pad a vehicle waits while one that takes part is
+/// silent.
 #[test]
 fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     let mut b = over_a_field(true);
@@ -347,8 +370,9 @@ impl Lie {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 200 } else { 5000 }))]
-    /// Rosters of strangers, of another mission and in this vehicle's own name change nothing. One vehicle of the roster that lies
-    /// may end the flight, by a landing; it moves the vehicle nowhere.
+    /// Rosters of strangers, of another mission and in this vehicle's own name change nothing. One
+    /// vehicle of the roster that lies may end the flight, by a landing; it moves the vehicle
+    /// nowhere.
     #[test]
     fn lies_of_a_roster_land_a_vehicle_at_worst(
         waits in any::<bool>(),

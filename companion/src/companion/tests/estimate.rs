@@ -7,7 +7,8 @@ use crate::autopilot::AutopilotKind;
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
-/// An estimate that is worse than the margin leaves: no start; in flight slower, then a stop, and on again.
+/// An estimate that is worse than the margin leaves: no start; in flight slower, then a stop, and
+/// on again.
 #[test]
 fn the_pace_follows_the_estimate() {
     let fastest = |bench: &mut Bench, seconds: f32| {
@@ -15,7 +16,9 @@ fn the_pace_follows_the_estimate() {
         let begun = bench.setpoints.len();
         bench.run(seconds);
         let pairs = bench.setpoints[begun..].windows(2);
-        pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32()).fold(0.0, f32::max)
+        pairs
+            .map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32())
+            .fold(0.0, f32::max)
     };
     // The margin of 0.5 m leaves 0.25 m at cruise and 0.4 m at a crawl.
     for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
@@ -63,7 +66,11 @@ fn the_pace_follows_the_estimate() {
     bench.accuracy_m = None;
     bench.run(3.0);
     assert!(fastest(&mut bench, 2.0) < 0.05);
-    assert!(bench.texts.iter().any(|t| t == "Estimate of unknown accuracy: stopping"), "{:?}", bench.texts);
+    assert!(
+        bench.texts.iter().any(|t| t == "Estimate of unknown accuracy: stopping"),
+        "{:?}",
+        bench.texts
+    );
     bench.until(State::Land, 40.0);
 }
 

@@ -68,7 +68,8 @@ proptest::proptest! {
     }
 }
 
-/// What a hostile radio peer sends: a command of each kind, a parameter, a file request, a question, a place, an intent.
+/// What a hostile radio peer sends: a command of each kind, a parameter, a file request, a
+/// question, a place, an intent.
 fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
     use crate::link::frame::{Header, MAX_FRAME_LEN, encode};
     use mavlink::dialects::ardupilotmega::*;
@@ -89,7 +90,11 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
         0 => encode(header, &long(MavCmd::MAV_CMD_MISSION_START, 0.0, 0.0), &mut out),
         1 => encode(header, &long(MavCmd::MAV_CMD_NAV_LAND, 0.0, 0.0), &mut out),
         2 => encode(header, &long(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, 0.0), &mut out),
-        3 => encode(header, &long(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, f32::from(seed % 3), 0.0), &mut out),
+        3 => encode(
+            header,
+            &long(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, f32::from(seed % 3), 0.0),
+            &mut out,
+        ),
         4 => encode(header, &long(MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0, 1.0), &mut out),
         5 => {
             let obstacle = COMMAND_INT_DATA {
@@ -117,7 +122,10 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
         }
         7 => encode(
             header,
-            &PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPANION_COMPONENT },
+            &PARAM_REQUEST_LIST_DATA {
+                target_system: SYSTEM,
+                target_component: crate::COMPANION_COMPONENT,
+            },
             &mut out,
         ),
         8 => encode(header, &TIMESYNC_DATA { tc1: 0, ts1: i64::from(seed) + 1 }, &mut out),
@@ -127,8 +135,12 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
             let mut payload = [0; 251];
             (payload[0], payload[3]) = (seed, [3, 4, 6, 8][usize::from(seed % 4)]);
             let (target_system, target_component) = (SYSTEM, crate::COMPANION_COMPONENT);
-            let file =
-                FILE_TRANSFER_PROTOCOL_DATA { target_network: 0, target_system, target_component, payload };
+            let file = FILE_TRANSFER_PROTOCOL_DATA {
+                target_network: 0,
+                target_system,
+                target_component,
+                payload,
+            };
             encode(header, &file, &mut out)
         }
         12 => {
@@ -168,7 +180,8 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
     out[..len].to_vec()
 }
 
-/// System ids of hostile peers: of the roster, of nobody, the vehicle's own; never the ground station's.
+/// System ids of hostile peers: of the roster, of nobody, the vehicle's own; never the ground
+/// station's.
 fn hostile_id(seed: u8) -> u8 {
     match seed % 4 {
         0 => 77,
@@ -179,7 +192,8 @@ fn hostile_id(seed: u8) -> u8 {
 
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig::with_cases(48))]
-    /// On the pad nothing starts, in flight nothing changes, and the ground station is answered all the same.
+    /// On the pad nothing starts, in flight nothing changes, and the ground station is answered all
+    /// the same.
     #[test]
     fn hostile_radio_peers_command_nothing_and_starve_nothing(
         frames in proptest::collection::vec(proptest::prelude::any::<(u8, u8, u8, bool)>(), 1..400),
@@ -248,9 +262,10 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
-    /// Positions of ids that the roster does not name, anywhere, the goal included, for as long as they like: the vehicle comes
-    /// to the ground all the same, and where the strangers leave 0.4 m more than the safety distance beside the path, at its
-    /// goal: a vehicle that was stopped continues only with some room to spare.
+    /// Positions of ids that the roster does not name, anywhere, the goal included, for as long as
+    /// they like: the vehicle comes to the ground all the same, and where the strangers leave 0.4 m
+    /// more than the safety distance beside the path, at its goal: a vehicle that was stopped
+    /// continues only with some room to spare.
     #[test]
     fn strangers_deny_no_goal(
         places in proptest::collection::vec((5f32..19.0, 0f32..4.0, 0f32..5.0, 1u8..=255), 1..7),
@@ -290,7 +305,8 @@ fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
         ..Default::default()
     };
     let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
-    let header = crate::link::frame::Header { system, component: crate::COMPANION_COMPONENT, sequence };
+    let header =
+        crate::link::frame::Header { system, component: crate::COMPANION_COMPONENT, sequence };
     let len = crate::link::frame::encode(header, &data, &mut out);
     out[..len].to_vec()
 }
@@ -353,7 +369,8 @@ fn an_origin_that_moves_in_flight_lands_the_vehicle_where_it_is() {
 
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig::with_cases(64))]
-    /// GPS_GLOBAL_ORIGIN of the own system and component 1, sent by radio and forwarded by the autopilot to its other port.
+    /// GPS_GLOBAL_ORIGIN of the own system and component 1, sent by radio and forwarded by the
+    /// autopilot to its other port.
     #[test]
     fn forged_origins_move_no_vehicle(
         forged in proptest::collection::vec((0u8..=255, -30_000i32..30_000, -30_000i32..30_000, 0u8..12), 1..40),
@@ -399,7 +416,8 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
         .iter()
         .filter_map(crate::link::frame::Frame::decode::<GLOBAL_POSITION_INT_DATA>)
         .collect();
-    let intents: Vec<_> = bench.swarm.iter().filter_map(|f| Intent::decode(f.padded(), SYSTEM)).collect();
+    let intents: Vec<_> =
+        bench.swarm.iter().filter_map(|f| Intent::decode(f.padded(), SYSTEM)).collect();
     assert_eq!((places.len(), intents.len()), (5, 5));
     let last = &places[4];
     let place = planner_core::frames::Geodetic {

@@ -1,4 +1,5 @@
-//! Every state against every interruption, on the scripted autopilots; random sequences of them are in `random`.
+//! Every state against every interruption, on the scripted autopilots; random sequences of them are
+//! in `random`.
 
 extern crate std;
 use std::format;
@@ -55,8 +56,8 @@ fn bench(kind: AutopilotKind) -> Bench {
     bench
 }
 
-/// A bench in a state that can be interrupted; from there the vehicle stands still, so that nothing but the interruption
-/// moves the mission on.
+/// A bench in a state that can be interrupted; from there the vehicle stands still, so that nothing
+/// but the interruption moves the mission on.
 fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<Bench> {
     use State::*;
     let mut b = match state {
@@ -256,7 +257,12 @@ fn a_pause_holds_the_vehicle_on_its_pad_until_the_resume() {
             b.start();
         }
         b.run(12.0);
-        assert_eq!((b.state(), b.armed, b.on_ground()), (Scheduled, false, true), "{at:?}: {:?}", b.texts);
+        assert_eq!(
+            (b.state(), b.armed, b.on_ground()),
+            (Scheduled, false, true),
+            "{at:?}: {:?}",
+            b.texts
+        );
         assert_eq!(resume(&mut b), Some(ACCEPTED), "{at:?}");
         b.until(Done, 60.0);
     }
@@ -272,7 +278,13 @@ fn a_vehicle_that_is_landed_before_it_lifts_off_ends_on_the_ground() {
             b.run(tenths as f32 * 0.1);
             assert_eq!(order(&mut b, command, 0.0), Some(ACCEPTED), "{tenths}");
             b.run(25.0);
-            assert!(b.on_ground() && !b.armed, "{tenths}: {:?} at {:?}, {:?}", b.state(), b.enu, b.texts);
+            assert!(
+                b.on_ground() && !b.armed,
+                "{tenths}: {:?} at {:?}, {:?}",
+                b.state(),
+                b.enu,
+                b.texts
+            );
             assert_eq!(b.state(), State::Aborted);
         }
     }
@@ -322,7 +334,11 @@ fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
     b.run(40.0);
     let asked = b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count();
     assert!((18..=21).contains(&asked), "{asked}");
-    let said = b.texts.iter().filter(|t| *t == "Autopilot refuses to arm or disarm: 400 (result 4)").count();
+    let said = b
+        .texts
+        .iter()
+        .filter(|t| *t == "Autopilot refuses to arm or disarm: 400 (result 4)")
+        .count();
     assert!((1..=4).contains(&said), "{said} on two links, arming and disarming: {:?}", b.texts);
     assert_eq!(b.state(), State::Aborted);
     // Accepted at last.
@@ -400,7 +416,11 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
     };
     assert_eq!(send(0.0).0, State::Paused);
     let (state, acks) = send(1.0);
-    assert_eq!((state, acks), (State::Follow, std::vec![(193, ACCEPTED, 255, 190)]), "the same number");
+    assert_eq!(
+        (state, acks),
+        (State::Follow, std::vec![(193, ACCEPTED, 255, 190)]),
+        "the same number"
+    );
     let (state, acks) = send(0.0);
     assert_eq!(
         (state, acks),

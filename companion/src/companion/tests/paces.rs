@@ -1,5 +1,5 @@
-//! Fast flights that are stopped and continue at any moment, as over a field: the setpoint stays on its path, and on the curve
-//! that stops with it. Descents to the ground.
+//! Fast flights that are stopped and continue at any moment, as over a field: the setpoint stays on
+//! its path, and on the curve that stops with it. Descents to the ground.
 
 use planner_core::flight::Path;
 use proptest::prelude::ProptestConfig;
@@ -79,7 +79,8 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
-    /// A PX4 that lands by itself holds where it was when it was ordered to: the wind has carried it off by then.
+    /// A PX4 that lands by itself holds where it was when it was ordered to: the wind has carried
+    /// it off by then.
     #[test]
     fn a_px4_is_led_to_the_ground_and_touches_it_slowly(
         margin_m in 0.1f32..3.0,
@@ -118,7 +119,8 @@ proptest::proptest! {
             }
             for pair in bench.setpoints.windows(2) {
                 let sinks_mps = (pair[0].1.z - pair[1].1.z) / (pair[1].0 - pair[0].0).as_secs_f32();
-                // What is sent is smoothed, and slow a little later than the raw point: 0.61 m/s at the margin.
+                // What is sent is smoothed, and slow a little later than the raw point: 0.61 m/s at
+                // the margin.
                 let slow = pair[0].1.z > low_m - 0.3 || sinks_mps < 0.55;
                 proptest::prop_assert!(slow, "{kind:?} sinks at {sinks_mps} m/s at {} m", pair[0].1.z);
             }
@@ -128,7 +130,8 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
-    /// Others keep off a narrow strip of its path: it does not leave it before it is low, and no ground holds it up.
+    /// Others keep off a narrow strip of its path: it does not leave it before it is low, and no
+    /// ground holds it up.
     #[test]
     fn a_vehicle_that_nobody_hears_is_led_straight_down(
         (flown_s, end_m) in (0.5f32..4.0, 1.5f32..8.0),
@@ -172,8 +175,8 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
-    /// PX4 reports no ground contact while the setpoint stands, and the ground, or the estimate, may be higher than planned: a
-    /// vehicle on the ground must not stay in Follow.
+    /// PX4 reports no ground contact while the setpoint stands, and the ground, or the estimate,
+    /// may be higher than planned: a vehicle on the ground must not stay in Follow.
     #[test]
     fn a_descent_onto_higher_ground_ends_without_a_report_of_contact(
         higher_m in 0f32..1.5,

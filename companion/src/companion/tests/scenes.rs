@@ -38,7 +38,13 @@ struct Scenes {
 impl Scenes {
     /// After `script` the state `end` is reached within so many seconds.
     #[track_caller]
-    fn play(&mut self, mut bench: Bench, script: impl FnOnce(&mut Bench), end: State, seconds: f32) {
+    fn play(
+        &mut self,
+        mut bench: Bench,
+        script: impl FnOnce(&mut Bench),
+        end: State,
+        seconds: f32,
+    ) {
         script(&mut bench);
         bench.until(end, seconds);
         self.texts.append(&mut bench.texts);

@@ -1,4 +1,5 @@
-//! A vehicle that no other vehicle hears any more over an area is found where it last said that it may be.
+//! A vehicle that no other vehicle hears any more over an area is found where it last said that it
+//! may be.
 
 use super::State::*;
 use super::divisions::over_a_field;
@@ -15,7 +16,8 @@ fn beside_m(intent: &Intent, from: &Point, place: &Point) -> f32 {
     })
 }
 
-/// Whenever its radio fails, in its climb too, it is on the way of its last intent until it stands, and that is no longer than it flies.
+/// Whenever its radio fails, in its climb too, it is on the way of its last intent until it stands,
+/// and that is no longer than it flies.
 #[test]
 fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
     let (mut furthest_m, mut beyond) = (0.0_f32, 0);
@@ -37,7 +39,11 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
                     break;
                 }
                 let off_m = beside_m(&told, &from, &bench.enu);
-                assert!(off_m < 1.0, "{off_m} m off, {tenths}: {told:?} from {from:?}, {:?}", bench.enu);
+                assert!(
+                    off_m < 1.0,
+                    "{off_m} m off, {tenths}: {told:?} from {from:?}, {:?}",
+                    bench.enu
+                );
                 furthest_m = furthest_m.max((bench.enu - from).norm());
             }
         }

@@ -43,19 +43,25 @@ impl Guidance {
     ) -> ReachableSet {
         let velocity_mps = fpu::sqrtf(telemetry.velocity.norm_squared());
         // Beside the path it flies straight to where it continues.
-        let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
+        let joins =
+            self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
         let join = if joins { path.point_at(self.tracker.along_m) } else { None };
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
         let reference_mps = fpu::sqrtf(self.smoother.velocity().norm_squared());
         let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
-        let braking_m = bounds.braking.stop_m(speed_mps).max(self.smoother.stopping_distance_m(true));
+        let braking_m =
+            bounds.braking.stop_m(speed_mps).max(self.smoother.stopping_distance_m(true));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
         let here = self.smoother.position();
         let points = path.waypoints();
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);
             let behind = points[..next].iter().rev().map(|w| w.position);
-            return ReachableSet::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
+            return ReachableSet::along(
+                here,
+                core::iter::once(here).chain(join).chain(behind),
+                fly_m,
+            );
         }
         // The vehicle stops for its gates in any case.
         let join_m = join.map_or(0.0, |join| (join - here).length());
@@ -80,9 +86,11 @@ impl Guidance {
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.hears_nobody(now);
         let deaf = lands && hears_nobody;
-        // In a guided descent over an area it checks, as in a landing, for unheard vehicles on the ground.
+        // In a guided descent over an area it checks, as in a landing, for unheard vehicles on the
+        // ground.
         let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
-        let floor_m = scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
+        let floor_m =
+            scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m()))
@@ -117,31 +125,36 @@ impl Guidance {
             }
             let silent = met.lost || met.motion.age_s > safety::FRESH_S;
             if lands && silent {
-                // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
+                // A landing does not wait for a vehicle that is silent: only where it may have
+                // stopped counts.
                 (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
                 met.motion.rests_within_m = 0.0;
             }
             if follows && contact.is_leased() && !(by_gates || met.lost) {
                 contact.follow_unheard(&mut met.motion, bounds);
             }
-            let ahead_s = if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
+            let ahead_s =
+                if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
             let held = self.filter.landing_held_for(now);
             if lands && met.stranger && held >= LANDING_WAITED_LONG {
                 // A place that anybody may claim keeps no vehicle in the air.
                 continue;
             }
-            // Only beside its own pad, where no path leads back to it, or where nobody is heard on the way: everywhere else
-            // there is another place.
+            // Only beside its own pad, where no path leads back to it, or where nobody is heard on
+            // the way: everywhere else there is another place.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
-            // A place aside was sought by then, and over an area the end of its path is above its pad.
-            let at_end = || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
+            // A place aside was sought by then, and over an area the end of its path is above its
+            // pad.
+            let at_end =
+                || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
             let rests = lies && held >= LANDING_WAITED_LONG && (last_place || at_end());
             let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.motion.grounded || met.stands) && by_gates {
-                // Past a vehicle that waits the schedule leads as near as that and what both deviate.
+                // Past a vehicle that waits the schedule leads as near as that and what both
+                // deviate.
                 safety_m
             } else if met.motion.grounded {
                 let vertical = lands || state == State::Climb || self.is_descending();
@@ -153,13 +166,19 @@ impl Guidance {
             };
             // Where there is no other place what may have fallen beside it keeps nobody in the air.
             let fallen = Some(now).filter(|_| !lands_late);
-            let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
+            let may_lie_below =
+                |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
             let below = || {
                 floor_m.is_some_and(may_lie_below)
                     || (comes_down && contact.comes_home(now, &place, safety_m))
             };
             if silent && !hears_nobody && !met.stranger && below() {
-                return Some(FilterConflict { id: met.id, yields: true, stranger: false, rests: met.lost });
+                return Some(FilterConflict {
+                    id: met.id,
+                    yields: true,
+                    stranger: false,
+                    rests: met.lost,
+                });
             }
             let reach_m = apart_m + met.motion.reach_m(bounds, ahead_s);
             let away = own.away_from_box(&met.motion.position);
@@ -173,7 +192,8 @@ impl Guidance {
                 let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
                 let other = met.motion.reachable_set(bounds, if ahead { ahead_s } else { 0.0 });
                 let low = |low: Point| own.conflicts(&ReachableSet::at(low), &low, apart_m);
-                own.conflicts(&other, &met.motion.position, apart_m) || met.before_climb.is_some_and(low)
+                own.conflicts(&other, &met.motion.position, apart_m)
+                    || met.before_climb.is_some_and(low)
             };
             if near > MAX_NEAR_COMPARED || meets() {
                 let yields = self.yields_to(state, scene, &met);
@@ -192,8 +212,8 @@ impl Guidance {
         !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld)
     }
 
-    /// Whether this vehicle lets `met` go first: a vehicle on the plan goes before one off it, then the gates' order decides,
-    /// then the lower id goes.
+    /// Whether this vehicle lets `met` go first: a vehicle on the plan goes before one off it, then
+    /// the gates' order decides, then the lower id goes.
     pub(super) fn yields_to<const W: usize, const G: usize>(
         &self,
         state: State,

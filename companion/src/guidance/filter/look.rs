@@ -9,15 +9,17 @@ use super::super::limits::bounds;
 use super::super::motion::clamp_to;
 use super::super::{Guidance, GuidanceInputs};
 use super::{
-    FilterConflict, FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER, MAX_TURNING_SETPOINT_M,
-    MAX_TURNING_SETPOINT_MPS, RESUME_CLEAR_FOR, RESUME_CLEAR_M, STANDSTILL_WITHIN_M, SafetyFilter,
+    FilterConflict, FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER,
+    MAX_TURNING_SETPOINT_M, MAX_TURNING_SETPOINT_MPS, RESUME_CLEAR_FOR, RESUME_CLEAR_M,
+    STANDSTILL_WITHIN_M, SafetyFilter,
 };
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// Compares the way ahead with all neighbours; to be called once a step, before the reference moves.
+    /// Compares the way ahead with all neighbours; to be called once a step, before the reference
+    /// moves.
     pub(in crate::guidance) fn filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -33,16 +35,18 @@ impl Guidance {
         let position = &scene.telemetry.position;
         let ground_m = || self.landing_height_m(state, scene, plan);
         let top_m = || plan.path.point_at(0.0).map_or(position.z, |p| p.z);
-        let on_pad = matches!(state, State::Scheduled | State::Streaming | State::Engaging | State::Arming);
+        let on_pad =
+            matches!(state, State::Scheduled | State::Streaming | State::Engaging | State::Arming);
         let whole_column = on_pad || matches!(state, State::Land | State::LandingHeld);
         let way = match state {
             _ if on_pad => FlightDirection::Vertical { to_m: top_m(), speed_mps: 0.0 },
             State::Land | State::LandingHeld => {
                 FlightDirection::Vertical { to_m: ground_m(), speed_mps: 0.0 }
             }
-            State::Climb => {
-                FlightDirection::Vertical { to_m: top_m(), speed_mps: self.smoother.velocity().z.max(0.0) }
-            }
+            State::Climb => FlightDirection::Vertical {
+                to_m: top_m(),
+                speed_mps: self.smoother.velocity().z.max(0.0),
+            },
             State::Follow
             | State::Paused
             | State::Alone
@@ -83,7 +87,9 @@ impl Guidance {
         let extra_m = if stopped { RESUME_CLEAR_M } else { 0.0 };
         let bounds = bounds(&self.track);
         let set = match way {
-            FlightDirection::Vertical { to_m, .. } if whole_column => ReachableSet::vertical(*position, to_m),
+            FlightDirection::Vertical { to_m, .. } if whole_column => {
+                ReachableSet::vertical(*position, to_m)
+            }
             FlightDirection::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
                 let stop_m = if stopped { 0.0 } else { self.smoother.stopping_distance_m(true) };
@@ -107,10 +113,13 @@ impl Guidance {
         let own = OwnSet::new(&set, &mut legs);
         let mut found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if found.is_none() && on_pad {
-            // Armed on the ground it has a few seconds only: it waits where one falls silent that would bar the climb soon.
-            let apart_m = self.deconflict.safety_distance_m + bounds.speed_max_mps * bounds.silent_s;
+            // Armed on the ground it has a few seconds only: it waits where one falls silent that
+            // would bar the climb soon.
+            let apart_m =
+                self.deconflict.safety_distance_m + bounds.speed_max_mps * bounds.silent_s;
             let missed = neighbours.missed_beside(position, apart_m, now);
-            found = missed.map(|id| FilterConflict { id, yields: true, stranger: false, rests: false });
+            found =
+                missed.map(|id| FilterConflict { id, yields: true, stranger: false, rests: false });
         }
         if whole_column {
             self.filter.note_column(found.as_ref(), now);
@@ -131,13 +140,17 @@ impl Guidance {
                     self.filter.note_hindered(found.yields, now);
                 }
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
-                (self.filter.blocker_is_stranger, self.filter.blocker_rests) = (found.stranger, found.rests);
+                (self.filter.blocker_is_stranger, self.filter.blocker_rests) =
+                    (found.stranger, found.rests);
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
                 // Past a stranger it continues in the same stop, slowly.
-                let clear_for =
-                    if self.filter.passes_stranger(now) { MAX_STOP_FOR_STRANGER } else { RESUME_CLEAR_FOR };
+                let clear_for = if self.filter.passes_stranger(now) {
+                    MAX_STOP_FOR_STRANGER
+                } else {
+                    RESUME_CLEAR_FOR
+                };
                 if now - since >= clear_for {
                     self.filter.reset_stop();
                 }
@@ -158,7 +171,10 @@ impl Guidance {
         if self.returning && scene.detours {
             // The way back ends where a detour began: the height of that place above the ground is
             // unknown.
-            ground_m = plan.path.point_at(0.0).map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
+            ground_m = plan
+                .path
+                .point_at(0.0)
+                .map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
         }
         // Between pad and goal the ground may be lower than below either.
         let lands = matches!(state, State::Land | State::LandingHeld);
@@ -166,15 +182,16 @@ impl Guidance {
         if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }
     }
 
-    /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
-    /// reference that turns back leaves the setpoint on its way.
+    /// Whether the vehicle flies back along its path, or stands and is about to. What is still to
+    /// be flown forward counts first: a reference that turns back leaves the setpoint on its way.
     fn is_flying_back<const W: usize>(&self, path: &Path<W>) -> bool {
         if self.tracker.along_m > self.setpoint_m + MAX_TURNING_SETPOINT_M {
             return false;
         }
         let velocity = self.smoother.velocity();
         if velocity.norm_squared() > MAX_TURNING_SETPOINT_MPS * MAX_TURNING_SETPOINT_MPS {
-            let beside = |by_m: f32| path.point_at(clamp_to(self.setpoint_m + by_m, 0.0, path.length_m()));
+            let beside =
+                |by_m: f32| path.point_at(clamp_to(self.setpoint_m + by_m, 0.0, path.length_m()));
             let onward = match (beside(-MAX_TURNING_SETPOINT_M), beside(MAX_TURNING_SETPOINT_M)) {
                 (Some(from), Some(to)) => velocity.dot(&(to - from)),
                 _ => 0.0,
@@ -197,8 +214,9 @@ impl Guidance {
         let id = self.advice.waiting_for;
         let along_m = self.tracker.along_m;
         let gate = |plan: &VehiclePlan<W, G>| {
-            let near =
-                |at_m: f32| (along_m - STANDSTILL_WITHIN_M..along_m + STANDSTILL_WITHIN_M).contains(&at_m);
+            let near = |at_m: f32| {
+                (along_m - STANDSTILL_WITHIN_M..along_m + STANDSTILL_WITHIN_M).contains(&at_m)
+            };
             plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
         };
         if matches!(state, State::Follow | State::Blocked | State::Replanning)
@@ -207,7 +225,8 @@ impl Guidance {
             && !scene.plan.is_some_and(gate)
         {
             self.filter.note_hindered(id < scene.id, now);
-            (self.filter.yields, self.filter.blocker_rests) = (id < scene.id, neighbours.is_at_rest(id, now));
+            (self.filter.yields, self.filter.blocker_rests) =
+                (id < scene.id, neighbours.is_at_rest(id, now));
         }
     }
 }

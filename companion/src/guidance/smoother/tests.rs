@@ -1,4 +1,5 @@
-//! The smoother over random paths, paces and steps: what it makes of them is finite, smooth, inside the fence and on the path.
+//! The smoother over random paths, paces and steps: what it makes of them is finite, smooth, inside
+//! the fence and on the path.
 
 extern crate std;
 
@@ -82,8 +83,8 @@ proptest! {
             if let Some((low, high)) = fence {
                 prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]));
             }
-            // Corners are rounded, stops are not overshot: never far from the path that the raw point has drawn, though
-            // every seventh step of a hairpin is late.
+            // Corners are rounded, stops are not overshot: never far from the path that the raw
+            // point has drawn, though every seventh step of a hairpin is late.
             if fence.is_none() && step % 16 == 0 {
                 let place = smoother.position();
                 let near = path.project(&place, tracker.along_m, path.length_m());

@@ -12,7 +12,11 @@ const HEADER: Header = Header { system: 7, component: 1, sequence: 3 };
 
 fn heartbeat(sequence: u8) -> Vec<u8> {
     let mut out = [0; MAX_FRAME_LEN];
-    let data = HEARTBEAT_DATA { custom_mode: 0x0006_0000, mavlink_version: 3, ..HEARTBEAT_DATA::default() };
+    let data = HEARTBEAT_DATA {
+        custom_mode: 0x0006_0000,
+        mavlink_version: 3,
+        ..HEARTBEAT_DATA::default()
+    };
     let len = encode(Header { sequence, ..HEADER }, &data, &mut out);
     out[..len].to_vec()
 }
@@ -20,7 +24,8 @@ fn heartbeat(sequence: u8) -> Vec<u8> {
 /// A frame of an id no dialect here knows, its payload full of start bytes.
 fn unknown() -> Vec<u8> {
     let mut out = [0; MAX_FRAME_LEN];
-    let len = encode_raw(HEADER, 0x00F0_F0F0, 99, &[0xFD, 200, 0, 0xFD, 30, 0, 0, 0xFE, 9, 1], &mut out);
+    let len =
+        encode_raw(HEADER, 0x00F0_F0F0, 99, &[0xFD, 200, 0, 0xFD, 30, 0, 0, 0xFE, 9, 1], &mut out);
     out[..len].to_vec()
 }
 
@@ -47,7 +52,11 @@ fn what_is_encoded_comes_back() {
     assert_eq!(frames[0].decode::<SYSTEM_TIME_DATA>(), Some(sent));
     assert_eq!(frames[0].decode::<HEARTBEAT_DATA>(), None);
     assert_eq!((frames[0].system, frames[0].component, frames[0].sequence), (7, 1, 3));
-    assert_eq!(encode(HEADER, &SYSTEM_TIME_DATA::default(), &mut out[..12]), 0, "too small a buffer");
+    assert_eq!(
+        encode(HEADER, &SYSTEM_TIME_DATA::default(), &mut out[..12]),
+        0,
+        "too small a buffer"
+    );
 }
 
 #[test]
@@ -130,8 +139,8 @@ fn every_id_of_the_dialect_is_known() {
 }
 
 proptest! {
-    /// Whatever the bytes and however they are cut, nothing panics, the buffer never overflows, and undamaged frames
-    /// in quiet surroundings still arrive.
+    /// Whatever the bytes and however they are cut, nothing panics, the buffer never overflows, and
+    /// undamaged frames in quiet surroundings still arrive.
     #[test]
     fn hostile_bytes_are_survived(
         noise in proptest::collection::vec(prop_oneof![Just(V1_START), Just(V2_START), Just(0u8), any::<u8>()], 0..900),
@@ -164,7 +173,8 @@ proptest! {
     }
 }
 
-/// The rule of the module's documentation, read off the whole stream: where each frame starts, and its sequence number.
+/// The rule of the module's documentation, read off the whole stream: where each frame starts, and
+/// its sequence number.
 fn reference(stream: &[u8]) -> Vec<(usize, u8)> {
     let (mut found, mut at) = (Vec::new(), 0);
     while at < stream.len() {
@@ -225,7 +235,8 @@ fn whole_frame() -> impl Strategy<Value = Vec<u8>> {
     )
 }
 
-/// What may lie between frames: noise, false starts, headers alone, frames cut, damaged, or of an unknown id.
+/// What may lie between frames: noise, false starts, headers alone, frames cut, damaged, or of an
+/// unknown id.
 fn garbage() -> impl Strategy<Value = Vec<u8>> {
     let byte = prop_oneof![Just(V1_START), Just(V2_START), Just(0u8), any::<u8>()];
     prop_oneof![
@@ -252,8 +263,9 @@ fn garbage() -> impl Strategy<Value = Vec<u8>> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
-    /// Garbage of any kind between frames loses no whole frame, however the stream is cut into chunks. A candidate in the
-    /// garbage whose checksum is right by chance is a frame: the reference finds it too.
+    /// Garbage of any kind between frames loses no whole frame, however the stream is cut into
+    /// chunks. A candidate in the garbage whose checksum is right by chance is a frame: the
+    /// reference finds it too.
     #[test]
     fn garbage_between_frames_loses_none(
         parts in proptest::collection::vec((garbage(), whole_frame()), 1..12),
@@ -266,7 +278,8 @@ proptest! {
             stream.extend(frame);
         }
         let expected = reference(&stream);
-        // Two checksums of 16 bits agree by chance now and then; a signature's or a cut frame's candidates may too.
+        // Two checksums of 16 bits agree by chance now and then; a signature's or a cut frame's
+        // candidates may too.
         let by_chance = expected.iter().any(|(at, _)| !starts.contains(at));
         for at in &starts {
             prop_assert!(by_chance || expected.iter().any(|(found, _)| found == at), "the reference loses byte {at}");
@@ -286,7 +299,8 @@ proptest! {
         prop_assert_eq!(framer.expires_at(), None);
     }
 
-    /// A frame is given out at most a lifetime and an eighth after its last byte, whatever precedes it and however slowly bytes come.
+    /// A frame is given out at most a lifetime and an eighth after its last byte, whatever precedes
+    /// it and however slowly bytes come.
     #[test]
     fn a_frame_is_held_back_for_a_lifetime_at_most(
         before in proptest::collection::vec(garbage(), 0..8),

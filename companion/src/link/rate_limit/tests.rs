@@ -73,8 +73,8 @@ impl Greedy {
         let now = self.bench.now;
         let mut read = [0; MAX_READ];
         while let Some(request) = self.bench.companion.poll_flash() {
-            let outcome =
-                obey(&mut self.flash, request, ErasePermission::Allowed, &mut read).expect("no power cut");
+            let outcome = obey(&mut self.flash, request, ErasePermission::Allowed, &mut read)
+                .expect("no power cut");
             self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
         }
         self.bench.drain();
@@ -99,8 +99,10 @@ impl Greedy {
     /// Most bytes within any second.
     fn most_in_a_second(&self) -> u32 {
         let second = |from: Instant| {
-            let within =
-                self.sent.iter().filter(|(at, _)| *at >= from && *at - from < Duration::from_secs(1));
+            let within = self
+                .sent
+                .iter()
+                .filter(|(at, _)| *at >= from && *at - from < Duration::from_secs(1));
             within.map(|(_, bytes)| *bytes as u32).sum()
         };
         self.sent.iter().map(|(at, _)| second(*at)).max().unwrap_or_default()
@@ -125,7 +127,11 @@ fn the_radio_gets_no_more_whatever_is_asked() {
         ground.most_in_a_second()
     );
     assert!(ground.bytes() <= 20 * (state_bytes_per_s(HZ) + DISARMED_BYTES_PER_S) + saved);
-    assert!(ground.bytes() > 20 * DISARMED_BYTES_PER_S / 2, "it was asked for more: {}", ground.bytes());
+    assert!(
+        ground.bytes() > 20 * DISARMED_BYTES_PER_S / 2,
+        "it was asked for more: {}",
+        ground.bytes()
+    );
 
     let mut air = Greedy::new(Bench::following(config()));
     air.bench.stuck = true;
@@ -136,7 +142,11 @@ fn the_radio_gets_no_more_whatever_is_asked() {
         "{}",
         air.most_in_a_second()
     );
-    assert!(air.bytes() <= 20 * (state_bytes_per_s(HZ) + ARMED_BYTES_PER_S) + saved, "{}", air.bytes());
+    assert!(
+        air.bytes() <= 20 * (state_bytes_per_s(HZ) + ARMED_BYTES_PER_S) + saved,
+        "{}",
+        air.bytes()
+    );
     assert!(air.told >= 20 * usize::from(HZ) - 1, "the state goes out all the same: {}", air.told);
 }
 
@@ -151,11 +161,15 @@ fn state_is_as_long_as_said() {
     bench.drain();
     // Ten seconds; this plan has fewer points than an intent holds.
     assert!(
-        bench.bytes() <= 10 * state_bytes_per_s(HZ) && bench.bytes() > 10 * state_bytes_per_s(HZ) / 3,
+        bench.bytes() <= 10 * state_bytes_per_s(HZ)
+            && bench.bytes() > 10 * state_bytes_per_s(HZ) / 3,
         "{}",
         bench.bytes()
     );
-    assert_eq!(STATE_BYTES as usize, (28 + 12) + (5 + 32 + 12 * crate::link::intent::MAX_POINTS + 12));
+    assert_eq!(
+        STATE_BYTES as usize,
+        (28 + 12) + (5 + 32 + 12 * crate::link::intent::MAX_POINTS + 12)
+    );
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! The camera: the autopilot is commanded to trigger it along the stretches that are photographed.
 //!
-//! By distance, `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the trigger on at a stretch's first place, with a picture at once,
-//! and off at its last, with another. By waypoint, `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands go one after the
-//! other and are repeated until they are acknowledged. A vehicle that leaves its path switches the trigger off; where it comes
-//! back it continues with a picture at once, so that no gap is wider than the spacing.
+//! By distance, `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the trigger on at a stretch's first place,
+//! with a picture at once, and off at its last, with another. By waypoint,
+//! `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands go one after the other and are
+//! repeated until they are acknowledged. A vehicle that leaves its path switches the trigger off;
+//! where it comes back it continues with a picture at once, so that no gap is wider than the
+//! spacing.
 
 use heapless::Deque;
 use libm::atan2f;
@@ -92,7 +94,8 @@ impl CameraControl {
         if photographs.trigger != Trigger::None {
             let beside = along.place == PathRelation::Beside;
             if core::mem::replace(&mut self.beside, beside) != beside {
-                // Pictures begin again where it leaves its path, and where it comes back: neither place may lie between two.
+                // Pictures begin again where it leaves its path, and where it comes back: neither
+                // place may lie between two.
                 self.beside_m = 0.0;
                 self.switch_off();
             }
@@ -190,8 +193,8 @@ impl CameraControl {
     }
 
     pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
-        let waits =
-            self.sent_at.is_some() && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
+        let waits = self.sent_at.is_some()
+            && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
         if !waits {
             return;
         }

@@ -1,7 +1,8 @@
 //! What the server remembers of requests that it must not obey twice.
 //!
-//! A repeated request is known for [`DUPLICATE_WINDOW`] by all that is in it. MAVSDK repeats under a new sequence number, after up to 4 s: so
-//! what closing a session came to is answered for [`CLOSED_SESSION_WINDOW`] under any number, until its client opens the next.
+//! A repeated request is known for [`DUPLICATE_WINDOW`] by all that is in it. MAVSDK repeats under
+//! a new sequence number, after up to 4 s: so what closing a session came to is answered for
+//! [`CLOSED_SESSION_WINDOW`] under any number, until its client opens the next.
 
 use super::packet::{NakError, Request, RequestFingerprint, op, request_fingerprint};
 use crate::time::{Duration, Instant};
@@ -40,11 +41,16 @@ struct ClosedSession {
 }
 
 impl DuplicateDetection {
-    /// Remembers the outcome of a request: TerminateSession by its session, any other request by its whole content.
+    /// Remembers the outcome of a request: TerminateSession by its session, any other request by
+    /// its whole content.
     pub fn remember(&mut self, request: &Request, outcome: Outcome, at: Instant) {
         if request.opcode == op::TERMINATE {
-            self.closed =
-                Some(ClosedSession { client: request.client, session: request.session, outcome, at });
+            self.closed = Some(ClosedSession {
+                client: request.client,
+                session: request.session,
+                outcome,
+                at,
+            });
         } else {
             self.done[self.next] =
                 Some(AnsweredRequest { request: request_fingerprint(request), outcome, at });
@@ -55,7 +61,8 @@ impl DuplicateDetection {
     /// Outcome of the same request if it was answered a short time ago.
     pub fn previous_outcome(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let print = request_fingerprint(request);
-        let known = |done: &&AnsweredRequest| done.request == print && now - done.at < DUPLICATE_WINDOW;
+        let known =
+            |done: &&AnsweredRequest| done.request == print && now - done.at < DUPLICATE_WINDOW;
         self.done.iter().flatten().find(known).map(|done| done.outcome)
     }
 

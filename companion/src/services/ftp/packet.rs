@@ -1,5 +1,5 @@
-//! The packet inside a FILE_TRANSFER_PROTOCOL: 12 bytes of header (sequence u16, session, opcode, size, opcode answered, burst
-//! complete, 0, offset u32), then at most 239 of data.
+//! The packet inside a FILE_TRANSFER_PROTOCOL: 12 bytes of header (sequence u16, session, opcode,
+//! size, opcode answered, burst complete, 0, offset u32), then at most 239 of data.
 
 use crate::link::frame::Frame;
 use crate::storage::store::{File, UploadError, crc32};
@@ -135,8 +135,10 @@ impl Request {
     /// The path it names, without slashes around it; a zero ends it.
     pub fn path(&self) -> &[u8] {
         let path = self.bytes().split(|b| *b == 0).next().unwrap_or_default();
-        let path =
-            path.strip_prefix(b".").filter(|rest| rest.first().is_none_or(|b| *b == b'/')).unwrap_or(path);
+        let path = path
+            .strip_prefix(b".")
+            .filter(|rest| rest.first().is_none_or(|b| *b == b'/'))
+            .unwrap_or(path);
         let start = path.iter().position(|b| *b != b'/').unwrap_or(path.len());
         &path[start..]
     }

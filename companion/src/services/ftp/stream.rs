@@ -45,5 +45,7 @@ impl FtpBurst {
 
 /// A request of one packet, or that of the next packet of the burst which it asked for.
 pub fn next_request(request: &Request, stream: Option<&FtpBurst>) -> Request {
-    stream.filter(|stream| stream.request.is_same_request(request)).map_or(*request, FtpBurst::next_request)
+    stream
+        .filter(|stream| stream.request.is_same_request(request))
+        .map_or(*request, FtpBurst::next_request)
 }

@@ -99,7 +99,8 @@ impl World {
         }
     }
 
-    /// A few milliseconds: what is under way arrives in some order, the server works, its answers come back.
+    /// A few milliseconds: what is under way arrives in some order, the server works, its answers
+    /// come back.
     fn step(&mut self) {
         self.now = self.now + Duration::from_millis(5);
         while !self.under_way.is_empty() {
@@ -142,7 +143,8 @@ impl World {
                 }
                 continue;
             };
-            let outcome = obey(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
+            let outcome =
+                obey(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
             if let Some(answer) = self.store.handle_outcome(outcome.map(|len| &read[..len])) {
                 self.ftp.handle_read_outcome(answer);
             }
@@ -174,10 +176,12 @@ impl World {
         let opened = self.ask(0, op::CREATE, 0, name.as_bytes());
         assert_eq!(opened.opcode, ACK, "{opened:?}");
         let session = opened.session;
-        // By the sequence number of the answer: late answers of an upload before this one mean nothing.
+        // By the sequence number of the answer: late answers of an upload before this one mean
+        // nothing.
         let mut missing: BTreeMap<u16, Vec<u8>> = BTreeMap::new();
         for (i, part) in file.chunks(piece).enumerate() {
-            let packet = self.packet(session, op::WRITE, part.len() as u8, (i * piece) as u32, part);
+            let packet =
+                self.packet(session, op::WRITE, part.len() as u8, (i * piece) as u32, part);
             missing.insert(self.sequence, packet);
         }
         for _ in 0..20_000 {
@@ -220,7 +224,10 @@ impl World {
 /// CRC-32 as clients compute it: from 0, not inverted.
 fn client_crc(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0, |crc: u32, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 })
+        (0..8).fold(
+            crc ^ u32::from(*byte),
+            |c, _| if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 },
+        )
     })
 }
 
@@ -239,7 +246,12 @@ fn a_roadmap_goes_up_and_comes_back_over_any_link() {
         assert_eq!(sum.data, client_crc(&file).to_le_bytes());
         assert_eq!(sum.session, 9, "of no session: echoed");
         world.restart();
-        assert!(world.store.roadmap().is_some_and(|extent| extent.end - extent.start == file.len() as u32));
+        assert!(
+            world
+                .store
+                .roadmap()
+                .is_some_and(|extent| extent.end - extent.start == file.len() as u32)
+        );
     }
 }
 
@@ -287,7 +299,8 @@ fn a_burst_that_ends_with_a_whole_packet_says_where_the_end_is() {
     world.heard.clear();
     world.send(&request);
     (0..20).for_each(|_| world.step());
-    let heard: Vec<_> = world.heard.iter().map(|p| (p.sequence, p.offset as usize, p.opcode)).collect();
+    let heard: Vec<_> =
+        world.heard.iter().map(|p| (p.sequence, p.offset as usize, p.opcode)).collect();
     let mut want: Vec<_> = (0..packets).map(|i| (first + i as u16, from + i * size, ACK)).collect();
     want.push((first + packets as u16, file.len(), NAK));
     assert_eq!(heard, want);
@@ -311,7 +324,10 @@ fn what_is_asked_wrongly_is_refused_as_the_protocol_says() {
     no(world.ask(1, op::READ, 0, &[]), 4);
     no(world.ask(1, op::WRITE, 0, &[1]), 4);
     no(world.ask(1, op::TERMINATE, 0, &[]), 4);
-    assert_eq!(world.upload("mission.bin", &crate::testing::fake_flash::mission(9), 100).opcode, ACK);
+    assert_eq!(
+        world.upload("mission.bin", &crate::testing::fake_flash::mission(9), 100).opcode,
+        ACK
+    );
     let listed = world.ask(0, op::LIST, 0, b"/").data;
     assert_eq!(listed, b"Fmission.bin\t396\0");
     no(world.ask(0, op::LIST, 1, b"/"), 6);
@@ -380,7 +396,8 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
 
-/// Asks, and again after 4 s each, under the same sequence number or a new one; the answers' opcodes.
+/// Asks, and again after 4 s each, under the same sequence number or a new one; the answers'
+/// opcodes.
 fn ask_three_times(world: &mut World, renumbers: bool, opcode: u8, data: &[u8]) -> [u8; 3] {
     let mut request = world.packet(0, opcode, data.len() as u8, 0, data);
     [(); 3].map(|()| {
@@ -462,12 +479,13 @@ fn any_packets_in_any_order_are_survived() {
         for _ in 0..400 {
             let mut data = [0; 60];
             data.iter_mut().for_each(|byte| *byte = world.rng.next_u32() as u8);
-            let name: &[u8] =
-                [&b"roadmap.bin"[..], b"/mission.bin", &data, b""][world.rng.next_u32() as usize % 4];
+            let name: &[u8] = [&b"roadmap.bin"[..], b"/mission.bin", &data, b""]
+                [world.rng.next_u32() as usize % 4];
             let session = (world.rng.next_u32() % 3) as u8;
             let opcode = (world.rng.next_u32() % 18) as u8;
             let offset = world.rng.next_u32() >> (world.rng.next_u32() % 32);
-            let size = if world.chance(200) { name.len() as u8 } else { world.rng.next_u32() as u8 };
+            let size =
+                if world.chance(200) { name.len() as u8 } else { world.rng.next_u32() as u8 };
             // Removing is what it says it is; here everything else must leave the file alone.
             if opcode != op::REMOVE {
                 let packet = world.packet(session, opcode, size, offset, name);

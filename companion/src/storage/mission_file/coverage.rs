@@ -1,7 +1,8 @@
-//! The block of a coverage mission: the area, how it is photographed, and each vehicle's share (CPP §3; byte by byte in
-//! `companion/README.md`).
+//! The block of a coverage mission: the area, how it is photographed, and each vehicle's share (CPP
+//! §3; byte by byte in `companion/README.md`).
 //!
-//! What follows from these numbers is computed: lanes, routes, flights. POWELL's shares W are planned on the desk.
+//! What follows from these numbers is computed: lanes, routes, flights. POWELL's shares W are
+//! planned on the desk.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};
@@ -129,7 +130,11 @@ impl CoverageParts<'_> {
         let (head, rest) = out.split_at_mut(HEAD_LEN);
         put_numbers(head, 12, numbers);
         let (shares, rest) = rest.split_at_mut(self.shares.len() * SHARE_LEN);
-        put_numbers(shares, 0, self.shares.iter().flat_map(|s| [s.weight, s.climb_mps, s.descend_mps]));
+        put_numbers(
+            shares,
+            0,
+            self.shares.iter().flat_map(|s| [s.weight, s.climb_mps, s.descend_mps]),
+        );
         let (rings, vertices) = rest.split_at_mut(self.rings.len() * RING_LEN);
         for (to, ring) in rings.chunks_exact_mut(RING_LEN).zip(self.rings) {
             to[..2].copy_from_slice(&ring.end.to_le_bytes());
@@ -149,7 +154,8 @@ pub const fn encoded_len(vehicles: usize, rings: usize, vertices: usize) -> usiz
     HEAD_LEN + vehicles * SHARE_LEN + rings * RING_LEN + vertices * VERTEX_LEN
 }
 
-/// A checked block over borrowed bytes. Whether its rings are an area, [`planner_core::coverage::area::Area::new`] says.
+/// A checked block over borrowed bytes. Whether its rings are an area,
+/// [`planner_core::coverage::area::Area::new`] says.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverageView<'a> {
     header: CoverageHeader,
@@ -164,11 +170,13 @@ pub struct CoverageView<'a> {
 const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
-    /// A vehicle that no other vehicle hears any more is down after so many seconds, from the highest layer.
+    /// A vehicle that no other vehicle hears any more is down after so many seconds, from the
+    /// highest layer.
     pub fn time_to_ground_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
-        let slowest_mps = self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
+        let slowest_mps =
+            self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
         UNHEARD_DOWN_S + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
     }
 
@@ -176,7 +184,8 @@ impl<'a> CoverageView<'a> {
     pub(super) fn parse(b: &'a [u8], vehicles: usize) -> Result<Self, MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());
         let Some(head) = b.first_chunk::<HEAD_LEN>() else { return Err(FileError::Length.into()) };
-        let (vertex_count, ring_count) = (usize::from(u16_at(head, 0)), usize::from(u16_at(head, 2)));
+        let (vertex_count, ring_count) =
+            (usize::from(u16_at(head, 0)), usize::from(u16_at(head, 2)));
         if b.len() != encoded_len(vehicles, ring_count, vertex_count) {
             return Err(FileError::Length.into());
         }
@@ -213,7 +222,12 @@ impl<'a> CoverageView<'a> {
             },
             angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
             margin_m: f32_at(head, 40),
-            ground: (head[44..60] != [0; 16]).then_some(Ground { height_m, tolerance_m, low_m, high_m }),
+            ground: (head[44..60] != [0; 16]).then_some(Ground {
+                height_m,
+                tolerance_m,
+                low_m,
+                high_m,
+            }),
         };
         header.check()?;
         let (shares, rest) = b[HEAD_LEN..].split_at(vehicles * SHARE_LEN);

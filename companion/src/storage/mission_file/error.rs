@@ -4,8 +4,8 @@ use core::fmt;
 
 use planner_core::file::FileError;
 
-/// Reason why a mission file was refused, on reading or writing. Its text has at most 41 characters, so that a STATUSTEXT
-/// has room for it.
+/// Reason why a mission file was refused, on reading or writing. Its text has at most 41
+/// characters, so that a STATUSTEXT has room for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionError {
     /// The bytes are no whole file.

@@ -4,7 +4,9 @@ use planner_core::Point;
 use planner_core::plan::VehicleTask;
 use planner_core::roadmap::MAX_COORDINATE_M;
 
-use super::numbers::{MAX_SPEED_MPS, f32_at, in_range, is_positive_up_to, point_at, put_numbers, u16_at};
+use super::numbers::{
+    MAX_SPEED_MPS, f32_at, in_range, is_positive_up_to, point_at, put_numbers, u16_at,
+};
 
 /// Bytes of a vehicle.
 pub const VEHICLE_LEN: usize = 32;
@@ -66,7 +68,8 @@ impl MissionVehicle {
         let mut b = [0; VEHICLE_LEN];
         b[0] = self.task.id;
         b[2..4].copy_from_slice(&self.task.goal.unwrap_or(NO_GOAL).to_le_bytes());
-        let numbers = [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
+        let numbers =
+            [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
         put_numbers(&mut b, 4, self.start.iter().copied().chain(numbers));
         b
     }

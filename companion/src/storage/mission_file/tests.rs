@@ -45,7 +45,10 @@ fn file() -> List<u8> {
     let vehicles = [vehicle(7, None), vehicle(2, Some(1)), vehicle(250, Some(0))];
     let goals = [goal(0), goal(1)];
     let mut out = vec![0xAA; encoded_len(3, 2)];
-    assert_eq!(write_mission(&header(), &vehicles, &MissionBlock::Goals(&goals), &mut out), Ok(out.len()));
+    assert_eq!(
+        write_mission(&header(), &vehicles, &MissionBlock::Goals(&goals), &mut out),
+        Ok(out.len())
+    );
     out
 }
 
@@ -216,7 +219,11 @@ fn a_text_has_room_for_why_a_mission_is_refused() {
 fn a_file_of_version_1_means_the_usual_ground_station() {
     let old = forged(8, &[1]);
     let config = MissionView::parse(&old).unwrap().companion_config::<3>(2).unwrap();
-    assert_eq!(config.ground_stations, [255, 0, 0, 0], "what its reserved bytes hold does not count");
+    assert_eq!(
+        config.ground_stations,
+        [255, 0, 0, 0],
+        "what its reserved bytes hold does not count"
+    );
 }
 
 #[test]

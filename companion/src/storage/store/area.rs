@@ -1,4 +1,5 @@
-//! Areas of flash, each written once between two erasures: two slots for roadmaps, two halves of the journal.
+//! Areas of flash, each written once between two erasures: two slots for roadmaps, two halves of
+//! the journal.
 //!
 //! | offset | word of 32 bytes | programmed |
 //! |---|---|---|
@@ -7,8 +8,9 @@
 //! | 64 | seal: what the area holds | last of all, when everything was read back |
 //! | 256 | data | between the two |
 //!
-//! A word that was cut while it was programmed may read as anything, or not at all; no decision hangs on one such word being
-//! one or the other: a seal is believed only with its CRC, an area is written only if it is clean and unused.
+//! A word that was cut while it was programmed may read as anything, or not at all; no decision
+//! hangs on one such word being one or the other: a seal is believed only with its CRC, an area is
+//! written only if it is clean and unused.
 
 use super::flash::{FlashFault, FlashLayout, MAX_PROGRAM, ReadFlash, WORD, crc32};
 
@@ -151,7 +153,11 @@ impl AreaCondition {
 }
 
 /// Reads the first words of an area; a slot's file is read whole and checked.
-pub fn read_condition(layout: &FlashLayout, area: FlashArea, flash: &mut impl ReadFlash) -> AreaCondition {
+pub fn read_condition(
+    layout: &FlashLayout,
+    area: FlashArea,
+    flash: &mut impl ReadFlash,
+) -> AreaCondition {
     let at = area.offset(layout);
     let mut word = |offset| {
         let mut word = [0; WORD];

@@ -78,7 +78,8 @@ pub enum FlashRequest<'a> {
         /// Offset of the first byte.
         at: u32,
     },
-    /// Program bytes: a multiple of [`WORD`] at a multiple of it, at most [`MAX_PROGRAM`], all erased before.
+    /// Program bytes: a multiple of [`WORD`] at a multiple of it, at most [`MAX_PROGRAM`], all
+    /// erased before.
     Program {
         /// The first byte.
         at: u32,
@@ -101,8 +102,8 @@ pub enum ErasePermission {
     Allowed,
     /// The vehicle is armed, or about to be.
     Forbidden,
-    /// The roadmap is planned on, or it is soon known whether there is an autopilot, and whether it is armed: what needs it
-    /// waits.
+    /// The roadmap is planned on, or it is soon known whether there is an autopilot, and whether it
+    /// is armed: what needs it waits.
     NotYet,
 }
 

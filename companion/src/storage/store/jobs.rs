@@ -1,10 +1,11 @@
-//! What the store does with its flash, one request at a time: which job is next, what it asks for, what follows.
+//! What the store does with its flash, one request at a time: which job is next, what it asks for,
+//! what follows.
 
 use super::Store;
 use super::area::{self, AreaCondition, FlashArea, Seal};
 use super::flash::{
-    CRC_START, ErasePermission, File, FlashFault, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome, WORD,
-    crc_step,
+    CRC_START, ErasePermission, File, FlashFault, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome,
+    WORD, crc_step,
 };
 use super::job::FlashJob;
 use super::journal;
@@ -12,8 +13,9 @@ use super::records::{Compaction, JournalRecord, RecordSource, RecordStep};
 use super::upload_state::{UploadError, UploadState};
 
 impl Store {
-    /// The shell's next request, once; its result goes to [`Self::handle_outcome`]. Areas are erased only
-    /// where that is allowed; a flash that stalls the processor only reads where it is forbidden.
+    /// The shell's next request, once; its result goes to [`Self::handle_outcome`]. Areas are
+    /// erased only where that is allowed; a flash that stalls the processor only reads where it is
+    /// forbidden.
     pub fn poll_request(&mut self, erasing: ErasePermission) -> Option<FlashRequest<'_>> {
         if self.request_pending {
             return None;
@@ -61,7 +63,10 @@ impl Store {
                 let at = self.reassembly.flushed_len() + done;
                 let left = self.reassembly.file_len() - at;
                 let count = left.next_multiple_of(WORD as u32).min(MAX_PROGRAM as u32) as usize;
-                FlashRequest::Program { at: slot.data_offset(layout) + at, bytes: &self.buffer[..count] }
+                FlashRequest::Program {
+                    at: slot.data_offset(layout) + at,
+                    bytes: &self.buffer[..count],
+                }
             }
             FlashJob::Check { slot, done, .. } => {
                 let left = (self.reassembly.file_len() - done) as usize;
@@ -75,7 +80,8 @@ impl Store {
                 let left = (record.total_len() - record.done) as usize;
                 match (record.step, record.source) {
                     (RecordStep::Head, _) => {
-                        self.program_word = journal::record_head(record.kind, record.len, record.crc);
+                        self.program_word =
+                            journal::record_head(record.kind, record.len, record.crc);
                         FlashRequest::Program { at: record.at, bytes: &self.program_word }
                     }
                     (RecordStep::Load, RecordSource::Flash(from)) => {
@@ -159,7 +165,8 @@ impl Store {
             return Some(core::mem::replace(&mut self.paused_job, FlashJob::None));
         }
         let uploads = matches!(self.upload, Some((_, UploadState::Taking | UploadState::Closing)));
-        let area = self.next_area_to_erase().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
+        let area =
+            self.next_area_to_erase().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
         Some(self.erase_job(area))
     }
 
@@ -174,7 +181,10 @@ impl Store {
     }
 
     /// Handles how the last request went; `Ok` of an erasure or a program holds no bytes.
-    pub fn handle_outcome<'a>(&mut self, outcome: Result<&'a [u8], FlashFault>) -> Option<ReadOutcome<'a>> {
+    pub fn handle_outcome<'a>(
+        &mut self,
+        outcome: Result<&'a [u8], FlashFault>,
+    ) -> Option<ReadOutcome<'a>> {
         if !core::mem::take(&mut self.request_pending) {
             return None;
         }
@@ -199,7 +209,8 @@ impl Store {
             (FlashJob::Erase { area, at }, Ok(_)) => {
                 let at = at + self.layout.sector_len;
                 let more = at < area.end(&self.layout);
-                self.job = if more { FlashJob::Erase { area, at } } else { FlashJob::MarkClean(area) };
+                self.job =
+                    if more { FlashJob::Erase { area, at } } else { FlashJob::MarkClean(area) };
             }
             (FlashJob::MarkClean(area), Ok(_)) => *self.condition_mut(area) = AreaCondition::Clean,
             (FlashJob::MarkUsed(area), Ok(_)) => self.open_area(area),
@@ -207,7 +218,11 @@ impl Store {
             (FlashJob::FlushRest { slot, done }, Ok(_)) => {
                 let done = done + MAX_PROGRAM as u32;
                 let more = self.reassembly.flushed_len() + done < self.reassembly.file_len();
-                self.job = if more { FlashJob::FlushRest { slot, done } } else { self.begin_crc_check(slot) };
+                self.job = if more {
+                    FlashJob::FlushRest { slot, done }
+                } else {
+                    self.begin_crc_check(slot)
+                };
             }
             (FlashJob::Check { slot, done, sum, tail }, Ok(bytes)) => {
                 self.check_upload_crc(slot, done, sum, tail, bytes);
@@ -222,11 +237,16 @@ impl Store {
             }
             (FlashJob::Record(record), Ok(bytes)) => self.continue_record(record, bytes),
             (FlashJob::Record(_), Err(_)) => self.fail_record(),
-            (FlashJob::MarkUsed(area) | FlashJob::Seal(area, _) | FlashJob::SealCheck(area, _), Err(_)) => {
+            (
+                FlashJob::MarkUsed(area) | FlashJob::Seal(area, _) | FlashJob::SealCheck(area, _),
+                Err(_),
+            ) => {
                 self.handle_area_failure(area);
             }
             (
-                FlashJob::Flush(slot) | FlashJob::FlushRest { slot, .. } | FlashJob::Check { slot, .. },
+                FlashJob::Flush(slot)
+                | FlashJob::FlushRest { slot, .. }
+                | FlashJob::Check { slot, .. },
                 Err(_),
             ) => {
                 self.handle_area_failure(slot);
@@ -239,7 +259,9 @@ impl Store {
     fn open_area(&mut self, area: FlashArea) {
         *self.condition_mut(area) = AreaCondition::Open;
         match area {
-            FlashArea::Slot(_) => self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking)),
+            FlashArea::Slot(_) => {
+                self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking))
+            }
             FlashArea::Half(half) => {
                 let at = area.data_offset(&self.layout);
                 self.journal.compacting = Some(Compaction { half, at, step: 0, mission: None });
@@ -260,7 +282,14 @@ impl Store {
         }
     }
 
-    fn check_upload_crc(&mut self, slot: FlashArea, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
+    fn check_upload_crc(
+        &mut self,
+        slot: FlashArea,
+        done: u32,
+        sum: u32,
+        mut tail: [u8; 4],
+        bytes: &[u8],
+    ) {
         let len = self.reassembly.file_len();
         let field = matches!(self.upload, Some((File::Field, _)));
         if (done == 0 && !Self::declares(field, bytes, len)) || bytes.is_empty() {
@@ -304,7 +333,9 @@ impl Store {
     /// Cancels the job of an upload.
     pub(super) fn drop_job(&mut self) {
         match self.job {
-            FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => *self.condition_mut(area) = AreaCondition::Dirty,
+            FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => {
+                *self.condition_mut(area) = AreaCondition::Dirty
+            }
             FlashJob::Flush(_) => {}
             _ => return,
         }

@@ -1,9 +1,9 @@
-//! The journal: records one after the other in one of two halves; when it is full, what counts is copied to the other half, which
-//! is sealed last.
+//! The journal: records one after the other in one of two halves; when it is full, what counts is
+//! copied to the other half, which is sealed last.
 //!
-//! A record is a word (kind, length, CRC-32 of the data, its own CRC-32), then the data, padded to whole words with 0xFF. The
-//! last whole record of a kind counts. A word that is neither blank nor whole ends the journal: the next record goes to the
-//! other half.
+//! A record is a word (kind, length, CRC-32 of the data, its own CRC-32), then the data, padded to
+//! whole words with 0xFF. The last whole record of a kind counts. A word that is neither blank nor
+//! whole ends the journal: the next record goes to the other half.
 
 use super::area::{AreaCondition, append_word_crc};
 use super::flash::{MAX_PROGRAM, WORD};

@@ -15,7 +15,9 @@ impl Store {
             let Compaction { half, at, step, mission } = compaction;
             return Some(match (step, self.journal.mission.clone()) {
                 (0, _) => FlashJob::Record(self.parameters_record(at)),
-                (1, _) if !self.photographed.is_empty() => FlashJob::Record(self.photographed_record(at)),
+                (1, _) if !self.photographed.is_empty() => {
+                    FlashJob::Record(self.photographed_record(at))
+                }
                 (1 | 2, Some(kept)) => FlashJob::Record(JournalRecord {
                     kind: RecordKind::Mission,
                     at,
@@ -53,8 +55,9 @@ impl Store {
         } else {
             return None;
         };
-        let fits =
-            |active: usize| self.journal.end + record_len(len) <= FlashArea::Half(active).end(&self.layout);
+        let fits = |active: usize| {
+            self.journal.end + record_len(len) <= FlashArea::Half(active).end(&self.layout)
+        };
         if !self.journal.active.is_some_and(fits) {
             return self.begin_compaction(erasing, closing);
         }
@@ -63,7 +66,8 @@ impl Store {
             RecordKind::Parameters => self.parameters_record(at),
             RecordKind::Photographed => self.photographed_record(at),
             RecordKind::Mission => {
-                let rest = if len == 0 { &[] } else { self.reassembly.last_part().unwrap_or_default() };
+                let rest =
+                    if len == 0 { &[] } else { self.reassembly.last_part().unwrap_or_default() };
                 let crc = crc32(rest);
                 let (step, source) = (RecordStep::Head, RecordSource::Window);
                 JournalRecord { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
@@ -143,10 +147,13 @@ impl Store {
             }
             (RecordStep::Verify, _) => {
                 let head = if record.done == 0 { WORD } else { 0 };
-                let Some((head, data)) = bytes.split_at_checked(head).filter(|_| !bytes.is_empty()) else {
+                let Some((head, data)) = bytes.split_at_checked(head).filter(|_| !bytes.is_empty())
+                else {
                     return self.fail_record();
                 };
-                if !head.is_empty() && head != journal::record_head(record.kind, record.len, record.crc) {
+                if !head.is_empty()
+                    && head != journal::record_head(record.kind, record.len, record.crc)
+                {
                     return self.fail_record();
                 }
                 record.sum = crc_step(record.sum, data);
@@ -156,7 +163,8 @@ impl Store {
         if record.done < record.total_len() {
             self.job = FlashJob::Record(record);
         } else if record.step != RecordStep::Verify {
-            self.job = FlashJob::Record(JournalRecord { step: RecordStep::Verify, done: 0, ..record });
+            self.job =
+                FlashJob::Record(JournalRecord { step: RecordStep::Verify, done: 0, ..record });
         } else if !record.sum != record.crc {
             self.fail_record();
         } else {

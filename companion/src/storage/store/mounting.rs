@@ -9,9 +9,12 @@ use super::records::RecordKind;
 impl Store {
     pub(super) fn mount_journal(&mut self, flash: &mut impl ReadFlash) {
         let layout = self.layout;
-        self.journal.halves = [0, 1].map(|i| area::read_condition(&layout, FlashArea::Half(i), flash));
+        self.journal.halves =
+            [0, 1].map(|i| area::read_condition(&layout, FlashArea::Half(i), flash));
         let number = |i: &usize| self.journal.halves[*i].seal().map(|seal| seal.sequence);
-        let Some(active) = (0..2).filter(|i| number(i).is_some()).max_by_key(number) else { return };
+        let Some(active) = (0..2).filter(|i| number(i).is_some()).max_by_key(number) else {
+            return;
+        };
         self.journal.active = Some(active);
         let half = FlashArea::Half(active);
         let (mut at, end) = (half.data_offset(&layout), half.end(&layout));

@@ -1,4 +1,5 @@
-//! How records get into the journal: the next one, a copy of what counts into the other half when the first is full.
+//! How records get into the journal: the next one, a copy of what counts into the other half when
+//! the first is full.
 
 use super::flash::WORD;
 use core::ops::Range;

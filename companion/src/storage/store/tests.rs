@@ -40,7 +40,10 @@ fn upload(
 fn files_come_back_after_a_restart() {
     let mut flash = Flash::new(1);
     let mut store = started(&mut flash);
-    assert_eq!((store.roadmap(), store.mission(), store.file_size(File::Roadmap)), (None, None, None));
+    assert_eq!(
+        (store.roadmap(), store.mission(), store.file_size(File::Roadmap)),
+        (None, None, None)
+    );
     for (round, nodes) in [300, 10, 600].into_iter().enumerate() {
         let (road, flown) = (roadmap(nodes), mission(nodes as u8 % 50 + 1));
         for (file, bytes) in [(File::Roadmap, &road), (File::Mission, &flown)] {
@@ -84,11 +87,17 @@ fn a_field_takes_the_place_of_the_roadmap_and_gives_it_back() {
         (File::Field, File::Roadmap, &heights),
         (File::Roadmap, File::Field, &road),
     ] {
-        assert_eq!(upload(&mut store, &mut flash, other, bytes, 239).unwrap(), Err(UploadError::Damaged));
+        assert_eq!(
+            upload(&mut store, &mut flash, other, bytes, 239).unwrap(),
+            Err(UploadError::Damaged)
+        );
         store = started(&mut flash);
         assert_eq!(upload(&mut store, &mut flash, own, bytes, 239).unwrap(), Ok(()));
         store = started(&mut flash);
-        assert_eq!((store.file_size(own), store.file_size(other)), (Some(bytes.len() as u32), None));
+        assert_eq!(
+            (store.file_size(own), store.file_size(other)),
+            (Some(bytes.len() as u32), None)
+        );
         assert_eq!(held(&flash, store.roadmap()), Some(bytes.as_slice()));
     }
     store.remove_file(File::Field);
@@ -136,7 +145,8 @@ fn run_armed(store: &mut Store, flash: &mut Flash) {
     let mut read = [0; MAX_READ];
     while let Some(request) = store.poll_request(ErasePermission::Forbidden) {
         assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
-        let outcome = obey(flash, request, ErasePermission::Forbidden, &mut read).expect("the power is on");
+        let outcome =
+            obey(flash, request, ErasePermission::Forbidden, &mut read).expect("the power is on");
         store.handle_outcome(outcome.map(|len| &read[..len]));
     }
 }
@@ -180,7 +190,11 @@ fn a_flash_that_stalls_only_reads_while_armed() {
         }
         store.finish_upload();
         run_armed(&mut store, &mut flash);
-        assert_ne!(store.upload_state(), Some(UploadState::Ended(Ok(()))), "it cannot be sealed yet");
+        assert_ne!(
+            store.upload_state(),
+            Some(UploadState::Ended(Ok(()))),
+            "it cannot be sealed yet"
+        );
         run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     }
@@ -190,7 +204,10 @@ fn a_flash_that_stalls_only_reads_while_armed() {
 fn nothing_is_erased_while_armed() {
     let mut flash = Flash::new(3);
     let mut store = Store::mount(LAYOUT, &mut flash);
-    assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Forbidden), Err(UploadError::Armed));
+    assert_eq!(
+        store.open_upload(File::Roadmap, ErasePermission::Forbidden),
+        Err(UploadError::Armed)
+    );
     store.set_parameter(0, 2.5).unwrap();
     run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     assert!(store.is_unsaved(), "there is no clean half to keep it in yet");
@@ -250,8 +267,8 @@ fn a_read_goes_first_between_two_sectors() {
         if let FlashRequest::Erase { at } = request {
             erased.push(at);
         }
-        let outcome =
-            obey(&mut flash, request, ErasePermission::Allowed, &mut read).expect("the power is on");
+        let outcome = obey(&mut flash, request, ErasePermission::Allowed, &mut read)
+            .expect("the power is on");
         if let Some(answer) = store.handle_outcome(outcome.map(|len| &read[..len])) {
             assert_eq!(answer, ReadOutcome::Bytes(&road[..100]));
             given += 1;
@@ -261,10 +278,15 @@ fn a_read_goes_first_between_two_sectors() {
     let sectors: Vec<u32> = (0..3).map(|i| LAYOUT.slot_len + i * LAYOUT.sector_len).collect();
     assert_eq!(erased, sectors, "each once");
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
-    assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Forbidden), Ok(()), "and it is ready");
+    assert_eq!(
+        store.open_upload(File::Roadmap, ErasePermission::Forbidden),
+        Ok(()),
+        "and it is ready"
+    );
 }
 
-/// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or `after`, whole.
+/// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or
+/// `after`, whole.
 fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(), Cut>, cuts: u32) {
     let (old_road, old_mission) = (roadmap(200), mission(30));
     let (new_road, new_mission) = (roadmap(500), mission(50));
@@ -299,7 +321,10 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
         let (road, flown) = (held(&flash, store.roadmap()), held(&flash, store.mission()));
         let is_new = road == Some(new_road.as_slice());
         assert!(is_new || road == Some(old_road.as_slice()), "cut {cut}: neither roadmap is whole");
-        assert!(flown == Some(&new_mission) || flown == Some(&old_mission), "cut {cut}: neither mission");
+        assert!(
+            flown == Some(&new_mission) || flown == Some(&old_mission),
+            "cut {cut}: neither mission"
+        );
         let value = store.parameters().get(0).unwrap().1;
         assert!(value == 1.0 || value == 2.0, "cut {cut}: {value}");
         found[usize::from(is_new)] += 1;
@@ -372,7 +397,9 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
                 store.handle_outcome(if bad { Err(FlashFault) } else { Ok(&nothing[..len]) });
             }
             match store.upload_state() {
-                Some(UploadState::Taking) if store.take_piece(0, &road[..200]) == PieceOutcome::Yes => {
+                Some(UploadState::Taking)
+                    if store.take_piece(0, &road[..200]) == PieceOutcome::Yes =>
+                {
                     store.finish_upload();
                 }
                 Some(UploadState::Ended(result)) => break assert!(result.is_err()),
@@ -420,7 +447,9 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
     let mut heads = 0;
     while let Some(request) = store.poll_request(ErasePermission::Allowed) {
         let head = match request {
-            FlashRequest::Program { at, bytes } if bytes[..4] == flown_head(&flown)[..4] => Some(at as usize),
+            FlashRequest::Program { at, bytes } if bytes[..4] == flown_head(&flown)[..4] => {
+                Some(at as usize)
+            }
             _ => None,
         };
         let outcome = obey(&mut flash, request, ErasePermission::Allowed, &mut read).unwrap();

@@ -14,7 +14,8 @@ impl Store {
         self.upload.map(|(_, state)| state)
     }
 
-    /// Begins an upload; one under way is given up. Pieces are taken once [`Self::upload_state`] says so.
+    /// Begins an upload; one under way is given up. Pieces are taken once [`Self::upload_state`]
+    /// says so.
     ///
     /// # Errors
     /// [`UploadError::Armed`] or [`UploadError::Waiting`].
@@ -52,7 +53,8 @@ impl Store {
         }
     }
 
-    /// All was sent: the file is to be checked and kept. [`Self::upload_state`] says when that has ended.
+    /// All was sent: the file is to be checked and kept. [`Self::upload_state`] says when that has
+    /// ended.
     pub fn finish_upload(&mut self) {
         let Some((file, UploadState::Taking)) = self.upload else { return };
         let state = match (file, self.reassembly.last_part()) {
@@ -110,7 +112,8 @@ impl Store {
         self.slots.iter().position(|slot| *slot == AreaCondition::Open).map(FlashArea::Slot)
     }
 
-    /// Whether the first bytes are those of a roadmap file, or a field, of this length that can be read.
+    /// Whether the first bytes are those of a roadmap file, or a field, of this length that can be
+    /// read.
     pub(super) fn declares(field: bool, bytes: &[u8], len: u32) -> bool {
         let declared = match field {
             true => bytes.first_chunk().and_then(|head| field::declared_len(head).ok()),

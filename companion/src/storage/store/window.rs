@@ -1,4 +1,5 @@
-//! What was received of a file being uploaded and is not yet in flash: pieces may come in any order within the window.
+//! What was received of a file being uploaded and is not yet in flash: pieces may come in any order
+//! within the window.
 
 use super::flash::MAX_PROGRAM;
 

@@ -6,7 +6,9 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, DETOUR_MARGIN_M};
 use super::flown::{DetourPurpose, FlownPath};
-use super::{BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
+use super::{
+    BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER,
+};
 use crate::guidance::evade;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
@@ -30,8 +32,8 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
-    /// Whether it may search for a landing place beside its path: it is on its path, hears another vehicle, and did not
-    /// just fail.
+    /// Whether it may search for a landing place beside its path: it is on its path, hears another
+    /// vehicle, and did not just fail.
     pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -46,17 +48,19 @@ impl Detours {
 
     /// Whether enough detours were not found, or led nowhere.
     pub(crate) fn has_given_up(&self) -> bool {
-        self.no_retry || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
+        self.no_retry
+            || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
     }
 
-    /// Time for which it has waited below a landing vehicle without another place; zero for a while after no way aside
-    /// was found.
+    /// Time for which it has waited below a landing vehicle without another place; zero for a while
+    /// after no way aside was found.
     pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Duration {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
-        let trapped = view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
+        let trapped =
+            view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
@@ -89,7 +93,10 @@ impl Detours {
         let (sought, plan) = (self.sought?, view.mission.plan()?);
         let points = plan.path.waypoints();
         let along_m = view.guidance.along_m();
-        let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
+        let next = points
+            .iter()
+            .position(|w| w.along_m > along_m)
+            .unwrap_or(points.len().saturating_sub(1));
         let ahead = points.get(next)?;
         let behind = points.get(next.saturating_sub(1))?;
         let apart_m = view.config.safety_distance_m;
@@ -97,17 +104,26 @@ impl Detours {
         match view.config.division {
             Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut tell),
             _ => {
-                // No nearer than blocks the way: a goal that is planned beside one that lies can be flown to.
+                // No nearer than blocks the way: a goal that is planned beside one that lies can be
+                // flown to.
                 let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
                 view.neighbours.for_each_place(view.now, apart, &mut tell);
             }
         }
         if sought.is_aside() {
-            view.neighbours.for_each_landing_column(view.now, apart_m + evade::EVADE_MARGIN_M, &mut tell);
+            view.neighbours.for_each_landing_column(
+                view.now,
+                apart_m + evade::EVADE_MARGIN_M,
+                &mut tell,
+            );
         }
         if sought == DetourPurpose::Landing {
             let height_m = plan.path.point_at(along_m)?.z;
-            view.neighbours.for_each_landing_zone(view.now, [apart_m + DETOUR_MARGIN_M, height_m], tell);
+            view.neighbours.for_each_landing_zone(
+                view.now,
+                [apart_m + DETOUR_MARGIN_M, height_m],
+                tell,
+            );
         }
         let (goal, descent_m) = match view.config.division {
             Some(_) => match sought.rejoin() {

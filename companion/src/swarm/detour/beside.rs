@@ -1,11 +1,15 @@
 //! Around what hovers or lies on a path over a field, and back to that path beyond it.
 //!
-//! The vehicle stops, asks its shell for the way to the first free place of its path behind what blocks that, flies it beside the
-//! plan, and then asks for its own plan again, to continue from there. It keeps its part: its progress stays where it left its path
-//! until it is back, and others wait for it. It comes back no further than its gates are open. From under a vehicle that comes down it
-//! first flies aside, and seeks the way back from there: to where it left its path, or beyond that if that place stays barred.
+//! The vehicle stops, asks its shell for the way to the first free place of its path behind what
+//! blocks that, flies it beside the plan, and then asks for its own plan again, to continue from
+//! there. It keeps its part: its progress stays where it left its path until it is back, and others
+//! wait for it. It comes back no further than its gates are open. From under a vehicle that comes
+//! down it first flies aside, and seeks the way back from there: to where it left its path, or
+//! beyond that if that place stays barred.
 //!
-//! ENU metres. Constant work but for [`is_barred`], which asks for the places of all others, and [`first_rejoin_m`], once an attempt each: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
+//! ENU metres. Constant work but for [`is_barred`], which asks for the places of all others, and
+//! [`first_rejoin_m`], once an attempt each: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`]
+//! things.
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
@@ -61,12 +65,14 @@ impl FieldSearches {
 }
 
 /// Number of the sources of [`zones_of_source`].
-fn source_count<const V: usize, const W: usize, const G: usize>(view: &DetourView<'_, V, W, G>) -> usize {
+fn source_count<const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'_, V, W, G>,
+) -> usize {
     2 * view.neighbours.len()
 }
 
-/// Zones that one other vehicle occupies over a field: first come the places of each, then the columns in which those in the air
-/// off the plan may come down.
+/// Zones that one other vehicle occupies over a field: first come the places of each, then the
+/// columns in which those in the air off the plan may come down.
 fn zones_of_source<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     source: usize,
@@ -110,8 +116,8 @@ pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
     barred
 }
 
-/// The first free place of its path behind what blocks that, metres; none before its last descent, or before the gate that is
-/// closed.
+/// The first free place of its path behind what blocks that, metres; none before its last descent,
+/// or before the gate that is closed.
 pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     known: &[KeepOutZone],

@@ -1,7 +1,8 @@
 //! What path a vehicle flies, and what path it seeks: one value each.
 //!
-//! A path is sought from the request to the shell until it comes, or the vehicle leaves the state in which it waits for that. A
-//! path that has come is flown for the purpose that it was sought for.
+//! A path is sought from the request to the shell until it comes, or the vehicle leaves the state
+//! in which it waits for that. A path that has come is flown for the purpose that it was sought
+//! for.
 
 use planner_core::Point;
 
@@ -18,7 +19,8 @@ pub(crate) struct RejoinPlace {
 pub(crate) struct RejoinPlaces {
     /// Where it left that path, or holds for a division.
     pub own: RejoinPlace,
-    /// The next free one when it left, used if the other one stays barred; the same where there was none.
+    /// The next free one when it left, used if the other one stays barred; the same where there was
+    /// none.
     pub beyond: RejoinPlace,
 }
 

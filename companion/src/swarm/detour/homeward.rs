@@ -1,6 +1,7 @@
-//! The way home over a field: a vehicle that is ordered back, or whose path stays blocked, does not fly its lanes back. It stops,
-//! asks its shell for the way straight home in its own layer, and flies that. It is off the plan from the moment on at which it
-//! turns: the others divide what it leaves.
+//! The way home over a field: a vehicle that is ordered back, or whose path stays blocked, does not
+//! fly its lanes back. It stops, asks its shell for the way straight home in its own layer, and
+//! flies that. It is off the plan from the moment on at which it turns: the others divide what it
+//! leaves.
 //!
 //! Constant work.
 
@@ -50,7 +51,8 @@ impl HomewardFlight {
         self.seeks_since.map(|since| now - since)
     }
 
-    /// Whether the shell may be asked for the path home now: not within [`RETURN_RETRY`] of the last failure.
+    /// Whether the shell may be asked for the path home now: not within [`RETURN_RETRY`] of the
+    /// last failure.
     pub(crate) fn may_request(&self, now: Instant) -> bool {
         self.is_seeking() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
     }

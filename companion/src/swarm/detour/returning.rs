@@ -7,7 +7,8 @@ use super::{Detours, beside};
 use crate::swarm::view::DetourView;
 use crate::time::Duration;
 
-/// Time for which a vehicle that made room waits for the place where it left its path, seconds: less than until it flies home.
+/// Time for which a vehicle that made room waits for the place where it left its path, seconds:
+/// less than until it flies home.
 const BARRED_MOST_S: u64 = 60;
 /// Time for which it seeks a way to that place once that is free, seconds.
 const NO_WAY_MOST_S: u64 = 90;
@@ -33,7 +34,8 @@ impl Detours {
         self.home.is_seeking() || self.flown == FlownPath::Detour(DetourPurpose::Home)
     }
 
-    /// Whether the path flown ends elsewhere than over the vehicle's goal: aside, or back on its own path.
+    /// Whether the path flown ends elsewhere than over the vehicle's goal: aside, or back on its
+    /// own path.
     pub(crate) fn ends_aside(&self) -> bool {
         self.flown.purpose().is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
     }
@@ -61,8 +63,8 @@ impl Detours {
         self.flown.purpose().and_then(|purpose| purpose.rejoin())
     }
 
-    /// Place where it comes back to its path from aside: where it left that, or beyond if that place stays barred, or no way
-    /// leads there. `None` while it waits for that place.
+    /// Place where it comes back to its path from aside: where it left that, or beyond if that
+    /// place stays barred, or no way leads there. `None` while it waits for that place.
     pub(crate) fn rejoin_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

@@ -32,7 +32,11 @@ fn a_revoked_obstacle_does_not_block_any_more() {
     assert_eq!(exclude(&mut bench, &sphere(at, -1.0)), ACCEPTED);
     assert_eq!(bench.companion.detours.obstacle_count(), 1);
     bench.until(State::Follow, 3.0);
-    assert_eq!(exclude(&mut bench, &sphere(at, 0.0)), ACCEPTED, "nothing is there: so it is revoked");
+    assert_eq!(
+        exclude(&mut bench, &sphere(at, 0.0)),
+        ACCEPTED,
+        "nothing is there: so it is revoked"
+    );
 }
 
 #[test]
@@ -89,7 +93,8 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     bench.until(State::Blocked, 3.0);
     bench.run(8.0);
     assert!(
-        bench.companion.detours.is_waiting(&bench.companion.detour_view()) && bench.state() == State::Blocked
+        bench.companion.detours.is_waiting(&bench.companion.detour_view())
+            && bench.state() == State::Blocked
     );
     // It flies: what was quiet is not any more.
     bench.neighbour = other(ON_DETOUR);
@@ -97,7 +102,8 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     bench.neighbour = other(BLOCKED | WAITING);
     bench.run(4.0);
     assert!(
-        bench.companion.detours.is_waiting(&bench.companion.detour_view()) && bench.state() == State::Blocked,
+        bench.companion.detours.is_waiting(&bench.companion.detour_view())
+            && bench.state() == State::Blocked,
         "it waits from the start again"
     );
     bench.until(State::Follow, 5.0);
@@ -116,7 +122,8 @@ fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
     bench.until(State::Blocked, 3.0);
     bench.run(8.0);
     assert!(
-        bench.companion.detours.is_waiting(&bench.companion.detour_view()) && bench.state() == State::Blocked
+        bench.companion.detours.is_waiting(&bench.companion.detour_view())
+            && bench.state() == State::Blocked
     );
 }
 
@@ -132,7 +139,10 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     bench.run(60.0);
     let mut told = Vec::new();
     bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| told.push(place));
-    assert!(told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5), "{told:?}");
+    assert!(
+        told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5),
+        "{told:?}"
+    );
 }
 
 /// What is kept clear vehicle 77 half a minute on.
@@ -154,10 +164,14 @@ fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
 fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
     let known = kept_off(GROUNDED | OUT_OF_PLAN, true);
     assert!(
-        matches!(known[..], [KeepOutZone { kind: ZoneKind::Static, .. }]) && known[0].from == known[0].to
+        matches!(known[..], [KeepOutZone { kind: ZoneKind::Static, .. }])
+            && known[0].from == known[0].to
     );
     let vague = kept_off(GROUNDED | OUT_OF_PLAN, false);
-    assert!(matches!(vague[..], [KeepOutZone { kind: ZoneKind::Grounded, .. }]) && vague[0].to.z < -40.0);
+    assert!(
+        matches!(vague[..], [KeepOutZone { kind: ZoneKind::Grounded, .. }])
+            && vague[0].to.z < -40.0
+    );
 }
 
 #[test]

@@ -10,8 +10,8 @@ use crate::link::roster::{MemberStatus, RosterReportEntry};
 pub struct DivisionInput {
     /// Whether it flies on.
     pub alive: bool,
-    /// Place along its path up to which the pictures are the vehicle's own; [`DivisionInput::WHOLE_PATH`] where
-    /// the vehicle took all of them.
+    /// Place along its path up to which the pictures are the vehicle's own;
+    /// [`DivisionInput::WHOLE_PATH`] where the vehicle took all of them.
     pub along_dm: u16,
 }
 
@@ -31,7 +31,11 @@ impl DivisionInput {
 
     /// The place, metres; infinite for [`DivisionInput::WHOLE_PATH`].
     pub fn along_m(&self) -> f32 {
-        if self.along_dm == Self::WHOLE_PATH { f32::INFINITY } else { f32::from(self.along_dm) / 10.0 }
+        if self.along_dm == Self::WHOLE_PATH {
+            f32::INFINITY
+        } else {
+            f32::from(self.along_dm) / 10.0
+        }
     }
 }
 

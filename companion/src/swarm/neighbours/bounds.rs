@@ -11,7 +11,8 @@ pub(crate) const MAX_HOVER_MPS: f32 = 0.3;
 pub(super) const RESTART_MS: u32 = 10_000;
 /// Age within which a neighbour counts as heard: four positions and intents.
 pub(super) const HEARD_WITHIN: Duration = Duration::from_millis(800);
-/// Age of a position from which its sender may have fallen silent: no vehicle arms where that would bar its climb.
+/// Age of a position from which its sender may have fallen silent: no vehicle arms where that would
+/// bar its climb.
 pub(super) const UNHEARD_BEFORE_ARMING: Duration = Duration::from_millis(600);
 /// Horizontal distance from its pad beyond which a vehicle on its plan is neither on the way up
 /// from the pad nor on the way down to it, metres.
@@ -43,7 +44,8 @@ pub(super) const COLUMN_KEPT: Duration = Duration::from_secs(600);
 /// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
 /// [`HEARD_WITHIN`] and 1 s, and stops. Over an area it flies on as long as its lease allows.
 pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
-/// Growth of [`UNHEARD_STRETCH_M`] for each second that a message takes to another vehicle and back, m/s.
+/// Growth of [`UNHEARD_STRETCH_M`] for each second that a message takes to another vehicle and
+/// back, m/s.
 pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
@@ -53,19 +55,19 @@ pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
 pub(super) const LANDS_UNHEARD: Duration = Duration::from_secs(40);
 /// Rounding of the length of a way of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
-/// Most spacings of the places on the unheard stretch over an area, where it is as long as the lease allows: with eight corners
-/// a neighbour makes 17 keep-out zones.
+/// Most spacings of the places on the unheard stretch over an area, where it is as long as the
+/// lease allows: with eight corners a neighbour makes 17 keep-out zones.
 pub(super) const STRETCH_PLACES: f32 = 8.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens the
 /// column where it knows the ground.
 pub(super) const MAX_COLUMN_M: f32 = 60.0;
 /// Silence after which an airborne vehicle may land before it is heard again.
 pub(super) const MAY_LAND_AFTER: Duration = Duration::from_secs(3);
-/// How far the wind takes a vehicle aside that falls with its motors off, for each metre of height: it falls at 10 m/s, and gusts of
-/// 3 m/s push it at half of that.
+/// How far the wind takes a vehicle aside that falls with its motors off, for each metre of height:
+/// it falls at 10 m/s, and gusts of 3 m/s push it at half of that.
 pub(super) const FALL_DRIFT_SHARE: f32 = 0.15;
-/// Time for which such a vehicle goes on as fast as it was when it was last heard, seconds: a second until it falls, and what its fall
-/// leaves of its speed.
+/// Time for which such a vehicle goes on as fast as it was when it was last heard, seconds: a
+/// second until it falls, and what its fall leaves of its speed.
 pub(super) const FALL_CARRY_S: f32 = 2.0;
 /// Greatest speed with which one that falls is carried on, m/s: whatever was reported.
 pub(super) const MAX_FALL_CARRY_MPS: f32 = 20.0;
@@ -85,9 +87,9 @@ pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
 pub(super) const LEVEL_M: f32 = 1.0;
 /// Position error of a vehicle whose own knowledge of its place is old, metres.
 pub(super) const VAGUE_POSITION_M: f32 = 0.5;
-/// Distance beside its path at which a vehicle may come down unheard, beyond the deviation that counts beside a vehicle on the
-/// ground, metres: it leads its landing as at its goal, so it is kept clear as the schedule keeps others off landed vehicles in
-/// announced gusts of 3 m/s.
+/// Distance beside its path at which a vehicle may come down unheard, beyond the deviation that
+/// counts beside a vehicle on the ground, metres: it leads its landing as at its goal, so it is
+/// kept clear as the schedule keeps others off landed vehicles in announced gusts of 3 m/s.
 pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
 /// Stray of two vehicles in the air together, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;

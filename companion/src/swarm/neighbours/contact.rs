@@ -55,10 +55,11 @@ pub(crate) struct NeighbourEntry {
     pub(super) place_on_points: PlaceOnPoints,
     /// Distance to which the points lead from the first of them, metres.
     pub(super) extent_m: f32,
-    /// Length of its points from its place on, metres, where it flies to the last of them unheard: over an area, where it reports
-    /// as many as its lease allows. Negative elsewhere.
+    /// Length of its points from its place on, metres, where it flies to the last of them unheard:
+    /// over an area, where it reports as many as its lease allows. Negative elsewhere.
     pub(super) unheard_way_m: f32,
-    /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
+    /// Whether it may come down from where it is, and the height of the ground below it; NaN where
+    /// it never reported any.
     pub(super) may_come_down: bool,
     pub(super) ground_m: f32,
     /// Place along its path up to which the vehicle's gates were open, or would be, metres: the
@@ -88,7 +89,8 @@ pub(crate) struct NeighbourEntry {
 }
 
 impl NeighbourEntry {
-    /// Notes where its position is on its points: to be called when either was heard, so that no step has to look for it.
+    /// Notes where its position is on its points: to be called when either was heard, so that no
+    /// step has to look for it.
     pub(super) fn update_place_on_points(&mut self) {
         self.place_on_points = PlaceOnPoints::find(&self.state.position, self.points_for_now());
         if self.is_leased() {
@@ -125,7 +127,9 @@ impl NeighbourEntry {
 
     /// Whether it is heard, but has had no valid position for long.
     pub(super) fn is_imprecise(&self) -> bool {
-        self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
+        self.heard_at
+            .zip(self.position_at)
+            .is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
     }
 
     /// Whether it follows the shared plan, as last heard.
@@ -165,7 +169,10 @@ impl NeighbourEntry {
             return Some(known_m);
         }
         let reckoned_m = known_m + self.assumed_speed_mps * silent_s;
-        Some(libm::fmaxf(known_m, libm::fminf(reckoned_m, self.gates_open_up_to_m - PROGRESS_ERROR_M)))
+        Some(libm::fmaxf(
+            known_m,
+            libm::fminf(reckoned_m, self.gates_open_up_to_m - PROGRESS_ERROR_M),
+        ))
     }
 
     /// Seconds until it has come past `until_m` for sure; none where that is open.
@@ -173,8 +180,10 @@ impl NeighbourEntry {
         let known_m = self.progress_m(now).filter(|_| !self.reports(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.intent_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.assumed_speed_mps;
-        let after_s = RECKONED_AFTER_S + f32::from(self.unheard_delay_s) - (now - known_at).as_secs_f32();
-        (until_m <= self.gates_open_up_to_m - PROGRESS_ERROR_M).then(|| libm::fmaxf(fly_s + after_s, 0.0))
+        let after_s =
+            RECKONED_AFTER_S + f32::from(self.unheard_delay_s) - (now - known_at).as_secs_f32();
+        (until_m <= self.gates_open_up_to_m - PROGRESS_ERROR_M)
+            .then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 
     pub(super) fn reports(&self, flag: u8) -> bool {
@@ -189,11 +198,19 @@ impl NeighbourEntry {
     /// flown since the report before, at `fastest_mps`. The rest comes by and by, a landing that
     /// reports the whole way at once too. Less than before is believed: it opens no gate. The first
     /// report of a plan is taken as it is, that of a vehicle that was restarted too.
-    pub(super) fn plausible_progress_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
-        let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).as_secs_f32());
-        let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
+    pub(super) fn plausible_progress_m(
+        &mut self,
+        progress_m: f32,
+        fastest_mps: f32,
+        now: Instant,
+    ) -> f32 {
+        let furthest =
+            self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).as_secs_f32());
+        let believed_m =
+            furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
         let late_m = believed_m + fastest_mps * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M;
-        self.furthest = Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
+        self.furthest =
+            Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
         believed_m
     }
 
@@ -203,7 +220,8 @@ impl NeighbourEntry {
             || (!self.reports(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
-    /// Whether it is out of the plan, or lately reported that it stands until another vehicle moves.
+    /// Whether it is out of the plan, or lately reported that it stands until another vehicle
+    /// moves.
     pub(super) fn is_waiting(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
             || (self.reports(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
@@ -228,7 +246,8 @@ impl NeighbourEntry {
             && self.state.velocity.length() < MAX_HOVER_MPS
     }
 
-    /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
+    /// Whether it will land where it is without looking, or may: it is in the air off the plan, or
+    /// unheard.
     pub(super) fn may_land_unseen(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
@@ -239,7 +258,8 @@ impl NeighbourEntry {
             && (silent || (self.state.progress_m.is_none() && !self.reports(ON_DETOUR)))
     }
 
-    /// The columns it may come down in, `apart_m` around it; unheard it has come as far as `upto_m` along its points.
+    /// The columns it may come down in, `apart_m` around it; unheard it has come as far as `upto_m`
+    /// along its points.
     pub(super) fn landing_columns(
         &self,
         now: Instant,
@@ -277,7 +297,11 @@ impl NeighbourEntry {
     /// Depth of the column below a place on its path, metres: over an area at least to the ground.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN counts as none.
-        if self.is_leased() { libm::fmaxf(MAX_COLUMN_M, place.z - self.ground_m) } else { MAX_COLUMN_M }
+        if self.is_leased() {
+            libm::fmaxf(MAX_COLUMN_M, place.z - self.ground_m)
+        } else {
+            MAX_COLUMN_M
+        }
     }
 
     /// Height of the top of its climb, if it climbs or is about to.
@@ -290,8 +314,9 @@ impl NeighbourEntry {
         (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
 
-    /// Stretch of its path that the vehicle may fly unheard, metres: over an area as far as its points lead; elsewhere further
-    /// where messages are late, its own and those by which it learns that no vehicle hears it.
+    /// Stretch of its path that the vehicle may fly unheard, metres: over an area as far as its
+    /// points lead; elsewhere further where messages are late, its own and those by which it learns
+    /// that no vehicle hears it.
     pub(super) fn unheard_distance_m(&self) -> f32 {
         // Rounding does not take away the last corner.
         libm::fmaxf(self.unheard_way_m + LEGS_ROUNDING_M, self.unheard_stop_m())
@@ -307,7 +332,8 @@ impl NeighbourEntry {
         !self.reports(GROUNDED | LANDED) || self.first_unheard_point > 0
     }
 
-    /// Whether it is silent, and continues over an area as long as its lease allows, or as its autopilot takes it.
+    /// Whether it is silent, and continues over an area as long as its lease allows, or as its
+    /// autopilot takes it.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.is_leased()
             && self.is_under_way()
@@ -315,15 +341,16 @@ impl NeighbourEntry {
             && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
-    /// Where it may have fallen, its motors off, if it is silent over an area: from its place as far as its speed took it, and so much
-    /// aside, metres.
+    /// Where it may have fallen, its motors off, if it is silent over an area: from its place as
+    /// far as its speed took it, and so much aside, metres.
     #[inline(never)]
     pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
-        let silent = self.is_leased() && self.is_under_way() && !self.heard_within(now, MAY_LAND_AFTER);
+        let silent =
+            self.is_leased() && self.is_under_way() && !self.heard_within(now, MAY_LAND_AFTER);
         let (here, velocity) = (self.state.position, self.state.velocity);
         let fast_mps = velocity.xy().norm().max(MAX_FALL_CARRY_MPS);
-        let carried =
-            Point::new(velocity.x, velocity.y, 0.0) * (FALL_CARRY_S * MAX_FALL_CARRY_MPS / fast_mps);
+        let carried = Point::new(velocity.x, velocity.y, 0.0)
+            * (FALL_CARRY_S * MAX_FALL_CARRY_MPS / fast_mps);
         silent.then(|| ([here, here + carried], self.fall_aside_m()))
     }
 
@@ -335,14 +362,15 @@ impl NeighbourEntry {
         if high_m > 0.0 { FALL_DRIFT_SHARE * high_m.min(MAX_FALL_M) } else { 0.0 }
     }
 
-    /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a place. No pads are as near to each other.
+    /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a
+    /// place. No pads are as near to each other.
     pub(crate) fn comes_home(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
         self.may_fly_on(now) && self.pad.is_some_and(near)
     }
 
-    /// Legs of its path for `left_m`, as far as it may come unheard, each with its length and the part that counts, metres; the first is the
-    /// place where it was heard.
+    /// Legs of its path for `left_m`, as far as it may come unheard, each with its length and the
+    /// part that counts, metres; the first is the place where it was heard.
     #[inline(never)]
     pub(super) fn for_each_leg(&self, mut left_m: f32, tell: &mut dyn FnMut([Point; 2], [f32; 2])) {
         let mut at = self.state.position;
@@ -357,12 +385,15 @@ impl NeighbourEntry {
         }
     }
 
-    /// Places along its path for `upto_m`, as far as it may come unheard, and how much further than from one of them it may be from the
-    /// nearest of them.
+    /// Places along its path for `upto_m`, as far as it may come unheard, and how much further than
+    /// from one of them it may be from the nearest of them.
     #[inline(never)]
     pub(super) fn for_each_place(&self, upto_m: f32, tell: &mut dyn FnMut(Point, f32)) {
-        let step_m =
-            if upto_m > self.unheard_stop_m() { upto_m / STRETCH_PLACES } else { UNHEARD_STRETCH_STEP_M };
+        let step_m = if upto_m > self.unheard_stop_m() {
+            upto_m / STRETCH_PLACES
+        } else {
+            UNHEARD_STRETCH_STEP_M
+        };
         let wider_m = if step_m > UNHEARD_STRETCH_STEP_M { 0.5 * step_m } else { 0.0 };
         self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
             for step in 1..=(flown_m / step_m) as u32 {
@@ -370,13 +401,17 @@ impl NeighbourEntry {
                 tell(at + (next - at) * (along_m / leg_m), wider_m);
             }
             // The end too: it may have come as far.
-            tell(if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next }, wider_m);
+            tell(
+                if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
+                wider_m,
+            );
         });
     }
 
-    /// How high it lies at most, once it came down from a place: on the ground that it reported, which away from pads is the
-    /// lowest there is. Then it is below what it flew along, which is over the ground by [`Ground::height_m`] but for what it
-    /// deviated; above its pad, and where it came down already, that is not known.
+    /// How high it lies at most, once it came down from a place: on the ground that it reported,
+    /// which away from pads is the lowest there is. Then it is below what it flew along, which is
+    /// over the ground by [`Ground::height_m`] but for what it deviated; above its pad, and where
+    /// it came down already, that is not known.
     pub(super) fn max_ground_m(&self, field: AreaGround, place: &Point) -> f32 {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;
@@ -390,8 +425,9 @@ impl NeighbourEntry {
         libm::fmaxf(self.ground_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
-    /// Keep-out zones of the places where the vehicle may be from now on, `apart_m` around it, which unheard has come as far as
-    /// `upto_m` along its points. Over a field it lies on the ground that it reported.
+    /// Keep-out zones of the places where the vehicle may be from now on, `apart_m` around it,
+    /// which unheard has come as far as `upto_m` along its points. Over a field it lies on the
+    /// ground that it reported.
     pub(super) fn keep_out_zones(
         &self,
         now: Instant,
@@ -402,7 +438,8 @@ impl NeighbourEntry {
         let here = self.state.position;
         // The zone is for vehicles in the air: those on the ground lie beside each other's pads.
         let wide_m = apart_m + field.map_or(0.0, |field| field.pair_position_error_m);
-        let place = |radius_m: f32| KeepOutZone { from: here, to: here, radius_m, kind: ZoneKind::Static };
+        let place =
+            |radius_m: f32| KeepOutZone { from: here, to: here, radius_m, kind: ZoneKind::Static };
         let column = |from: Point, nature: ZoneKind| {
             let to = from - Point::new(0.0, 0.0, self.column_depth_m(&from));
             KeepOutZone { from, to, radius_m: apart_m + VAGUE_POSITION_M, kind: nature }
@@ -413,7 +450,9 @@ impl NeighbourEntry {
             && (self.reports(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
         {
             tell(place(apart_m));
-        } else if self.reports(OUT_OF_PLAN) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
+        } else if self.reports(OUT_OF_PLAN)
+            && (field.is_none() || self.heard_within(now, COLUMN_KEPT))
+        {
             let below = column(here, ZoneKind::Static);
             tell(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // The place of the vehicle may not be approached from above or the side, whatever its
@@ -427,11 +466,13 @@ impl NeighbourEntry {
             }
             let down = !self.heard_within(now, field.map_or(DOWN_AFTER, |field| field.down));
             if let Some(field) = field.filter(|_| down && !self.ground_m.is_nan()) {
-                // No lane and no layer comes as low: as thin as it lies, and below that at corners alone.
+                // No lane and no layer comes as low: as thin as it lies, and below that at corners
+                // alone.
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
                 let high = |at: Point| low(at, self.max_ground_m(field, &at));
                 return self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
-                    let next = if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
+                    let next =
+                        if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
                     let (from, lies) = (high(next), place(apart_m + VAGUE_POSITION_M));
                     tell(KeepOutZone { from, to: high(at), ..lies });
                     if from.z > self.ground_m {

@@ -9,14 +9,17 @@ use crate::swarm::fleet::{FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, Ow
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
-    /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds;
-    /// `ground` is what is not level. By `stray_m` two may be nearer than they believe.
+    /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many
+    /// seconds; `ground` is what is not level. By `stray_m` two may be nearer than they believe.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
         (self.ground, self.pair_position_error_m) = (ground, stray_m);
         self.down = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
-        self.fleet =
-            Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, FleetTimeouts::of_flight(down)));
+        self.fleet = Some(Fleet::new(
+            usize::from(self.own_rank),
+            self.roster + 1,
+            FleetTimeouts::of_flight(down),
+        ));
     }
 
     /// The fleet; none where the mission is no area.
@@ -33,11 +36,13 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn step_fleet(&mut self, own: &OwnReport, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
         let roster = &self.contacts[..self.roster];
-        let lately = |c: &&NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
+        let lately =
+            |c: &&NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
         let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.heard_bits);
         let own_rank = usize::from(self.own_rank);
         fleet.step(now, own, |rank| {
-            let contact = rank.checked_sub(usize::from(rank > own_rank)).and_then(|at| roster.get(at));
+            let contact =
+                rank.checked_sub(usize::from(rank > own_rank)).and_then(|at| roster.get(at));
             let bit = 1u32.checked_shl(rank as u32).unwrap_or(0);
             contact.filter(|_| rank != own_rank).map_or(MemberReception::default(), |contact| {
                 MemberReception {
@@ -51,12 +56,13 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether one that follows another plan of this mission was heard lately.
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
-        let lately = |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
+        let lately =
+            |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
-    /// Whether another vehicle that takes part is in flight, and none of them is missed: while one may be lost, each that lives
-    /// counts for a majority.
+    /// Whether another vehicle that takes part is in flight, and none of them is missed: while one
+    /// may be lost, each that lives counts for a majority.
     pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
         let flies = |c: &&NeighbourEntry| heard(c) && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);

@@ -1,7 +1,10 @@
-//! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it is too far away to matter.
+//! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it
+//! is too far away to matter.
 
 use planner_core::Point;
-use planner_core::safety::{MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints};
+use planner_core::safety::{
+    MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints,
+};
 
 use super::*;
 
@@ -50,9 +53,9 @@ pub(crate) struct ReachQuery<'a> {
 }
 
 impl NeighbourEntry {
-    /// Whether it counts as dead, where it may come within reach; `None` where it stays out of reach wherever it can be: what
-    /// most of them do, seen without making a set of it. Never `None` where [`Neighbours::for_filter`] and its reach say
-    /// otherwise.
+    /// Whether it counts as dead, where it may come within reach; `None` where it stays out of
+    /// reach wherever it can be: what most of them do, seen without making a set of it. Never
+    /// `None` where [`Neighbours::for_filter`] and its reach say otherwise.
     #[inline(always)]
     fn within_reach(&self, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> Option<bool> {
         let placed_at = self.position_at?;
@@ -80,16 +83,18 @@ impl NeighbourEntry {
             column_to_m: None,
         };
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
-        let column =
-            !heard.grounded && (self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan());
+        let column = !heard.grounded
+            && (self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan());
         let above_m = if column { 0.0 } else { away.z };
         let beyond = across_sq + above_m * above_m >= most_m * most_m;
         (!beyond).then_some(false)
     }
 
-    /// The same where its place is old. Seen from above it is where it was or, known by its intents, at the first of its points;
-    /// or as far from there as it can have flown: as long as it may not have noticed that no other vehicle hears it, in a climb to its top
-    /// and a little further, and once it counts as dead along its points alone. What lies after so long moves no more.
+    /// The same where its place is old. Seen from above it is where it was or, known by its
+    /// intents, at the first of its points; or as far from there as it can have flown: as long as
+    /// it may not have noticed that no other vehicle hears it, in a climb to its top and a little
+    /// further, and once it counts as dead along its points alone. What lies after so long moves no
+    /// more.
     fn is_silent_beyond(
         &self,
         age: Duration,
@@ -111,7 +116,11 @@ impl NeighbourEntry {
             reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
         }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
-            reaches(self.unheard_distance_m() + self.place_on_points.flown_beyond_m() + OFF_REPORTED_PATH_M);
+            reaches(
+                self.unheard_distance_m()
+                    + self.place_on_points.flown_beyond_m()
+                    + OFF_REPORTED_PATH_M,
+            );
         }
         if reach.lands || self.climb_top_m().is_some() {
             reaches(self.rest_radius_m(reach));
@@ -126,7 +135,8 @@ impl NeighbourEntry {
         away_sq >= most_m * most_m
     }
 
-    /// Points that it may have flown along, all of them once it is dead, and no less than the distance to which they lead, metres.
+    /// Points that it may have flown along, all of them once it is dead, and no less than the
+    /// distance to which they lead, metres.
     fn points_flown(&self, dead: bool) -> (&[Point], f32) {
         match dead {
             true if self.is_leased() => (&self.points, self.unheard_distance_m()),
@@ -135,15 +145,22 @@ impl NeighbourEntry {
         }
     }
 
-    /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its points, and is no ball.
-    pub(crate) fn follow_unheard<'a>(&'a self, heard: &mut NeighbourMotion<'a>, bounds: &MotionBounds) {
+    /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its
+    /// points, and is no ball.
+    pub(crate) fn follow_unheard<'a>(
+        &'a self,
+        heard: &mut NeighbourMotion<'a>,
+        bounds: &MotionBounds,
+    ) {
         let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
-        let follows = !heard.points.is_empty() && matches!(self.place_on_points, PlaceOnPoints::On { .. });
+        let follows =
+            !heard.points.is_empty() && matches!(self.place_on_points, PlaceOnPoints::On { .. });
         if !follows || heard.age_s <= stopped_s || heard.grounded {
             return;
         }
         let fastest_mps = libm::fmaxf(bounds.speed_max_mps, heard.speed_mps);
-        let flown_m = fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
+        let flown_m =
+            fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
         (heard.age_s, heard.delay_s, heard.speed_mps) = (0.0, 0.0, 0.0);
         (heard.points, heard.place_on_points, heard.extent_m) =
             (&self.points, self.place_on_points, f32::INFINITY);
@@ -187,21 +204,23 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// A vehicle in flight, not out of the plan, within `apart_m` of the vertical through `pad` that was missed for a moment, and may have fallen
-    /// silent: three of its positions were lost, or more.
+    /// A vehicle in flight, not out of the plan, within `apart_m` of the vertical through `pad`
+    /// that was missed for a moment, and may have fallen silent: three of its positions were lost,
+    /// or more.
     #[inline(never)]
     pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {
         let missed = |c: &&NeighbourEntry| {
             let flies = !c.reports(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
             let beside = (c.state.position - pad).xy().norm_squared() < apart_m * apart_m;
-            let lately = |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
+            let lately =
+                |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
             flies && beside && c.position_at.is_some_and(lately)
         };
         self.contacts[..self.roster].iter().find(missed).map(|c| c.id)
     }
 
-    /// The first contact from number `from` on that was placed and may be within reach, its number, and whether it counts as
-    /// dead.
+    /// The first contact from number `from` on that was placed and may be within reach, its number,
+    /// and whether it counts as dead.
     pub(crate) fn next_within(
         &self,
         from: usize,
@@ -217,7 +236,8 @@ impl<const V: usize> Neighbours<V> {
         None
     }
 
-    /// A contact as the safety filter sees it, `dead` or not; one that was never placed as if it had been at the start.
+    /// A contact as the safety filter sees it, `dead` or not; one that was never placed as if it
+    /// had been at the start.
     #[inline(always)]
     pub(crate) fn for_filter<'a>(
         &'a self,
@@ -230,35 +250,45 @@ impl<const V: usize> Neighbours<V> {
         // Most are heard: then nothing of what follows is so.
         let silent = placed_for >= MAX_HEIGHT_AGE;
         // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
-        let told_at =
-            contact.intent_at.filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
-        let told_s = told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
+        let told_at = contact
+            .intent_at
+            .filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
+        let told_s =
+            told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
-        // Dead, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
-        let down =
-            silent && (placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise()));
+        // Dead, or without a position of its own, it rests by then where a reroute keeps off; later
+        // on the ground below.
+        let down = silent
+            && (placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise()));
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
-        let top = if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
+        let top =
+            if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
         if lies {
-            highest_m = self.area_ground().map_or(contact.ground_m, |g| contact.max_ground_m(g, &here));
+            highest_m =
+                self.area_ground().map_or(contact.ground_m, |g| contact.max_ground_m(g, &here));
             here.z = libm::fminf(highest_m, here.z);
         } else if let Some(top) = top {
             here.z = top;
         }
         let grounded = (contact.reports(GROUNDED | LANDED) && top.is_none()) || lies;
-        let down = dead || contact.may_come_down || contact.reports(OUT_OF_PLAN) || contact.ground_m.is_nan();
-        let floor_m = if contact.ground_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.ground_m };
+        let down = dead
+            || contact.may_come_down
+            || contact.reports(OUT_OF_PLAN)
+            || contact.ground_m.is_nan();
+        let floor_m =
+            if contact.ground_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.ground_m };
         let (rests, unknown) = (dead || top.is_some(), by_intent || lies || top.is_some());
         let (points, extent_m) = contact.points_flown(dead);
         let heard = NeighbourMotion {
             position: here,
             velocity: contact.state.velocity,
             speed_mps: if rests { 0.0 } else { contact.speed_mps },
-            // A vehicle that flew along its points stopped on them, and rests where a reroute keeps off.
+            // A vehicle that flew along its points stopped on them, and rests where a reroute keeps
+            // off.
             age_s: if rests { 0.0 } else { age_s },
             delay_s: match (dead, top) {
                 (false, Some(_)) => UNHEARD_BEYOND_TOP_S,
@@ -280,7 +310,8 @@ impl<const V: usize> Neighbours<V> {
             shares_plan: contact.shares_plan,
             lost: dead,
             waits: contact.reports(WAITING) && contact.heard_within(now, HEARD_WITHIN),
-            stands: grounded || (now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S),
+            stands: grounded
+                || (now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S),
             motion: heard,
             before_climb: top.map(|_| contact.state.position),
         }

@@ -4,7 +4,9 @@ use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
 
 use super::contact::{AreaGround, NeighbourEntry};
-use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN, VAGUE_POSITION_M};
+use super::{
+    LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN, VAGUE_POSITION_M,
+};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
@@ -23,8 +25,8 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears no other vehicle
-    /// has lost its own radio rather: the others fly on, nobody knows where.
+    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears
+    /// no other vehicle has lost its own radio rather: the others fly on, nobody knows where.
     #[inline(never)]
     fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !contact.heard_within(now, LANDS_UNHEARD);
@@ -34,9 +36,17 @@ impl<const V: usize> Neighbours<V> {
 
     /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
     /// detour says so: `apart_m` away from it is far enough.
-    pub fn for_each_zone_of(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
-        let avoided = |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < VAGUE_POSITION_M;
-        let unknown = |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
+    pub fn for_each_zone_of(
+        &self,
+        i: usize,
+        now: Instant,
+        apart_m: f32,
+        mut tell: impl FnMut(KeepOutZone),
+    ) {
+        let avoided =
+            |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < VAGUE_POSITION_M;
+        let unknown =
+            |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
             contact.keep_out_zones(
                 now,
@@ -81,21 +91,36 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Columns in which vehicles that land without looking may come nearer than `apart_m`.
-    pub fn for_each_landing_column(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
+    pub fn for_each_landing_column(
+        &self,
+        now: Instant,
+        apart_m: f32,
+        mut tell: impl FnMut(KeepOutZone),
+    ) {
         (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
     }
 
     /// The columns of contact `i`.
-    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
+    pub fn landing_column(
+        &self,
+        i: usize,
+        now: Instant,
+        apart_m: f32,
+        mut tell: impl FnMut(KeepOutZone),
+    ) {
         let landing = |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_unseen(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
-            contact.landing_columns(now, [apart_m, self.unheard_progress_m(contact, now)], &mut tell);
+            contact.landing_columns(
+                now,
+                [apart_m, self.unheard_progress_m(contact, now)],
+                &mut tell,
+            );
         }
     }
 
     /// Zones in which a landing would end within `apart_m` of a vehicle that is there: a path may
-    /// lead over them, and not end there. Over an area a silent one may come down anywhere on its way, or at
-    /// its pad: that bars places at `height_m`.
+    /// lead over them, and not end there. Over an area a silent one may come down anywhere on its
+    /// way, or at its pad: that bars places at `height_m`.
     pub fn for_each_landing_zone(
         &self,
         now: Instant,
@@ -116,7 +141,8 @@ impl<const V: usize> Neighbours<V> {
             if contact.may_fly_on(now) {
                 contact.for_each_leg(contact.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
             }
-            // Whoever is in the air comes down at its pad, or off its plan below where it is, or at the end of its way.
+            // Whoever is in the air comes down at its pad, or off its plan below where it is, or at
+            // the end of its way.
             if contact.is_leased() && contact.is_under_way() {
                 contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
                 if !contact.reports(ON_PLAN) {
@@ -140,9 +166,10 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column from `place` down to the
-    /// ground at `floor_m`: from where it may have come along its path it comes down, never up. At the time `fallen`, if that is given,
-    /// it may have fallen too, and not straight down.
+    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column
+    /// from `place` down to the ground at `floor_m`: from where it may have come along its path it
+    /// comes down, never up. At the time `fallen`, if that is given, it may have fallen too, and
+    /// not straight down.
     pub(crate) fn may_lie_below(
         &self,
         i: usize,
@@ -160,7 +187,11 @@ impl<const V: usize> Neighbours<V> {
             below |= high && (away - leg * share).norm_squared() < apart_m * apart_m;
         };
         contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
-            near(at, if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next }, apart_m);
+            near(
+                at,
+                if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
+                apart_m,
+            );
         });
         if let Some(([from, to], aside_m)) = fallen.and_then(|now| contact.fall(now)) {
             near(from, to, apart_m + aside_m);
@@ -168,7 +199,8 @@ impl<const V: usize> Neighbours<V> {
         below
     }
 
-    /// Whether a neighbour was last heard lower than `position` and within `within_m` of its vertical.
+    /// Whether a neighbour was last heard lower than `position` and within `within_m` of its
+    /// vertical.
     pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
         let under = |p: &Point| p.z < position.z && (p - position).xy().length() < within_m;
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
@@ -177,7 +209,8 @@ impl<const V: usize> Neighbours<V> {
     /// Marks the vehicles that now rest: a detour around them was planned.
     pub fn mark_avoided(&mut self, now: Instant) {
         for contact in &mut self.contacts {
-            contact.avoided_at = if contact.is_out_of_plan(now) { contact.state.position } else { NO_PLACE };
+            contact.avoided_at =
+                if contact.is_out_of_plan(now) { contact.state.position } else { NO_PLACE };
         }
     }
 

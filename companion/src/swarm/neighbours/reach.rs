@@ -1,9 +1,10 @@
 //! How far a vehicle flies on unheard, and when it comes there.
 //!
-//! A vehicle reports a lower bound of its later progress: from its progress now it flies at least at the assumed speed, after a
-//! delay of some seconds, as far as its gates are open or will be. A gate adds to the delay only by how much later the vehicle
-//! leaves it than that bound passes it: a gate far ahead that opens soon adds nothing. So a vehicle that waits for one that itself
-//! waits knows how far that one flies meanwhile, and so on along a row of them.
+//! A vehicle reports a lower bound of its later progress: from its progress now it flies at least
+//! at the assumed speed, after a delay of some seconds, as far as its gates are open or will be. A
+//! gate adds to the delay only by how much later the vehicle leaves it than that bound passes it: a
+//! gate far ahead that opens soon adds nothing. So a vehicle that waits for one that itself waits
+//! knows how far that one flies meanwhile, and so on along a row of them.
 
 use planner_core::flight::Gate;
 
@@ -11,12 +12,14 @@ use super::Neighbours;
 use super::bounds::STANDS_SHORT_M;
 use crate::time::Instant;
 
-/// Longest time for which an unheard vehicle waits before a gate, seconds: less than the row `Alone` waits.
+/// Longest time for which an unheard vehicle waits before a gate, seconds: less than the row
+/// `Alone` waits.
 const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl<const V: usize> Neighbours<V> {
-    /// Place of the first of these gates before which an unheard vehicle would wait too long, metres, infinite if there is
-    /// none, and the seconds by which those before it delay a flight at the assumed speed from `progress_m`.
+    /// Place of the first of these gates before which an unheard vehicle would wait too long,
+    /// metres, infinite if there is none, and the seconds by which those before it delay a flight
+    /// at the assumed speed from `progress_m`.
     pub(crate) fn unheard_reach(&self, gates: &[Gate], progress_m: f32, now: Instant) -> (f32, u8) {
         let mut delay_s = 0.0;
         let closed = gates.iter().find(|gate| {
@@ -32,7 +35,8 @@ impl<const V: usize> Neighbours<V> {
         (closed.map_or(f32::INFINITY, |gate| gate.at_m), libm::ceilf(delay_s) as u8)
     }
 
-    /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where that is unknown.
+    /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where
+    /// that is unknown.
     fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
         if self.has_passed(gate, now) {
             return Some(0.0);

@@ -1,10 +1,11 @@
 //! Progress of vehicles that a neighbour does not hear: a vehicle that hears them passes it on.
 //!
-//! The order of the schedule needs the progress of vehicles that may be out of radio range by then. So each vehicle reports,
-//! once a second at most, how far those have come that some neighbour of it does not hear: nothing at all while everybody
-//! hears everybody. Progress never falls, so it may be old. It opens gates; and a vehicle that is not heard, but was reported to
-//! follow the shared plan a moment ago, is neither lost nor somewhere about: gates keep it apart. What a vehicle itself
-//! reports goes before what others say of it.
+//! The order of the schedule needs the progress of vehicles that may be out of radio range by then.
+//! So each vehicle reports, once a second at most, how far those have come that some neighbour of
+//! it does not hear: nothing at all while everybody hears everybody. Progress never falls, so it
+//! may be old. It opens gates; and a vehicle that is not heard, but was reported to follow the
+//! shared plan a moment ago, is neither lost nor somewhere about: gates keep it apart. What a
+//! vehicle itself reports goes before what others say of it.
 //!
 //! The payload of TUNNEL under a private payload type, little-endian, at most 122 bytes:
 //!
@@ -47,7 +48,8 @@ const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
 const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
 /// Age that each hop adds, microseconds: longer than most messages take.
 const HOP_AGE_US: u64 = 500_000;
-/// Delay that each hop adds to that of the flight, seconds: a progress is not as old as its age says.
+/// Delay that each hop adds to that of the flight, seconds: a progress is not as old as its age
+/// says.
 const HOP_DELAY_S: u8 = 1;
 /// Unit of an age in the message, microseconds.
 const AGE_TICK_US: u64 = 100_000;
@@ -100,10 +102,15 @@ impl Relay {
         if !is_ours || body.len() < HEADER_LEN || body[0] != VERSION || body[1] != sender {
             return None;
         }
-        let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
+        let word =
+            |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
         let mut relay = Self { mission_crc: word(4), plan_crc: word(8), items: Vec::new() };
-        for item in body[HEADER_LEN..].get(..ITEM_LEN * usize::from(body[2]))?.chunks_exact(ITEM_LEN) {
-            let float = |at: usize| f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]]);
+        for item in
+            body[HEADER_LEN..].get(..ITEM_LEN * usize::from(body[2]))?.chunks_exact(ITEM_LEN)
+        {
+            let float = |at: usize| {
+                f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
+            };
             let item = RelayedProgress {
                 rank: item[0],
                 age: item[1],
@@ -124,7 +131,9 @@ impl NeighbourEntry {
     /// it is not heard. None if it was last heard off the plan.
     pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
-        if self.heard_within(now, HEARD_DIRECTLY_WITHIN) || (own_m.is_none() && self.intent_at.is_some()) {
+        if self.heard_within(now, HEARD_DIRECTLY_WITHIN)
+            || (own_m.is_none() && self.intent_at.is_some())
+        {
             return own_m;
         }
         match (own_m, self.relayed_m) {
@@ -133,11 +142,12 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether it is out of range, and was lately reported to follow the plan: by those that heard it longer than this vehicle
-    /// did. One that all heard up to the same moment has failed.
+    /// Whether it is out of range, and was lately reported to follow the plan: by those that heard
+    /// it longer than this vehicle did. One that all heard up to the same moment has failed.
     #[inline(never)]
     pub(super) fn is_reported_out_of_range(&self, now: Instant) -> bool {
-        let longer = |at: Instant| self.heard_at.is_none_or(|heard| at > heard + HEARD_DIRECTLY_WITHIN);
+        let longer =
+            |at: Instant| self.heard_at.is_none_or(|heard| at > heard + HEARD_DIRECTLY_WITHIN);
         self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME && longer(at))
             && !self.heard_within(now, OUT_OF_RANGE_AFTER)
             && self.progress_m(now).is_some()
@@ -166,8 +176,9 @@ impl<const V: usize> Neighbours<V> {
         let roster = &self.contacts[..self.roster];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));
         // A report that one neighbour misses is sent to all.
-        let missed =
-            |c: &NeighbourEntry| speaking().any(|by| by.rank != c.rank && by.heard_bits & (1 << c.rank) == 0);
+        let missed = |c: &NeighbourEntry| {
+            speaking().any(|by| by.rank != c.rank && by.heard_bits & (1 << c.rank) == 0)
+        };
         let first = roster.partition_point(|c| c.rank < self.relay_next);
         let mut next = self.relay_next;
         let turn = roster[first..].iter().chain(&roster[..first]);
@@ -194,7 +205,8 @@ impl<const V: usize> Neighbours<V> {
                 continue;
             }
             let known_m = contact.relayed_m.unwrap_or(f32::NEG_INFINITY);
-            let newest_m = libm::fmaxf(known_m, contact.state.progress_m.unwrap_or(f32::NEG_INFINITY));
+            let newest_m =
+                libm::fmaxf(known_m, contact.state.progress_m.unwrap_or(f32::NEG_INFINITY));
             if item.progress_m > newest_m {
                 // Progress that others report of a vehicle is believed no faster than progress that
                 // the vehicle reports itself.

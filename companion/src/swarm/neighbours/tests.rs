@@ -69,7 +69,9 @@ fn below_is_lower_and_near_the_vertical() {
     assert!(!table.any_below(&above, 2.0), "nobody was heard");
     table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 0));
     assert!(table.any_below(&above, 2.0));
-    assert!(!table.any_below(&Point::new(0.0, 3.0, 9.0), 2.0) && !table.any_below(&Point::zeros(), 2.0));
+    assert!(
+        !table.any_below(&Point::new(0.0, 3.0, 9.0), 2.0) && !table.any_below(&Point::zeros(), 2.0)
+    );
 }
 
 #[test]
@@ -131,7 +133,11 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
     table.handle_intent(at(0), 1, &intent(OUT_OF_PLAN | BLOCKED, 7, 8), 1, None);
     table.handle_position(at(0), &ORIGIN, 9, &place(0, 0));
     assert_eq!(table.states_at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
-    assert_eq!((table.heard_bits(at(0)), table.blocked_count_before(200)), (0, 0), "nor do its flags");
+    assert_eq!(
+        (table.heard_bits(at(0)), table.blocked_count_before(200)),
+        (0, 0),
+        "nor do its flags"
+    );
     table.handle_intent(at(100), 1, &intent(0, 1, 2), 1, None);
     assert!(table.states_at(at(100)).is_empty(), "it is no stranger any more");
     table.handle_position(at(200), &ORIGIN, 9, &place(200, 0));
@@ -143,7 +149,8 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
 }
 
 proptest::proptest! {
-    /// Whatever ids send whatever intents and positions, the roster keeps its slots, and what it is known by.
+    /// Whatever ids send whatever intents and positions, the roster keeps its slots, and what it is
+    /// known by.
     #[test]
     fn strangers_never_displace_the_roster(
         frames in proptest::collection::vec(
@@ -179,7 +186,11 @@ proptest::proptest! {
 fn silence_is_that_of_those_who_fly() {
     let mut table = table();
     let at = Instant::from_millis;
-    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "never heard");
+    assert_eq!(
+        table.silence_duration(at(9000), at(2000)),
+        Duration::from_millis(7000),
+        "never heard"
+    );
     table.handle_intent(at(5000), 1, &Intent { heard_bits: 0, ..intent(0, 1, 2) }, 1, None);
     assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "unheard");
     table.handle_intent(at(5000), 1, &intent(0, 1, 2), 1, None);
@@ -227,12 +238,16 @@ fn who_falls_silent_before_its_place_and_plan_were_heard_opens_gates_too() {
     let gate = Gate { at_m: 1.0, id: 9, until_m: 5.0 };
     assert!(table.has_passed(&gate, dead), "a promise may count on that");
     let state = table.states_at(dead)[0];
-    assert!((state.id, state.out_of_plan, state.grounded) == (9, true, true) && state.position == FAR_AWAY);
+    assert!(
+        (state.id, state.out_of_plan, state.grounded) == (9, true, true)
+            && state.position == FAR_AWAY
+    );
 }
 
 proptest::proptest! {
-    /// Whatever is reported, what is believed grows no faster than a vehicle flies, but for a message's delay. True reports,
-    /// however late they come, are believed as they are; a jump is believed in the end.
+    /// Whatever is reported, what is believed grows no faster than a vehicle flies, but for a
+    /// message's delay. True reports, however late they come, are believed as they are; a jump is
+    /// believed in the end.
     #[test]
     fn progress_grows_no_faster_than_a_vehicle_flies(
         delays_ms in proptest::collection::vec(0u64..1000, 2..60),
@@ -274,7 +289,10 @@ proptest::proptest! {
 #[test]
 fn deaf_is_who_hears_none_of_those_there_are() {
     let at = |seconds: u64| Instant::from_millis(seconds * 1000);
-    assert!(!Neighbours::<4>::new(&[], 1, 2.0).hears_nobody(at(100)), "alone there is nobody to hear");
+    assert!(
+        !Neighbours::<4>::new(&[], 1, 2.0).hears_nobody(at(100)),
+        "alone there is nobody to hear"
+    );
     let roster = [1, 2, 9].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
     let mut table = Neighbours::<4>::new(&roster, 1, 2.0);
     table.handle_intent(at(10), 0, &intent(0, 1, 2), 1, None);
@@ -369,8 +387,9 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let away = reach.own.away_from_box(&met.motion.position);
         let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
-        let below =
-            lands && silent && table.may_lie_below(1, &place, -MAX_COLUMN_M, reach.within_m, Some(now));
+        let below = lands
+            && silent
+            && table.may_lie_below(1, &place, -MAX_COLUMN_M, reach.within_m, Some(now));
         if table.next_within(1, now, &reach).is_none() {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
@@ -444,8 +463,8 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let told = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
             table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
             // Whatever shape is told, no place is free that may be too near by the truth.
-            let away =
-                Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0).normalize();
+            let away = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0)
+                .normalize();
             let truly_m = apart_m + if in_air { stray_m } else { 0.0 };
             let here = table.contacts[1].state.position;
             let near = here + away * (0.99 * truly_m);

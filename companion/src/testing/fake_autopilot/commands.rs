@@ -79,7 +79,9 @@ impl Bench {
                     AutopilotKind::ArduPilot => c.param2 as u32,
                 };
             }
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0 && !self.never_arms,
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {
+                self.armed = c.param1 == 1.0 && !self.never_arms
+            }
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
                 assert!(self.kind == AutopilotKind::ArduPilot && self.armed);
                 if !self.took_off {

@@ -32,7 +32,9 @@ impl Bench {
         }
         let landing = self.mode == self.kind.land_mode() && self.on_ground() && self.armed;
         self.landed_at = if landing { self.landed_at.or(Some(self.now)) } else { None };
-        if self.landed_at.is_some_and(|at| self.now - at > Duration::from_millis(2200)) && !self.stays_armed {
+        if self.landed_at.is_some_and(|at| self.now - at > Duration::from_millis(2200))
+            && !self.stays_armed
+        {
             self.armed = false;
         }
         self.disarm_by_itself();
@@ -41,7 +43,8 @@ impl Bench {
     /// Both autopilots disarm after 10 s on the ground with nothing to fly to (`COM_DISARM_PRFLT`,
     /// `DISARM_DELAY`).
     fn disarm_by_itself(&mut self) {
-        let streamed = self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));
+        let streamed =
+            self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));
         let takes_off = match self.kind {
             AutopilotKind::Px4 => streamed && self.mode == self.kind.setpoint_mode(),
             AutopilotKind::ArduPilot => self.took_off,

@@ -2,7 +2,9 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange};
+use planner_core::flight::{
+    HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange,
+};
 use planner_core::frames::Geodetic;
 
 use super::Plan;
@@ -10,7 +12,8 @@ use crate::{Config, RosterEntry};
 
 pub(crate) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 /// 300 m away and 20 m up: frames that are mixed up fly into the ground.
-pub(crate) const EKF_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3350, lon_deg: -3.7640, alt_m: 720.0 };
+pub(crate) const EKF_ORIGIN: Geodetic =
+    Geodetic { lat_deg: 40.3350, lon_deg: -3.7640, alt_m: 720.0 };
 pub(crate) const SYSTEM: u8 = 42;
 pub(crate) const START: Point = Point::new(8.0, 12.0, 1.5);
 pub(crate) const GOAL: Point = Point::new(16.0, 12.0, 3.5);
@@ -34,7 +37,15 @@ pub(crate) fn plan() -> Plan {
         path.push(point, 1.2).unwrap();
     }
     let gates = heapless::Vec::new();
-    VehiclePlan { task: Task::Goto(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
+    VehiclePlan {
+        task: Task::Goto(0),
+        path,
+        climb_m: 1.5,
+        descent_m: 3.5,
+        depart_s: 0.0,
+        gates,
+        plan_crc: 5,
+    }
 }
 
 /// One picture of a field, and home: up to its layer, out, back, and down over its pad.

@@ -39,10 +39,12 @@ impl Bench {
             alt: (place.alt_m * 1e3) as i32,
             ..Default::default()
         };
-        let head = |sequence| Header { system: id, component: crate::COMPANION_COMPONENT, sequence };
+        let head =
+            |sequence| Header { system: id, component: crate::COMPANION_COMPONENT, sequence };
         let mut out = [0; MAX_FRAME_LEN];
         let (id, seed) = (TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC);
-        let n = frame::encode_raw(head(self.neighbour_sequence), id, seed, &payload[..len], &mut out);
+        let n =
+            frame::encode_raw(head(self.neighbour_sequence), id, seed, &payload[..len], &mut out);
         self.companion.handle_bytes(Link::Swarm, self.now, &out[..n]);
         let n = frame::encode(head(self.neighbour_sequence.wrapping_add(1)), &place, &mut out);
         self.companion.handle_bytes(Link::Swarm, self.now, &out[..n]);

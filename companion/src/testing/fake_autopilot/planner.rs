@@ -1,4 +1,5 @@
-//! The planner of the shell: it reads what is wanted when it begins, and answers one request after the other.
+//! The planner of the shell: it reads what is wanted when it begins, and answers one request after
+//! the other.
 
 extern crate std;
 use std::vec::Vec;
@@ -20,10 +21,15 @@ pub(super) struct Answer {
 }
 
 impl Bench {
-    /// Begins what the vehicle wants, and gives the answer that is due, whatever the vehicle wants by then. False if neither is.
+    /// Begins what the vehicle wants, and gives the answer that is due, whatever the vehicle wants
+    /// by then. False if neither is.
     pub(super) fn step_planner(&mut self) -> bool {
         if let Some(answer) = self.answer_under_way.take_if(|answer| answer.due <= self.now) {
-            self.companion.handle_plan(self.now, answer.wanted, answer.plan.as_ref().map_err(|e| *e));
+            self.companion.handle_plan(
+                self.now,
+                answer.wanted,
+                answer.plan.as_ref().map_err(|e| *e),
+            );
             return true;
         }
         if self.answer_under_way.is_some() {
@@ -65,8 +71,14 @@ impl Bench {
         let found = |()| {
             let mut path = Path::new();
             if matches!(request.goal, Goal::Home { .. }) {
-                around::plan_detour(&Transit::<1>::empty(), None, request, &mut obstacles, &mut path)
-                    .map_err(|_| PlanFailure::Unreachable)?;
+                around::plan_detour(
+                    &Transit::<1>::empty(),
+                    None,
+                    request,
+                    &mut obstacles,
+                    &mut path,
+                )
+                .map_err(|_| PlanFailure::Unreachable)?;
                 return Ok(VehiclePlan { path, descent_m: request.descent_m, ..plan() });
             }
             path.push(request.here, 1.2).unwrap();
@@ -82,7 +94,8 @@ impl Bench {
         if self.undividable {
             return Some(Err(PlanFailure::Capacity));
         }
-        let rank = usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
+        let rank =
+            usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
         // Beside its path its plan is the detour.
         let beside = self.companion.detours.is_beside_plan();

@@ -11,14 +11,19 @@ use crate::autopilot::AutopilotKind;
 
 impl Bench {
     pub(crate) fn heartbeat(&mut self) -> Vec<u8> {
-        let armed = if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
-        let mut data = HEARTBEAT_DATA { custom_mode: self.mode, base_mode: armed, ..Default::default() };
+        let armed =
+            if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
+        let mut data =
+            HEARTBEAT_DATA { custom_mode: self.mode, base_mode: armed, ..Default::default() };
         data.autopilot = match self.kind {
             AutopilotKind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
             AutopilotKind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
         };
-        data.system_status =
-            if self.status >= 5 { MavState::MAV_STATE_CRITICAL } else { MavState::MAV_STATE_ACTIVE };
+        data.system_status = if self.status >= 5 {
+            MavState::MAV_STATE_CRITICAL
+        } else {
+            MavState::MAV_STATE_ACTIVE
+        };
         self.bytes(&data)
     }
 
@@ -65,7 +70,8 @@ impl Bench {
                 self.send(&ESTIMATOR_STATUS_DATA { pos_horiz_accuracy, ..Default::default() });
             }
             if self.sends(1) && !self.no_battery {
-                let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
+                let status =
+                    SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
                 self.send(&status);
             }
         }

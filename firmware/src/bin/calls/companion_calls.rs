@@ -44,8 +44,8 @@ const ACK: u8 = 128;
 const FTP_DATA: usize = 239;
 const GROUND: (u8, u8) = (255, 190);
 
-/// All of them, each part in a stack frame of its own: a companion takes 36 kB of the stack, and three of them in one frame ran
-/// over the statics below it.
+/// All of them, each part in a stack frame of its own: a companion takes 36 kB of the stack, and
+/// three of them in one frame ran over the statics below it.
 #[inline(never)]
 pub fn measure_companion_calls(meter: &mut impl Meter) {
     measure_framing(meter);
@@ -65,7 +65,8 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
     .run();
 }
 
-/// Bytes that look like the start of a frame again and again, each with a wrong checksum; and noise.
+/// Bytes that look like the start of a frame again and again, each with a wrong checksum; and
+/// noise.
 #[inline(never)]
 fn measure_framing(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
@@ -108,7 +109,9 @@ fn measure_framing(meter: &mut impl Meter) {
     let mut out = [0; MAX_FRAME_LEN];
     let full = [0xA5; 255];
     let header = Header { system: 1, component: 191, sequence: 0 };
-    meter.call("frame::encode_raw, 255 bytes", 0, || frame::encode_raw(header, 0, 50, &full, &mut out));
+    meter.call("frame::encode_raw, 255 bytes", 0, || {
+        frame::encode_raw(header, 0, 50, &full, &mut out)
+    });
 }
 
 /// A mission file for as many vehicles as there may be.
@@ -160,10 +163,12 @@ fn measure_mission_parsing(meter: &mut impl Meter) {
     });
 }
 
-/// The agreement on what lost vehicles leave, among as many as there may be, each of which reports something new.
+/// The agreement on what lost vehicles leave, among as many as there may be, each of which reports
+/// something new.
 #[inline(never)]
 fn measure_fleet_agreement(meter: &mut impl Meter) {
-    let mut fleet = Fleet::<VEHICLES>::new(0, VEHICLES, FleetTimeouts::of_flight(Duration::from_secs(60)));
+    let mut fleet =
+        Fleet::<VEHICLES>::new(0, VEHICLES, FleetTimeouts::of_flight(Duration::from_secs(60)));
     let bytes = size_of_val(&fleet);
     let mut now = Instant::ZERO;
     fleet.begin_flight(now);
@@ -172,7 +177,11 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
         // The last ones fall silent one by one, those before them promise and hold.
         let hearing = |rank: usize| {
             let speaks = rank < VEHICLES - usize::from(round / 10);
-            MemberReception { heard_at: speaks.then_some(now), hears_us: speaks, heard_by_others: speaks }
+            MemberReception {
+                heard_at: speaks.then_some(now),
+                hears_us: speaks,
+                heard_by_others: speaks,
+            }
         };
         let promise_dm = Some(100 + round);
         let own = OwnReport {
@@ -187,20 +196,24 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
         }
         meter.call("fleet::Fleet::division_hash", bytes, || fleet.division_hash());
         for first in [0, roster::MAX_ENTRIES] {
-            let mut told = meter.call("fleet::Fleet::roster_message", bytes, || fleet.roster_message(first));
+            let mut told =
+                meter.call("fleet::Fleet::roster_message", bytes, || fleet.roster_message(first));
             let mut payload = [0; roster::MAX_LEN];
             meter.call("roster::RosterReport::encode", 0, || told.encode(&mut payload));
             let mut padded = [0; 255];
             padded[..roster::MAX_LEN].copy_from_slice(&payload);
-            let read = meter
-                .call("roster::RosterReport::decode", 0, || RosterReport::decode(&padded, told.system_id));
+            let read = meter.call("roster::RosterReport::decode", 0, || {
+                RosterReport::decode(&padded, told.system_id)
+            });
             assert!(read.is_some_and(|read| read == told));
             for entry in &mut told.entries {
-                (entry.progress_dm, entry.commitment_dm, entry.holds) = (10 * round + 5, promise_dm, true);
+                (entry.progress_dm, entry.commitment_dm, entry.holds) =
+                    (10 * round + 5, promise_dm, true);
             }
             let sender = 1 + usize::from(round) % (VEHICLES / 2);
-            meter
-                .call("fleet::Fleet::handle_roster, 32", bytes, || fleet.handle_roster(sender, &told, false));
+            meter.call("fleet::Fleet::handle_roster, 32", bytes, || {
+                fleet.handle_roster(sender, &told, false)
+            });
         }
     }
 }
@@ -211,14 +224,16 @@ fn values(meter: &mut impl Meter) {
     let mut config = flight::config();
     for (index, parameter) in parameters::TABLE.iter().enumerate() {
         let _ = meter.call("parameters::Parameters::set", 0, || values.set(index, parameter.max));
-        meter.call("parameters::Parameters::index_of", 0, || Parameters::index_of(parameter.name.as_bytes()));
+        meter.call("parameters::Parameters::index_of", 0, || {
+            Parameters::index_of(parameter.name.as_bytes())
+        });
     }
     meter.call("parameters::Parameters::apply", 0, || values.apply(&mut config));
     let bytes = meter.call("parameters::Parameters::to_bytes", 0, || values.to_bytes());
     let (entries, _) = bytes.as_chunks();
-    entries
-        .iter()
-        .for_each(|entry| meter.call("parameters::Parameters::restore", 0, || values.restore(entry)));
+    entries.iter().for_each(|entry| {
+        meter.call("parameters::Parameters::restore", 0, || values.restore(entry))
+    });
 }
 
 /// A flash in memory that takes no time.
@@ -264,7 +279,9 @@ impl<M: Meter> GroundedCompanion<'_, M> {
             self.feed_frame(PARAM_SET, &set);
         }
         self.feed_frame(PARAM_REQUEST_LIST, &[1, companion::COMPANION_COMPONENT]);
-        for command in [commands::START, commands::PAUSE_CONTINUE, commands::REQUEST, commands::LAND] {
+        for command in
+            [commands::START, commands::PAUSE_CONTINUE, commands::REQUEST, commands::LAND]
+        {
             let mut order = [0; 33];
             order[28..30].copy_from_slice(&command.to_le_bytes());
             (order[30], order[31]) = (1, companion::COMPANION_COMPONENT);
@@ -277,8 +294,9 @@ impl<M: Meter> GroundedCompanion<'_, M> {
     /// Mounts the flash, as a start does; whether a roadmap lies in it.
     fn mount(&mut self) -> bool {
         let flash = &mut self.flash;
-        let store =
-            self.meter.call("store::Store::mount", size_of::<Store>(), || Store::mount(LAYOUT, flash));
+        let store = self
+            .meter
+            .call("store::Store::mount", size_of::<Store>(), || Store::mount(LAYOUT, flash));
         let found = store.roadmap().is_some();
         let companion = &mut self.companion;
         self.meter.call("Companion::attach_store", COMPANION, || companion.attach_store(store));
@@ -318,7 +336,8 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         self.drain_outputs()
     }
 
-    /// Drains the companion's frames and events, and executes its flash operations; whether an FTP request was acknowledged.
+    /// Drains the companion's frames and events, and executes its flash operations; whether an FTP
+    /// request was acknowledged.
     fn drain_outputs(&mut self) -> bool {
         let Self { companion, flash, meter, now, .. } = self;
         let now = *now;
@@ -328,8 +347,9 @@ impl<M: Meter> GroundedCompanion<'_, M> {
             let mut out = [0; MAX_FRAME_LEN];
             let mut len = 0;
             for link in [Link::Autopilot, Link::Swarm] {
-                len = meter
-                    .call("Companion::poll_transmit", COMPANION, || companion.poll_transmit(link, &mut out));
+                len = meter.call("Companion::poll_transmit", COMPANION, || {
+                    companion.poll_transmit(link, &mut out)
+                });
                 granted |= len > 16 && out[7..10] == [110, 0, 0] && out[16] == ACK;
             }
             let event: Option<Event> =
@@ -348,10 +368,14 @@ impl<M: Meter> GroundedCompanion<'_, M> {
                     flash.0[at as usize..][..bytes.len()].copy_from_slice(bytes);
                     Ok(0)
                 }
-                Some(FlashRequest::Read { at, len }) => flash.read(at, &mut bytes[..len]).map(|()| len),
+                Some(FlashRequest::Read { at, len }) => {
+                    flash.read(at, &mut bytes[..len]).map(|()| len)
+                }
             };
             let outcome = outcome.map(|len| &bytes[..len]);
-            meter.call("Companion::handle_flash", COMPANION, || companion.handle_flash(now, outcome));
+            meter.call("Companion::handle_flash", COMPANION, || {
+                companion.handle_flash(now, outcome)
+            });
         }
     }
 }

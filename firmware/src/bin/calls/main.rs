@@ -1,5 +1,6 @@
-//! What every public call of planner-core and companion costs a board, in instructions: run in QEMU with `-icount shift=0`, read
-//! by the bench. A roadmap lies in bank 2, a map beyond it. Every line is a name, bytes and instructions.
+//! What every public call of planner-core and companion costs a board, in instructions: run in QEMU
+//! with `-icount shift=0`, read by the bench. A roadmap lies in bank 2, a map beyond it. Every line
+//! is a name, bytes and instructions.
 #![no_std]
 #![no_main]
 
@@ -90,7 +91,8 @@ fn measure_area_flights(meter: &mut Instructions) {
     let mut steps = 0;
     for seed in 0.. {
         let plan = flight::random_area_plan(&mut Pcg32::seed_from_u64(seed));
-        let mut companion = BoardCompanion::new(flight::area_config()).expect("the settings are good");
+        let mut companion =
+            BoardCompanion::new(flight::area_config()).expect("the settings are good");
         steps += flight::measure_flight(seed, &plan, &mut companion, meter);
         if steps >= cases::STEP_CASES {
             return;

@@ -2,7 +2,9 @@
 
 use firmware::boards::chosen::memory;
 use firmware::calls::{Meter, coverage, coverage_flights, flight};
-use firmware::capacity::{GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS};
+use firmware::capacity::{
+    GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
+};
 use firmware::cases::{self, StepCase, random_below, random_between, random_point};
 use firmware::scratch::{Planner, WorkspaceOverlay};
 use heapless::Vec;
@@ -104,13 +106,17 @@ fn measure_frames_and_grids(meter: &mut impl Meter) {
     for _ in 0..MANY_CASES {
         let origin = random_geodetic(&mut rng);
         let enu = random_point(&mut rng, 5000.0);
-        let place = meter.call("frames::enu_to_geodetic", 0, || frames::enu_to_geodetic(&origin, &enu));
+        let place =
+            meter.call("frames::enu_to_geodetic", 0, || frames::enu_to_geodetic(&origin, &enu));
         meter.call("frames::geodetic_to_enu", 0, || frames::geodetic_to_enu(&origin, &place));
         meter.call("frames::haversine_m", 0, || frames::haversine_m(&origin, &place));
         for projection in [Projection::Px4, Projection::ArduPilot] {
-            let ned = meter
-                .call("frames::geodetic_to_ned", 0, || frames::geodetic_to_ned(projection, &origin, &place));
-            meter.call("frames::ned_to_geodetic", 0, || frames::ned_to_geodetic(projection, &origin, &ned));
+            let ned = meter.call("frames::geodetic_to_ned", 0, || {
+                frames::geodetic_to_ned(projection, &origin, &place)
+            });
+            meter.call("frames::ned_to_geodetic", 0, || {
+                frames::ned_to_geodetic(projection, &origin, &ned)
+            });
         }
     }
 }
@@ -122,20 +128,24 @@ fn measure_searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Pla
     let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
     let search = &mut ws.search;
     for _ in 0..SOME_CASES {
-        let (from, to) = (random_below(&mut rng, nodes) as u16, random_below(&mut rng, nodes) as u16);
+        let (from, to) =
+            (random_below(&mut rng, nodes) as u16, random_below(&mut rng, nodes) as u16);
         let mut way: Vec<u16, WAYPOINTS> = Vec::new();
         // No path, or one too long, is an answer too.
-        let _ =
-            meter.call("search::astar", bytes, || search::astar(view, from, to, passable, search, &mut way));
+        let _ = meter.call("search::astar", bytes, || {
+            search::astar(view, from, to, passable, search, &mut way)
+        });
         let _ = meter.call("search::SearchWorkspace::path_to", 0, || search.path_to(to, &mut way));
         meter.call("roadmap::RoadmapView::edge_between", 0, || view.edge_between(from, to));
     }
-    let mut draw =
-        || -> Vec<u16, VEHICLES> { (0..VEHICLES).map(|_| random_below(&mut rng, nodes) as u16).collect() };
+    let mut draw = || -> Vec<u16, VEHICLES> {
+        (0..VEHICLES).map(|_| random_below(&mut rng, nodes) as u16).collect()
+    };
     let (starts, goals) = (draw(), draw());
     let mut row = [0.0; VEHICLES];
-    let _ =
-        meter.call("search::dijkstra_all", bytes, || search::dijkstra_all(view, starts[0], passable, search));
+    let _ = meter.call("search::dijkstra_all", bytes, || {
+        search::dijkstra_all(view, starts[0], passable, search)
+    });
     let _ = meter.call("search::dijkstra_row, 32 targets", bytes, || {
         search::dijkstra_row(view, starts[0], &goals, passable, search, &mut row)
     });
@@ -149,7 +159,8 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
     let mut rng = Pcg32::seed_from_u64(3);
     let bytes = size_of::<AssignmentWorkspace<VEHICLES>>();
     for case in 0..60 {
-        // Metres at random; few different ones; every third pair impossible; one worse than the other.
+        // Metres at random; few different ones; every third pair impossible; one worse than the
+        // other.
         let mut cost = |i: usize| match case % 4 {
             0 => random_between(&mut rng, 0.0, 100.0),
             1 => random_below(&mut rng, 4) as f32,
@@ -170,7 +181,12 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
 }
 
 /// The demo's ten vehicles.
-fn measure_plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
+fn measure_plans(
+    meter: &mut impl Meter,
+    view: &RoadmapView<'_>,
+    ws: &mut Planner,
+    plan: &mut Plan,
+) {
     let bytes = size_of::<Planner>();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
     let request = cases::plan_request(&vehicles, &descents_m);
@@ -180,20 +196,30 @@ fn measure_plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planne
         .call("plan::compute_costs, 10 × 10", bytes, || plan::compute_costs(view, &request, ws))
         .expect(good);
     meter
-        .call("plan::assign_goals, 10 × 10", bytes, || plan::assign_goals(&request, ws, &mut goals))
+        .call("plan::assign_goals, 10 × 10", bytes, || {
+            plan::assign_goals(&request, ws, &mut goals)
+        })
         .expect(good);
     meter
         .call("plan::schedule_flights, 10", bytes, || {
             plan::schedule_flights(view, &request, &goals, ws, plan)
         })
         .expect(good);
-    meter.call("plan::plan_swarm, 10", bytes, || plan::plan_swarm(view, &request, ws, plan)).expect(good);
+    meter
+        .call("plan::plan_swarm, 10", bytes, || plan::plan_swarm(view, &request, ws, plan))
+        .expect(good);
     let bytes = size_of::<SippWorkspace<ROADMAP_NODES, TIMED_SEGMENTS>>();
     for (index, flight) in plan.flights.iter().enumerate() {
         let Some(goal) = flight.task.goal() else { continue };
         let (from, to) = (index as u16, view.header().starts + goal);
-        let route =
-            RouteQuery { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
+        let route = RouteQuery {
+            cfg: &cases::SCHEDULE,
+            from,
+            to,
+            not_before_s: 0.0,
+            parked: &[],
+            handover_s: 0.0,
+        };
         let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
         let others = plan.flights.iter().filter(|other| other.id != flight.id);
         let mut own = flight.clone();
@@ -205,7 +231,12 @@ fn measure_plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planne
 }
 
 /// The largest swarm, on shortest paths between random nodes.
-fn measure_largest_swarm(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
+fn measure_largest_swarm(
+    meter: &mut impl Meter,
+    view: &RoadmapView<'_>,
+    ws: &mut Planner,
+    plan: &mut Plan,
+) {
     let mut rng = Pcg32::seed_from_u64(4);
     let cfg = &cases::SCHEDULE;
     plan.flights.clear();
@@ -216,7 +247,9 @@ fn measure_largest_swarm(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mu
             random_below(&mut rng, view.node_count()) as u16,
         );
         let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
-        if search::astar(view, from, to, passable, &mut ws.search, &mut way).is_err() || way.len() < 2 {
+        if search::astar(view, from, to, passable, &mut ws.search, &mut way).is_err()
+            || way.len() < 2
+        {
             continue;
         }
         let mut path = Path::new();
@@ -224,8 +257,15 @@ fn measure_largest_swarm(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mu
         meter.call("flight::Path::label_times", 0, || path.label_times(1.0, cfg.cruise_mps));
         let id = 1 + plan.flights.len() as u8;
         let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::MAX_TIMED_SEGMENT_M);
-        let flight =
-            Flight { id, task: Task::Goto(0), path, climb_m, descent_m, depart_s: 0.0, segment_m: piece_m };
+        let flight = Flight {
+            id,
+            task: Task::Goto(0),
+            path,
+            climb_m,
+            descent_m,
+            depart_s: 0.0,
+            segment_m: piece_m,
+        };
         plan.flights.push(flight).expect("there is room");
     }
     let bytes = size_of::<ScheduleWorkspace>();
@@ -279,7 +319,14 @@ fn measure_detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut 
             detour::plan_detour(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
         });
         let _ = meter.call("detour::plan_vehicle_detour, 128 things", bytes, || {
-            detour::plan_vehicle_detour(view, &request, &mut obstacles, search, &mut nodes, &mut own)
+            detour::plan_vehicle_detour(
+                view,
+                &request,
+                &mut obstacles,
+                search,
+                &mut nodes,
+                &mut own,
+            )
         });
         meter.call("detour::KeepOutZone::contains", 0, || obstacles[0].contains(&here));
     }
@@ -291,13 +338,17 @@ fn measure_paths(meter: &mut impl Meter) {
         let mut path: Path<WAYPOINTS> = Path::new();
         for waypoint in flight::random_path(&mut rng).waypoints() {
             let (next, clearance_m) = (waypoint.position, waypoint.clearance_m);
-            meter.call("flight::Path::push", 0, || path.push(next, clearance_m)).expect("there is room");
+            meter
+                .call("flight::Path::push", 0, || path.push(next, clearance_m))
+                .expect("there is room");
         }
         let length_m = path.length_m();
         let along_m = random_between(&mut rng, 0.0, length_m);
         let near = random_point(&mut rng, 30.0);
         meter.call("flight::Path::point_at", 0, || path.point_at(along_m));
-        meter.call("flight::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
+        meter.call("flight::Path::points_from, 16", 0, || {
+            path.points_from(along_m, 0.5).take(16).count()
+        });
         meter.call("flight::Path::project", 0, || path.project(&near, along_m, length_m));
         let track = TrackConfig { cruise_mps: flight::CRUISE_MPS, ..TrackConfig::default() };
         let mut tracker = Tracker { along_m, speed_mps: track.cruise_mps, ..Tracker::default() };
@@ -329,17 +380,25 @@ fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
         let way = random_point(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_else(Point::x);
         let b = a + way * MAX_EDGE_M;
         meter.call("voxel::VoxelGrid::is_blocked_at", 0, || grid.is_blocked_at(&a));
-        meter.call("segment::segment_is_clear, 0 m", 0, || segment::segment_is_clear(grid, &a, &b, 0.0));
+        meter.call("segment::segment_is_clear, 0 m", 0, || {
+            segment::segment_is_clear(grid, &a, &b, 0.0)
+        });
         meter.call("segment::segment_is_clear, 0.8 m", 0, || {
             segment::segment_is_clear(grid, &a, &b, cases::CLEARANCE_M)
         });
-        if let (Some(from), Some(to)) = (segment::snap(grid.shape(), &a), segment::snap(grid.shape(), &b)) {
+        if let (Some(from), Some(to)) =
+            (segment::snap(grid.shape(), &a), segment::snap(grid.shape(), &b))
+        {
             meter.call("segment::snapped_segment_touches", 0, || {
                 segment::snapped_segment_touches(grid, &from, &to)
             });
         }
-        meter.call("segment::segment_clearance, to 2 m", 0, || segment::segment_clearance(grid, &a, &b, 2.0));
-        meter.call("segment::point_clearance, to 2 m", 0, || segment::point_clearance(grid, &a, 2.0));
+        meter.call("segment::segment_clearance, to 2 m", 0, || {
+            segment::segment_clearance(grid, &a, &b, 2.0)
+        });
+        meter.call("segment::point_clearance, to 2 m", 0, || {
+            segment::point_clearance(grid, &a, 2.0)
+        });
         let nodes = [a, b];
         meter.call("prm::edge_clearance, to 2 m", 0, || {
             prm::edge_clearance(grid, &nodes, prm::Edge { a: 0, b: 1 }, 2.0)
@@ -348,23 +407,37 @@ fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
 }
 
 /// P3D's building on board.
-fn measure_roadmap_builds(meter: &mut impl Meter, grid: &VoxelGrid<'_>, scratch: &mut WorkspaceOverlay) {
+fn measure_roadmap_builds(
+    meter: &mut impl Meter,
+    grid: &VoxelGrid<'_>,
+    scratch: &mut WorkspaceOverlay,
+) {
     let bytes = size_of::<prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>>();
     let good = "the building has room";
     let builder = scratch.builder();
     meter
-        .call("prm::sample_nodes, 2300", 0, || builder.sample_nodes(grid, &[], &cases::ROADMAP_CONFIG))
+        .call("prm::sample_nodes, 2300", 0, || {
+            builder.sample_nodes(grid, &[], &cases::ROADMAP_CONFIG)
+        })
         .expect(good);
     meter
-        .call("prm::Workspace::build_index, 2300", bytes, || builder.build_index(&cases::ROADMAP_CONFIG))
+        .call("prm::Workspace::build_index, 2300", bytes, || {
+            builder.build_index(&cases::ROADMAP_CONFIG)
+        })
         .expect(good);
     meter
-        .call("prm::connect_range, 2300", bytes, || builder.connect_nodes(grid, &cases::ROADMAP_CONFIG))
+        .call("prm::connect_range, 2300", bytes, || {
+            builder.connect_nodes(grid, &cases::ROADMAP_CONFIG)
+        })
         .expect(good);
     let wide = Config { clearance_m: cases::CLEARANCE_M, ..cases::ROADMAP_CONFIG };
-    meter.call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample_nodes(grid, &[], &wide)).expect(good);
+    meter
+        .call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample_nodes(grid, &[], &wide))
+        .expect(good);
     builder.build_index(&wide).expect(good);
-    meter.call("prm::connect_range, 2300, 0.8 m", bytes, || builder.connect_nodes(grid, &wide)).expect(good);
+    meter
+        .call("prm::connect_range, 2300, 0.8 m", bytes, || builder.connect_nodes(grid, &wide))
+        .expect(good);
 }
 
 /// Calls that a desk makes, on a small roadmap.
@@ -400,7 +473,9 @@ fn measure_desk_calls(
         starts: 0,
         goals: 0,
     };
-    meter.call("roadmap::write, 300", 0, || roadmap::write(&header, nodes, kept, file)).expect(good);
+    meter
+        .call("roadmap::write, 300", 0, || roadmap::write(&header, nodes, kept, file))
+        .expect(good);
     let len = meter
         .call("roadmap::write_with_landmarks, 300", size_of::<Search>(), || {
             roadmap::write_with_landmarks(&header, nodes, kept, &[], search, file)

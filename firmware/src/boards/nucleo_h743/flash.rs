@@ -1,15 +1,20 @@
-//! Bank 2 of the STM32H743's flash: 8 sectors of 128 kB, words of 32 bytes with an error-correcting code each.
+//! Bank 2 of the STM32H743's flash: 8 sectors of 128 kB, words of 32 bytes with an error-correcting
+//! code each.
 //!
-//! A word whose programming was cut by a reset has a code that fits nothing. Reading one is answered by a bus error (RM0433, "Error
-//! code correction": double error detection), which would end in a hard fault. So all is read as memory is probed (ARMv7-M
-//! manual, `CCR.BFHFNMIGN`): with FAULTMASK set this code runs at priority −1, where that bit has a load's bus error ignored and
-//! noted in CFSR alone. For the time of one word, about a microsecond, no interrupt is taken but NMI. A load's error belongs to
-//! the load that made it, so what is found in CFSR between the barriers is this word's. The flag that the flash itself keeps is not
-//! asked: a load that the processor made ahead of time, and dropped, may have set it.
+//! A word whose programming was cut by a reset has a code that fits nothing. Reading one is
+//! answered by a bus error (RM0433, "Error code correction": double error detection), which would
+//! end in a hard fault. So all is read as memory is probed (ARMv7-M manual, `CCR.BFHFNMIGN`): with
+//! FAULTMASK set this code runs at priority −1, where that bit has a load's bus error ignored and
+//! noted in CFSR alone. For the time of one word, about a microsecond, no interrupt is taken but
+//! NMI. A load's error belongs to the load that made it, so what is found in CFSR between the
+//! barriers is this word's. The flag that the flash itself keeps is not asked: a load that the
+//! processor made ahead of time, and dropped, may have set it.
 //!
-//! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands embassy-stm32 0.6 takes every erasure and program for
-//! failed: it clears them by FLASH_SR2, which on this chip is read-only for them. So they are cleared before. It leaves PSIZE at 8 bits
-//! when it has programmed, as which a sector is erased at the slowest (DS12110, "Flash memory programming"): so that is widened before.
+//! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands embassy-stm32 0.6
+//! takes every erasure and program for failed: it clears them by FLASH_SR2, which on this chip is
+//! read-only for them. So they are cleared before. It leaves PSIZE at 8 bits when it has
+//! programmed, as which a sector is erased at the slowest (DS12110, "Flash memory programming"): so
+//! that is widened before.
 //!
 //! The bank is not cached, so a load that fails is this code's own, and what was programmed is what
 //! is read. Only the sectors of the roadmap in use are: the MPU holds them read only for as long.
@@ -62,7 +67,9 @@ impl Flash {
     pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
         let address = bank_address(at, len)?;
         // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
-        let lent = self.lender.lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
+        let lent = self
+            .lender
+            .lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
         // SAFETY: nobody writes there.
         unsafe { mpu::set(super::ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32))) };
         Some(lent)
@@ -107,10 +114,11 @@ impl ReadFlash for Flash {
 /// # Safety
 /// They have to be memory, whole or torn.
 unsafe fn read_tolerating_bus_errors(from: *const u8, out: &mut [u8]) -> Result<(), FlashFault> {
-    // SAFETY: no other code of the firmware uses CCR and CFSR but the fault handler, which does not come back.
+    // SAFETY: no other code of the firmware uses CCR and CFSR but the fault handler, which does not
+    // come back.
     let scb = unsafe { &*SCB::PTR };
-    // SAFETY: FAULTMASK and BFHFNMIGN are set for the loads alone, and put back: they were not set before. Nothing in between may
-    // panic; `out` is not in the flash, so only the loads can fail.
+    // SAFETY: FAULTMASK and BFHFNMIGN are set for the loads alone, and put back: they were not set
+    // before. Nothing in between may panic; `out` is not in the flash, so only the loads can fail.
     unsafe {
         asm!("cpsid f", options(nostack, preserves_flags));
         scb.ccr.modify(|ccr| ccr | BFHFNMIGN);

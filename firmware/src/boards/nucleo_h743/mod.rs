@@ -49,8 +49,10 @@ const RADIO_BAUD: u32 = 460_800;
 const UART_RING: usize = 2048;
 static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
 static DMA_RADIO_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
-static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::new(transmitter::EMPTY);
-static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::new(transmitter::EMPTY);
+static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> =
+    ConstStaticCell::new(transmitter::EMPTY);
+static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> =
+    ConstStaticCell::new(transmitter::EMPTY);
 
 /// Region of the MPU for the roadmap in use: above that of the bank, below the guard's.
 const ROADMAP_REGION: u32 = 3;

@@ -15,8 +15,8 @@ use crate::chips::h743::{self, Revision};
 /// which the oscillator takes 2 (DS12110).
 const MAX_HSE_POLLS: u32 = 200_000;
 
-/// Reason why the chip started, once: the flags are cleared. Switches the memories of domain D2 on too,
-/// and mends reading from AXI SRAM where the silicon is old.
+/// Reason why the chip started, once: the flags are cleared. Switches the memories of domain D2 on
+/// too, and mends reading from AXI SRAM where the silicon is old.
 pub fn reset_cause() -> ResetCause {
     pac::RCC.ahb2enr().modify(|w| w.0 |= h743::D2_SRAM);
     // By the errata of all peripheral clocks: read the register, then the memory is there.

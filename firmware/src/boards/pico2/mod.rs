@@ -7,8 +7,8 @@
 //! | GP25 | the light |
 //!
 //! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a
-//! UART may be lost. So both are done only on the ground, disarmed (`FlashLayout::stalls`): uploads are
-//! refused in flight, and parameters are kept when it is over.
+//! UART may be lost. So both are done only on the ground, disarmed (`FlashLayout::stalls`): uploads
+//! are refused in flight, and parameters are kept when it is over.
 //!
 //! `SYSRESETREQ` resets the processor and leaves watchdog, UARTs and all else as they are: so this
 //! board restarts by its watchdog, which resets all of it but the oscillators.
@@ -20,7 +20,9 @@ use embassy_rp::flash::{Blocking, Flash as Device};
 use embassy_rp::gpio::{Level, Output};
 use embassy_rp::interrupt;
 use embassy_rp::interrupt::{InterruptExt, Priority};
-use embassy_rp::uart::{self, BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx};
+use embassy_rp::uart::{
+    self, BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx,
+};
 use embassy_rp::{Peri, bind_interrupts, install_core0_stack_guard, pac, peripherals, watchdog};
 use heapless::Vec;
 use static_cell::ConstStaticCell;
@@ -122,7 +124,8 @@ pub fn start() -> Parts {
     let autopilot =
         BufferedUart::new(p.UART0, p.PIN_0, p.PIN_1, Irqs, sends, receives, serial(AUTOPILOT_BAUD));
     let [sends, receives] = RADIO_RINGS.take();
-    let swarm = BufferedUart::new(p.UART1, p.PIN_4, p.PIN_5, Irqs, sends, receives, serial(RADIO_BAUD));
+    let swarm =
+        BufferedUart::new(p.UART1, p.PIN_4, p.PIN_5, Irqs, sends, receives, serial(RADIO_BAUD));
     // The first bytes of a burst are taken early, so that the last ones find room.
     for uart in [pac::UART0, pac::UART1] {
         uart.uartifls().modify(|w| w.set_rxiflsel(rp2350::RX_QUARTER));

@@ -1,7 +1,7 @@
 //! Time: CMSDK timer 0 counts, timer 1 wakes.
 //!
-//! Both run at 25 MHz. With `-icount shift=0` one instruction is one nanosecond, so timer 0 counts instructions in forties.
-//! In lock step it is two nanoseconds.
+//! Both run at 25 MHz. With `-icount shift=0` one instruction is one nanosecond, so timer 0 counts
+//! instructions in forties. In lock step it is two nanoseconds.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -81,7 +81,12 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
 
 /// When a task is due, counts. Wakes those that are due by now.
 pub(super) fn next_alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
-    CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_PER_US).saturating_mul(COUNTS_PER_US)
+    CLOCK
+        .queue
+        .borrow(cs)
+        .borrow_mut()
+        .next_expiration(now / COUNTS_PER_US)
+        .saturating_mul(COUNTS_PER_US)
 }
 
 /// Makes `counts` pass at once, in lock step.

@@ -1,5 +1,6 @@
-//! Bank 2 of the STM32H743's flash, emulated in memory that a warm reset leaves alone: 8 sectors of 128 kB, words of 32 bytes
-//! that are programmed once between two erasures, and torn ones that cannot be read.
+//! Bank 2 of the STM32H743's flash, emulated in memory that a warm reset leaves alone: 8 sectors of
+//! 128 kB, words of 32 bytes that are programmed once between two erasures, and torn ones that
+//! cannot be read.
 #![expect(unsafe_code, reason = "the emulated flash is memory that the linker knows nothing of")]
 
 use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
@@ -92,7 +93,10 @@ impl crate::flash::Flash for Flash {
 
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), FlashFault> {
         let (allowed, at) = (self.0.allows(at, bytes.len() as u32), at as usize);
-        if !allowed || !at.is_multiple_of(WORD) || !bytes.len().is_multiple_of(WORD) || at + bytes.len() > LEN
+        if !allowed
+            || !at.is_multiple_of(WORD)
+            || !bytes.len().is_multiple_of(WORD)
+            || at + bytes.len() > LEN
         {
             return Err(FlashFault);
         }
@@ -105,7 +109,8 @@ impl crate::flash::Flash for Flash {
             Timer::after(PROGRAM_TIME).await;
             // SAFETY: inside the bank, and this word is not lent.
             unsafe {
-                ((BANK_ADDRESS + place * WORD) as *mut u8).copy_from_nonoverlapping(word.as_ptr(), WORD)
+                ((BANK_ADDRESS + place * WORD) as *mut u8)
+                    .copy_from_nonoverlapping(word.as_ptr(), WORD)
             };
             set_mark(place, WHOLE);
         }

@@ -1,13 +1,18 @@
 //! Lock step: this board's time passes only as the desk grants it ([`lock_step`]).
 //!
-//! A message of the desk says until when the board may run, and which bytes its ports receive when. The dual timer, above every
-//! other interrupt, comes when the next of it is due. Where the grant ends the board gives what it sent to the desk and reads the next
-//! message by semihosting. QEMU runs no instruction meanwhile, and with `-icount` its timers count instructions: so waiting takes
-//! no time of the board, its timers and its watchdog need not be stopped, and computing takes what it takes.
+//! A message of the desk says until when the board may run, and which bytes its ports receive when.
+//! The dual timer, above every other interrupt, comes when the next of it is due. Where the grant
+//! ends the board gives what it sent to the desk and reads the next message by semihosting. QEMU
+//! runs no instruction meanwhile, and with `-icount` its timers count instructions: so waiting
+//! takes no time of the board, its timers and its watchdog need not be stopped, and computing takes
+//! what it takes.
 //!
-//! Bytes enter where the UART's driver keeps what it received, and leave where it would take what is to be sent: the desk's serial line
-//! knows baud rates.
-#![expect(unsafe_code, reason = "memory that the linker knows nothing of, and the desk's debug probe")]
+//! Bytes enter where the UART's driver keeps what it received, and leave where it would take what
+//! is to be sent: the desk's serial line knows baud rates.
+#![expect(
+    unsafe_code,
+    reason = "memory that the linker knows nothing of, and the desk's debug probe"
+)]
 
 use core::cell::RefCell;
 use core::mem::MaybeUninit;
@@ -51,7 +56,8 @@ struct SimulationLink {
 
 static DESK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
 
-/// Waits for the first message, if the board was switched on in lock step. Bytes that come to a port are given to `take`.
+/// Waits for the first message, if the board was switched on in lock step. Bytes that come to a
+/// port are given to `take`.
 pub fn start(take: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];
     if sys_get_cmdline_uninit(&mut line).is_ok_and(|line| line == COMMAND_LINE.as_bytes()) {
@@ -130,7 +136,8 @@ impl SimulationLink {
     }
 
     fn message_bytes(&self) -> &'static [u8] {
-        // SAFETY: memory of this board that nothing else uses; it changes in `read_message` alone, which has no slice of it.
+        // SAFETY: memory of this board that nothing else uses; it changes in `read_message` alone,
+        // which has no slice of it.
         unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.length) }
     }
 
@@ -144,7 +151,8 @@ impl SimulationLink {
             ToBoard::Run { .. } => {}
             ToBoard::Peek { address, len } => {
                 // SAFETY: the desk asks for memory that there is.
-                let memory = unsafe { slice::from_raw_parts(address as usize as *const u8, len.into()) };
+                let memory =
+                    unsafe { slice::from_raw_parts(address as usize as *const u8, len.into()) };
                 self.queue_record(FromBoard::Memory { len }, memory);
             }
             ToBoard::Poke { address, .. } => {
@@ -153,7 +161,9 @@ impl SimulationLink {
             }
             ToBoard::Call { address, argument } => {
                 // SAFETY: as above; it may never come back.
-                let call = unsafe { core::mem::transmute::<usize, extern "C" fn(u32)>(address as usize | 1) };
+                let call = unsafe {
+                    core::mem::transmute::<usize, extern "C" fn(u32)>(address as usize | 1)
+                };
                 call(argument);
             }
         }

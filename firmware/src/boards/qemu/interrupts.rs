@@ -46,7 +46,8 @@ unsafe impl InterruptNumber for Irq {
 
 /// Sets the priority of one that is not enabled yet.
 pub fn set_priority(irq: Irq, priority: u8) {
-    // SAFETY: only priorities are set, before the interrupt is enabled, at the start when nothing else runs.
+    // SAFETY: only priorities are set, before the interrupt is enabled, at the start when nothing
+    // else runs.
     unsafe { cortex_m::Peripherals::steal().NVIC.set_priority(irq, priority) }
 }
 

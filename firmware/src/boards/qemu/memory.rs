@@ -50,7 +50,10 @@ pub fn measurement_map() -> ([u8; MAP_HEADER_LEN], &'static [u64]) {
     let words = u32::from_le_bytes([head[28], head[29], head[30], head[31]]) as usize;
     // SAFETY: as above; the memory there is 8 MB long.
     let words = unsafe {
-        core::slice::from_raw_parts((MAP_ADDRESS + MAP_HEADER_LEN) as *const u64, words.min(1 << 19))
+        core::slice::from_raw_parts(
+            (MAP_ADDRESS + MAP_HEADER_LEN) as *const u64,
+            words.min(1 << 19),
+        )
     };
     (head, words)
 }

@@ -6,7 +6,8 @@
 pub struct Register(usize);
 
 impl Register {
-    /// The register `offset` bytes into the device at `base`, one of the addresses that application note AN500 gives.
+    /// The register `offset` bytes into the device at `base`, one of the addresses that application
+    /// note AN500 gives.
     pub(super) const fn new(base: usize, offset: usize) -> Self {
         Self(base + offset)
     }

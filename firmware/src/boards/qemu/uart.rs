@@ -144,7 +144,8 @@ impl embedded_io_async::ErrorType for Receiver {
 impl embedded_io_async::Read for Receiver {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
         let lost = [&self.uart.counters.overruns, &self.uart.counters.dropped];
-        let lost = lost.iter().fold(0, |sum: u32, count| sum.wrapping_add(count.load(Ordering::Relaxed)));
+        let lost =
+            lost.iter().fold(0, |sum: u32, count| sum.wrapping_add(count.load(Ordering::Relaxed)));
         if core::mem::replace(&mut self.reported, lost) != lost {
             return Err(BytesLost);
         }

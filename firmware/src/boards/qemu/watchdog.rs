@@ -22,7 +22,8 @@ const RELOAD_COUNTS: u32 = WATCHDOG_TIMEOUT_US / 2 * 25;
 /// Interrupt at the first end, reset at the second.
 const ENABLED: u32 = 0b11;
 
-/// Half of the time is over, which this device says by the interrupt that nothing masks: the other half is left.
+/// Half of the time is over, which this device says by the interrupt that nothing masks: the other
+/// half is left.
 #[exception]
 unsafe fn NonMaskableInt() {}
 

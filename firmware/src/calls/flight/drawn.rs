@@ -3,7 +3,9 @@
 use companion::{Config, RosterEntry};
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::flight::{Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange};
+use planner_core::flight::{
+    Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange,
+};
 use rand_pcg::Pcg32;
 
 use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
@@ -31,7 +33,8 @@ pub fn config() -> Config<VEHICLES> {
     config
 }
 
-/// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight on or to and fro.
+/// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight
+/// on or to and fro.
 pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     let leg_m = [0.2, 1.0, 5.0][random_below(rng, 3)];
     let onward = random_point(rng, leg_m);
@@ -40,7 +43,11 @@ pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     let mut at = Point::new(0.0, 0.0, 10.0);
     for _ in 0..[4, 8, WAYPOINTS][random_below(rng, 3)] {
         path.push(at, random_between(rng, 0.4, 2.0)).expect("there is room");
-        at += if straight { onward + random_point(rng, 0.01 * leg_m) } else { random_point(rng, leg_m) };
+        at += if straight {
+            onward + random_point(rng, 0.01 * leg_m)
+        } else {
+            random_point(rng, leg_m)
+        };
     }
     path
 }
@@ -76,8 +83,9 @@ pub fn area_config() -> Config<VEHICLES> {
 /// A random plan of a coverage mission: every second leg is a lane.
 pub fn random_area_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let mut plan = random_plan(rng);
-    let mut photographs = PicturePlan::new(PICTURE_SPACING_M, HeadingMode::Ahead, Trigger::Distance)
-        .with_area(TOTAL_PICTURES, false);
+    let mut photographs =
+        PicturePlan::new(PICTURE_SPACING_M, HeadingMode::Ahead, Trigger::Distance)
+            .with_area(TOTAL_PICTURES, false);
     for (lane, from) in (1..plan.path.waypoints().len() - 1).step_by(2).enumerate() {
         let first = PICTURES_PER_LANE * lane as u32;
         photographs

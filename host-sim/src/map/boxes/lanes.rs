@@ -37,7 +37,11 @@ impl<S: Simd> SimdLanes<S> {
 
     /// A part of some numbers on three axes.
     #[inline(always)]
-    pub(super) fn load_part<const N: usize>(simd: S, [x, y, z]: &[[f32; N]; 3], part: usize) -> [Self; 3] {
+    pub(super) fn load_part<const N: usize>(
+        simd: S,
+        [x, y, z]: &[[f32; N]; 3],
+        part: usize,
+    ) -> [Self; 3] {
         [
             Self::new(simd, S::as_simd_f32s(x).0[part]),
             Self::new(simd, S::as_simd_f32s(y).0[part]),

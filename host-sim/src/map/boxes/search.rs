@@ -1,8 +1,9 @@
 //! The nearest obstacle to a segment, by branch and bound over a tree of boxes.
 //!
-//! All boxes of a node are treated alike, by vector instructions where the machine has them: branches that depend on distances
-//! cannot be foreseen, and cost more than arithmetic. The results are the same bits with any of them. What calculates with
-//! [`SimdLanes`] is inlined into [`Search::with_simd`], and closures are not: so there are none.
+//! All boxes of a node are treated alike, by vector instructions where the machine has them:
+//! branches that depend on distances cannot be foreseen, and cost more than arithmetic. The results
+//! are the same bits with any of them. What calculates with [`SimdLanes`] is inlined into
+//! [`Search::with_simd`], and closures are not: so there are none.
 
 use pulp::{Simd, WithSimd};
 
@@ -19,8 +20,8 @@ const LEAF: u32 = 0;
 /// Coordinate of a box that is beyond everything, cells: its square is finite.
 const FAR_AWAY_CELLS: f32 = 1e18;
 
-/// Up to [`BOXES_PER_NODE`] boxes, coordinate by coordinate so that they are compared together; cells. All of them are obstacles, or
-/// none is.
+/// Up to [`BOXES_PER_NODE`] boxes, coordinate by coordinate so that they are compared together;
+/// cells. All of them are obstacles, or none is.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     pub(super) low: [[f32; BOXES_PER_NODE]; 3],
@@ -49,8 +50,9 @@ struct OpenNode {
     node: u32,
 }
 
-/// A search for the squared distance to the nearest obstacle if that is below `bound`, else `bound`; any that is at most
-/// `enough`. A type and no closure, so that all of it is compiled for the vector instructions that it is given to.
+/// A search for the squared distance to the nearest obstacle if that is below `bound`, else
+/// `bound`; any that is at most `enough`. A type and no closure, so that all of it is compiled for
+/// the vector instructions that it is given to.
 pub(super) struct Search<'a> {
     /// The first is the root.
     pub(super) nodes: &'a [Node],
@@ -137,9 +139,10 @@ impl Segment {
             .fold(f32::INFINITY, f32::min)
     }
 
-    /// For each box of a node a square that no distance from the segment to it is below, and the square of one that there
-    /// is. The first is the greater of two: the distance of the box around the segment, and, as squares of distances along a
-    /// segment are convex, the tangent where the segment is nearest to the box's centre.
+    /// For each box of a node a square that no distance from the segment to it is below, and the
+    /// square of one that there is. The first is the greater of two: the distance of the box around
+    /// the segment, and, as squares of distances along a segment are convex, the tangent where the
+    /// segment is nearest to the box's centre.
     #[inline(always)]
     fn distance_bounds_sq<S: Simd>(
         &self,
@@ -150,11 +153,14 @@ impl Segment {
         let [first, last] =
             [SimdLanes::splat_triple(simd, self.low), SimdLanes::splat_triple(simd, self.high)];
         let [zero, half, one] = SimdLanes::splat_triple(simd, [0.0, 0.5, 1.0]);
-        let [two, rounding, inv_square] = SimdLanes::splat_triple(simd, [2.0, 2e-6, self.inv_square]);
+        let [two, rounding, inv_square] =
+            SimdLanes::splat_triple(simd, [2.0, 2e-6, self.inv_square]);
         let (mut least, mut most) = ([0.0; BOXES_PER_NODE], [0.0; BOXES_PER_NODE]);
         for part in 0..BOXES_PER_NODE / S::F32_LANES {
-            let [low, high] =
-                [SimdLanes::load_part(simd, &node.low, part), SimdLanes::load_part(simd, &node.high, part)];
+            let [low, high] = [
+                SimdLanes::load_part(simd, &node.low, part),
+                SimdLanes::load_part(simd, &node.high, part),
+            ];
             let (mut gap_square, mut along) = (zero, zero);
             for axis in 0..3 {
                 let gap = (low[axis] - last[axis]).max(first[axis] - high[axis]).max(zero);
@@ -178,8 +184,9 @@ impl Segment {
         (least, most)
     }
 
-    /// Squared distance to each box of a node. As a function of the place along the segment it is convex and piecewise
-    /// quadratic, with breaks where the segment crosses a face's plane; its rate is linear between them.
+    /// Squared distance to each box of a node. As a function of the place along the segment it is
+    /// convex and piecewise quadratic, with breaks where the segment crosses a face's plane; its
+    /// rate is linear between them.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "several arrays of three axes, side by side")]
     fn distances_sq_to_boxes<S: Simd>(&self, simd: S, node: &Node) -> [f32; BOXES_PER_NODE] {
@@ -191,8 +198,10 @@ impl Segment {
         let [zero, a_half, one] = SimdLanes::splat_triple(simd, [0.0, 0.5, 1.0]);
         let mut squares = [0.0; BOXES_PER_NODE];
         for part in 0..BOXES_PER_NODE / S::F32_LANES {
-            let [low, high] =
-                [SimdLanes::load_part(simd, &node.low, part), SimdLanes::load_part(simd, &node.high, part)];
+            let [low, high] = [
+                SimdLanes::load_part(simd, &node.low, part),
+                SimdLanes::load_part(simd, &node.high, part),
+            ];
             let mut boxes = Boxes { half: [zero; 3], start: [zero; 3], d };
             for axis in 0..3 {
                 boxes.half[axis] = (high[axis] - low[axis]) * a_half;
@@ -207,7 +216,8 @@ impl Segment {
                     let (_, rate) = boxes.at(t);
                     let falls = rate.is_below(zero);
                     (from, to) = (t.select(falls, from), to.select(falls, t));
-                    (rate_from, rate_to) = (rate.select(falls, rate_from), rate_to.select(falls, rate));
+                    (rate_from, rate_to) =
+                        (rate.select(falls, rate_from), rate_to.select(falls, rate));
                 }
             }
             // Between both ends the distance falls, then rises, and its rate is linear.

@@ -11,8 +11,8 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 use super::checks::{VehicleSpans, check_margins};
 use super::terrain::TerrainFile;
 use super::{
-    Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults, read_geodetic,
-    read_unsupported, read_vehicles, unsupported_error,
+    Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults,
+    read_geodetic, read_unsupported, read_vehicles, unsupported_error,
 };
 use crate::area::overlap::{self, Overlap};
 use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
@@ -41,7 +41,11 @@ enum Coordinates {
 }
 
 /// The scenario of a coverage mission.
-pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
+pub(in crate::scenario) fn coverage(
+    text: Text<'_>,
+    root: &Table<'_>,
+    folder: &Path,
+) -> Result<Scenario> {
     let Common { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_STRAY_OVER_FIELDS_M, DEFAULT_AREA_TIME_LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
@@ -57,9 +61,9 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let mission = mission.unwrap_or_else(|| empty_table(text, "mission"));
     for key in ["goals", "goals_file"] {
         let goals = mission.get(key);
-        unsupported.extend(
-            goals.map(|goals| unsupported_error(text, &goals.span, &format!("mission.{key} beside [area]"))),
-        );
+        unsupported.extend(goals.map(|goals| {
+            unsupported_error(text, &goals.span, &format!("mission.{key} beside [area]"))
+        }));
     }
     let mission = self::read_coverage_mission(&mission, &vehicles)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
@@ -70,14 +74,20 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     }
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
-    let apart_m = margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
+    let apart_m =
+        margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
     check_pads(text, &vehicles, &spans, apart_m)?;
     check_heights(text, &vehicles, &spans, area.heights.mission_m)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    area.usable =
-        margins::usable_footprint(&area.spacing, area.height_m, mission.cruise_mps, &simulation, &vehicles);
+    area.usable = margins::usable_footprint(
+        &area.spacing,
+        area.height_m,
+        mission.cruise_mps,
+        &simulation,
+        &vehicles,
+    );
     Ok(Scenario {
         path: text.file.to_owned(),
         text: text.text.to_owned(),
@@ -105,7 +115,12 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
 const FLOWN_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
 
 /// Pads have to be so far apart, however high they lie: no vehicle climbs through another one.
-fn check_pads(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], apart_m: f32) -> Result<()> {
+fn check_pads(
+    text: Text<'_>,
+    vehicles: &[Vehicle],
+    spans: &[VehicleSpans],
+    apart_m: f32,
+) -> Result<()> {
     for (index, (vehicle, spans)) in vehicles.iter().zip(spans).enumerate() {
         let apart = |other: &Vehicle| (vehicle.start - other.start).xy().norm();
         let near = |other: &&Vehicle| apart(other) < apart_m;
@@ -123,8 +138,14 @@ fn check_pads(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], apar
 }
 
 /// No vehicle starts as high as pictures are taken, or higher.
-fn check_heights(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], height_m: f32) -> Result<()> {
-    let Some((vehicle, spans)) = vehicles.iter().zip(spans).find(|(v, _)| v.start.z >= height_m) else {
+fn check_heights(
+    text: Text<'_>,
+    vehicles: &[Vehicle],
+    spans: &[VehicleSpans],
+    height_m: f32,
+) -> Result<()> {
+    let Some((vehicle, spans)) = vehicles.iter().zip(spans).find(|(v, _)| v.start.z >= height_m)
+    else {
         return Ok(());
     };
     let why = format!(
@@ -135,7 +156,10 @@ fn check_heights(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], h
 }
 
 /// `[mission]` of a coverage mission: it has no goals.
-fn read_coverage_mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mission> {
+fn read_coverage_mission(
+    table: &Table<'_>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+) -> Result<Mission> {
     table.one_of("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
     table.declare_keys(&["objective", "goals", "goals_file"]);
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
@@ -165,7 +189,8 @@ fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFi
     if let (Some(terrain), None) = (&terrain, given) {
         origin.alt_m = terrain.altitude_m(table.text, &origin)?;
     }
-    let (vertices, rings) = rings_in_mission_frame(table, &source, &polygons, coordinates, &origin)?;
+    let (vertices, rings) =
+        rings_in_mission_frame(table, &source, &polygons, coordinates, &origin)?;
     let camera = table.get("camera").map(|v| read_camera(&v)).transpose()?;
     let (height_m, spacing) = read_spacing(table, camera.as_ref())?;
     let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
@@ -193,7 +218,11 @@ fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFi
         trigger: table.one_of(
             "trigger",
             Trigger::Distance,
-            &[("distance", Trigger::Distance), ("waypoint", Trigger::Waypoint), ("none", Trigger::None)],
+            &[
+                ("distance", Trigger::Distance),
+                ("waypoint", Trigger::Waypoint),
+                ("none", Trigger::None),
+            ],
         )?,
     };
     table.finish()?;
@@ -203,8 +232,11 @@ fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFi
 /// The polygons of the table, what their numbers are, and where they stand.
 fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, Span)> {
     let (file, polygon) = (table.get("file"), table.get("polygon"));
-    let words =
-        [("wgs84", Coordinates::Wgs84), ("metres", Coordinates::Metres), ("meters", Coordinates::Metres)];
+    let words = [
+        ("wgs84", Coordinates::Wgs84),
+        ("metres", Coordinates::Metres),
+        ("meters", Coordinates::Metres),
+    ];
     let said = table.get("coordinates").map(|v| v.one_of(&words)).transpose()?;
     let (mut polygons, usual, span) = match (&file, &polygon) {
         (Some(_), Some(polygon)) => {
@@ -216,8 +248,9 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
         }
         (Some(file), None) => {
             let path = folder.join(file.str()?);
-            let polygons = area::read(&path)
-                .map_err(|error| file.error(&format!("is no area: {}: {error}", quoted_path(&path))))?;
+            let polygons = area::read(&path).map_err(|error| {
+                file.error(&format!("is no area: {}: {error}", quoted_path(&path)))
+            })?;
             let metres = AreaFormat::from_path(&path) == Some(AreaFormat::Wkt);
             let usual = if metres { Coordinates::Metres } else { Coordinates::Wgs84 };
             (polygons, usual, file.span.clone())
@@ -249,7 +282,8 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
     Ok((polygons, coordinates, span))
 }
 
-/// One ring: `[[x, y], …]` is metres unless `coordinates` says else, `[{ lat_deg, lon_deg }, …]` is degrees.
+/// One ring: `[[x, y], …]` is metres unless `coordinates` says else, `[{ lat_deg, lon_deg }, …]` is
+/// degrees.
 fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
     let items = value.items()?;
     let degrees = items.first().is_some_and(Value::is_table);
@@ -267,7 +301,9 @@ fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
             }
             false => {
                 let pair = item.items()?;
-                let [x, y] = pair.as_slice() else { return Err(item.error("must be two numbers, x and y")) };
+                let [x, y] = pair.as_slice() else {
+                    return Err(item.error("must be two numbers, x and y"));
+                };
                 let range = -1e7..=1e7;
                 [x.f64(&range)?, y.f64(&range)?]
             }
@@ -298,7 +334,9 @@ fn rings_in_mission_frame(
         (RingKind::Hole, &polygons.holes),
         (RingKind::NoFly, &polygons.no_fly),
     ];
-    for (kind, ring) in kinds.iter().flat_map(|(kind, rings)| rings.iter().map(move |ring| (*kind, ring))) {
+    for (kind, ring) in
+        kinds.iter().flat_map(|(kind, rings)| rings.iter().map(move |ring| (*kind, ring)))
+    {
         let begin = vertices.len();
         for &[x, y] in ring {
             let place = match coordinates {
@@ -313,8 +351,9 @@ fn rings_in_mission_frame(
                 }
             };
             // Two that f32 or the user makes one are one.
-            let repeats =
-                vertices[begin..].last().is_some_and(|last: &Flat| (place - last).amax() < SAME_VERTEX_M);
+            let repeats = vertices[begin..]
+                .last()
+                .is_some_and(|last: &Flat| (place - last).amax() < SAME_VERTEX_M);
             if !repeats {
                 vertices.push(place);
             }
@@ -340,7 +379,10 @@ fn rings_in_mission_frame(
         Err(error) => {
             let far = matches!(error, core_area::AreaError::TooFar { .. });
             let near = "metres are about area.origin, and origin must be near the area";
-            bad(format!("area: {}", describe_area_error(error, &rings)), if far { near } else { "" })
+            bad(
+                format!("area: {}", describe_area_error(error, &rings)),
+                if far { near } else { "" },
+            )
         }
     }
 }
@@ -352,7 +394,9 @@ fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
         indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
     };
     Some(match overlap::find_overlap(&of(RingKind::Outer), &of(RingKind::Hole))? {
-        Overlap::Outers(i, j) => (format!("polygon {i} and polygon {j} overlap"), "draw them as one"),
+        Overlap::Outers(i, j) => {
+            (format!("polygon {i} and polygon {j} overlap"), "draw them as one")
+        }
         Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
         Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
         Overlap::NothingLeft(i) => (format!("holes leave nothing of polygon {i}"), ""),
@@ -380,14 +424,20 @@ fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -> String {
     match error {
         E::NoOuter => "there is no polygon".to_owned(),
         E::Shape => "its rings are out of order".to_owned(),
-        E::TooFewVertices { ring: r } => format!("{} has fewer than three vertices that differ", ring(r)),
+        E::TooFewVertices { ring: r } => {
+            format!("{} has fewer than three vertices that differ", ring(r))
+        }
         E::NotFinite { vertex: v } => format!("{} is not a finite number", vertex(v)),
         E::TooFar { vertex: v } => {
             format!("{} is more than {} km from the origin", vertex(v), MAX_VERTEX_M / 1e3)
         }
         E::Duplicate { vertex: v } => format!("{} repeats the one before it", vertex(v)),
-        E::NoArea { ring: r } => format!("{} encloses nothing: its vertices lie on one line", ring(r)),
-        E::SelfCrossing { vertex: v } => format!("the edge from {} crosses another one of it", vertex(v)),
+        E::NoArea { ring: r } => {
+            format!("{} encloses nothing: its vertices lie on one line", ring(r))
+        }
+        E::SelfCrossing { vertex: v } => {
+            format!("the edge from {} crosses another one of it", vertex(v))
+        }
         E::RingsCross { ring: r, other } => format!("{} and {} cross", ring(r), ring(other)),
         E::HoleOutside { ring: r } => format!("{} lies outside every polygon", ring(r)),
         E::OuterInside { ring: r } => format!("{} lies inside another polygon", ring(r)),
@@ -405,7 +455,9 @@ fn read_camera(value: &Value<'_>) -> Result<Camera> {
             let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
             let focal_mm = table.required("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
             let pixels = match table.get("pixels") {
-                Some(pixels) => read_pair(&pixels, |v| v.integer_in_range(1..=1_000_000).map(|n| n as u32))?,
+                Some(pixels) => {
+                    read_pair(&pixels, |v| v.integer_in_range(1..=1_000_000).map(|n| n as u32))?
+                }
                 None => return Err(value.error("needs pixels beside sensor_mm")),
             };
             Camera::Sensor { sides_mm, focal_mm, pixels }
@@ -431,7 +483,9 @@ fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spac
     let height = table.get("height_m");
     let gsd = table.get("gsd_m");
     let height_m = match (&height, &gsd) {
-        (Some(_), Some(gsd)) => return Err(gsd.error("cannot stand beside area.height_m: give one of them")),
+        (Some(_), Some(gsd)) => {
+            return Err(gsd.error("cannot stand beside area.height_m: give one of them"));
+        }
         (Some(height), None) => height.f64(&(0.1..=5000.0))? as f32,
         (None, Some(gsd)) => {
             let gsd_m = gsd.f64(&(1e-4..=100.0))? as f32;
@@ -442,12 +496,12 @@ fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spac
     };
     let distances = 0.1..=10_000.0;
     let lane = table.get("lane_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
-    let waypoint = table.get("waypoint_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
+    let waypoint =
+        table.get("waypoint_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
     for (overlap, spacing) in [("overlap_side", &lane), ("overlap_front", &waypoint)] {
         if let (Some(value), Some(_)) = (table.get(overlap), spacing) {
-            return Err(
-                value.error("cannot stand beside the distance that follows from it: give one of them")
-            );
+            return Err(value
+                .error("cannot stand beside the distance that follows from it: give one of them"));
         }
     }
     let side = table.f32("overlap_side", 0.6, 0.0..=0.95)?;
@@ -461,7 +515,8 @@ fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spac
             }
             (Some((lane_m, _)), None) => Footprint { along_m: *lane_m, across_m: *lane_m },
             _ => {
-                let hint = "add `camera = { fov_deg = 73.7, aspect = 1.5 }`, or lane_m and waypoint_m";
+                let hint =
+                    "add `camera = { fov_deg = 73.7, aspect = 1.5 }`, or lane_m and waypoint_m";
                 return Err(table.text.with_hint(&table.span, "area.camera is missing", hint));
             }
         },
@@ -477,7 +532,8 @@ fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spac
         Ok(()) => Ok((height_m, spacing)),
         Err(CoverageError::Gaps) => {
             let wide = lane_m > footprint.across_m;
-            let (key, side) = if wide { (&lane, footprint.across_m) } else { (&waypoint, footprint.along_m) };
+            let (key, side) =
+                if wide { (&lane, footprint.across_m) } else { (&waypoint, footprint.along_m) };
             let why = format!("leaves gaps: one picture shows {side:.2} m from {height_m} m");
             match key {
                 Some((_, value)) => Err(value.error(&why)),

@@ -14,7 +14,8 @@ pub(super) struct VehicleSpans {
     pub(super) table: Span,
 }
 
-/// Where estimates err as recorded, separation and, with a roadmap, its margin must leave room for it.
+/// Where estimates err as recorded, separation and, with a roadmap, its margin must leave room for
+/// it.
 pub(super) fn check_margins(
     text: Text<'_>,
     span: &Span,
@@ -33,14 +34,18 @@ pub(super) fn check_margins(
     let short = missing.filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
     let lacks: Vec<String> = short
         .map(|(key, has_m, need_m)| {
-            format!("{key} is {has_m:.2} m, {:.2} m less than the {need_m:.2} m it takes", need_m - has_m)
+            format!(
+                "{key} is {has_m:.2} m, {:.2} m less than the {need_m:.2} m it takes",
+                need_m - has_m
+            )
         })
         .collect();
     if lacks.is_empty() {
         return Ok(());
     }
     let hint = "docs/simulating.md adds up margin and separation; \"rtk\" errs by 0.1 m";
-    let why = format!("estimates as wrong as the recorded ones leave no room: {}", lacks.join("; "));
+    let why =
+        format!("estimates as wrong as the recorded ones leave no room: {}", lacks.join("; "));
     Err(text.with_hint(span, why, hint))
 }
 
@@ -81,7 +86,8 @@ pub(super) fn check_goals_apart(
                 let why = format!(
                     "goals {j} and {i} are {apart:.2} m apart, below the safety distance of {safety_distance_m} m"
                 );
-                let needed_m = margins::parked_separation_m(simulation, safety_distance_m, vehicles);
+                let needed_m =
+                    margins::parked_separation_m(simulation, safety_distance_m, vehicles);
                 let hint = format!("vehicles that land at both need {needed_m:.2} m between them");
                 return Err(table.text.with_hint(&span, why, hint));
             }
@@ -137,14 +143,18 @@ pub(super) fn check_goals(
         let span = spans.goal.as_ref().unwrap_or(&spans.table);
         if goal >= mission.goals.len() {
             let last = mission.goals.len() - 1;
-            return Err(
-                text.error(span, format!("vehicle {}: goal {goal} is beyond the last, {last}", vehicle.id))
-            );
+            return Err(text.error(
+                span,
+                format!("vehicle {}: goal {goal} is beyond the last, {last}", vehicle.id),
+            ));
         }
-        if let Some((other, _)) = vehicles[..index].iter().find(|(other, _)| other.goal == Some(goal)) {
-            return Err(
-                text.error(span, format!("vehicles {} and {} have the same goal", other.id, vehicle.id))
-            );
+        if let Some((other, _)) =
+            vehicles[..index].iter().find(|(other, _)| other.goal == Some(goal))
+        {
+            return Err(text.error(
+                span,
+                format!("vehicles {} and {} have the same goal", other.id, vehicle.id),
+            ));
         }
     }
     Ok(())

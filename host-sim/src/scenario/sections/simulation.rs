@@ -8,14 +8,19 @@ use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
-/// The table of a mission in which vehicles deviate from their paths by `stray_m` together, unless it says otherwise.
+/// The table of a mission in which vehicles deviate from their paths by `stray_m` together, unless
+/// it says otherwise.
 pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
-    let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
+    let methods =
+        [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.one_of("method", Method::Priority, &methods)?;
     // Companions refuse a distance of 0.
     let safety_distance_m = table.f32("safety_distance_m", SAFETY_DISTANCE_M, 0.01..=1000.0)?;
-    let separation_m =
-        table.f32("separation_m", safety_distance_m + stray_m, f64::from(safety_distance_m)..=1000.0)?;
+    let separation_m = table.f32(
+        "separation_m",
+        safety_distance_m + stray_m,
+        f64::from(safety_distance_m)..=1000.0,
+    )?;
     let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
     table.finish()?;
     Ok(deconfliction)
@@ -55,7 +60,8 @@ pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
         return Err(value.error("is no vehicle's id"));
     }
     let vehicle = vehicle.map(|v| v.integer_in_range(1..=MAX_ID).map(|id| id as u8)).transpose()?;
-    let direction = table.get("direction").map(|v| v.one_of(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
+    let direction =
+        table.get("direction").map(|v| v.one_of(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
     let fault = Fault {
         at_s,
         duration_s: table.optional_f32("duration_s", 0.0..=1e6)?,

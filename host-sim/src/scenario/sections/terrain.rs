@@ -31,7 +31,11 @@ pub(super) struct TerrainFile {
 
 impl TerrainFile {
     /// The terrain by `[area]`; `metres` where its coordinates are.
-    pub(super) fn from_table(table: &Table<'_>, folder: &Path, metres: bool) -> Result<Option<Self>> {
+    pub(super) fn from_table(
+        table: &Table<'_>,
+        folder: &Path,
+        metres: bool,
+    ) -> Result<Option<Self>> {
         let tolerance = table.get("terrain_tolerance_m");
         let Some(file) = table.get("terrain") else {
             return match tolerance {
@@ -40,7 +44,12 @@ impl TerrainFile {
             };
         };
         let tolerance_m = table.f32("terrain_tolerance_m", 3.0, 0.1..=1000.0)?;
-        Ok(Some(Self { path: folder.join(file.str()?), span: file.span.clone(), tolerance_m, metres }))
+        Ok(Some(Self {
+            path: folder.join(file.str()?),
+            span: file.span.clone(),
+            tolerance_m,
+            metres,
+        }))
     }
 
     fn read(&self, text: Text<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
@@ -56,9 +65,11 @@ impl TerrainFile {
                 format!("area.terrain: {path} is in {what}, which cannot be used"),
                 *hint,
             ),
-            TerrainError::Nowhere(hint) => {
-                text.with_hint(&self.span, format!("area.terrain: {path} does not say where it is"), *hint)
-            }
+            TerrainError::Nowhere(hint) => text.with_hint(
+                &self.span,
+                format!("area.terrain: {path} does not say where it is"),
+                *hint,
+            ),
             other => text.error(&self.span, format!("area.terrain: {path} {other}")),
         }
     }
@@ -69,7 +80,11 @@ impl TerrainFile {
         let height_m = grid.height_at(&Flat::zeros());
         let hint = "another area.origin, or a file that holds it";
         height_m.map(f64::from).ok_or_else(|| {
-            text.with_hint(&self.span, "area.terrain has no height at the mission's origin".to_owned(), hint)
+            text.with_hint(
+                &self.span,
+                "area.terrain has no height at the mission's origin".to_owned(),
+                hint,
+            )
         })
     }
 
@@ -83,13 +98,13 @@ impl TerrainFile {
         simulation: &Simulation,
     ) -> Result<()> {
         let pads: Vec<Flat> = vehicles.iter().map(|(vehicle, _)| vehicle.start.xy()).collect();
-        let [low, high] =
-            area.vertices.iter().chain(&pads).fold(
-                [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)],
-                |[low, high], place| [low.inf(place), high.sup(place)],
-            );
+        let [low, high] = area.vertices.iter().chain(&pads).fold(
+            [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)],
+            |[low, high], place| [low.inf(place), high.sup(place)],
+        );
         // Lanes may begin beyond the border, by the margin and half of what a picture shows.
-        let beyond = Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
+        let beyond =
+            Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
         let own: Vec<Vehicle> = vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
         let slope = own.iter().map(|vehicle| {
             let [climb_mps, descend_mps] = vehicle.climbs_mps();
@@ -123,12 +138,20 @@ impl TerrainFile {
             }
             vehicle.start.z = ground_m;
         }
-        let terrain =
-            Terrain { grid: Arc::new(grid), field: field.into(), tolerance_m: self.tolerance_m, slope };
+        let terrain = Terrain {
+            grid: Arc::new(grid),
+            field: field.into(),
+            tolerance_m: self.tolerance_m,
+            slope,
+        };
         let top_m = terrain.following(area.height_m).map_or(0.0, |following| following.top_m());
         if top_m <= 0.0 {
             let hint = format!("area.origin alt_m = {:.1} is above it", area.origin.alt_m);
-            return Err(text.with_hint(&self.span, "area.terrain lies below the origin".to_owned(), hint));
+            return Err(text.with_hint(
+                &self.span,
+                "area.terrain lies below the origin".to_owned(),
+                hint,
+            ));
         }
         area.heights = Heights { mission_m: top_m, ..area.heights };
         area.terrain = Some(terrain);

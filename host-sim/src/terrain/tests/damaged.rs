@@ -80,7 +80,8 @@ fn a_cloud_is_the_same_compressed() {
 fn damaged_files_end_in_an_error_or_in_heights() {
     let values: Vec<i16> = (0..300).collect();
     let image = tiff([20, 15], &values, &keys(1, 32630), [500_000.0, 4_794_000.0], 5.0);
-    let grid = b"ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 5\nNODATA_value -1\n1 2 3\n4 -1 6\n";
+    let grid =
+        b"ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 5\nNODATA_value -1\n1 2 3\n4 -1 6\n";
     type Decode = fn(&[u8]) -> Result<HeightGrid, TerrainError>;
     let files: [(&str, Vec<u8>, Decode); 5] = [
         ("tif", image, decode_tiff),
@@ -89,7 +90,8 @@ fn damaged_files_end_in_an_error_or_in_heights() {
         ("laz in layers", returns(true, 6), decode_cloud),
         ("asc", grid.to_vec(), decode_asc),
     ];
-    let tries = std::env::var("FLOCKMATE_DAMAGED").ok().and_then(|n| n.parse().ok()).unwrap_or(300u32);
+    let tries =
+        std::env::var("FLOCKMATE_DAMAGED").ok().and_then(|n| n.parse().ok()).unwrap_or(300u32);
     let mut random = Pcg32::new(12, 34);
     for (name, whole, decode) in files {
         decode(&whole).unwrap();
@@ -104,7 +106,11 @@ fn damaged_files_end_in_an_error_or_in_heights() {
                 }
                 1 => {
                     // The header counts most.
-                    let at = if random.next_u32().is_multiple_of(2) { at % 400 % bytes.len() } else { at };
+                    let at = if random.next_u32().is_multiple_of(2) {
+                        at % 400 % bytes.len()
+                    } else {
+                        at
+                    };
                     bytes[at] = random.next_u32() as u8;
                     refused += u32::from(decode(&bytes).is_err());
                 }
@@ -167,7 +173,10 @@ fn files_that_say_that_they_are_vast_are_refused() {
     assert!(matches!(decode_asc(vast.as_bytes()), Err(TerrainError::TooManyCells(10_000_000_000))));
     let few = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n";
     assert!(
-        decode_asc(few.as_bytes()).unwrap_err().to_string().contains("it has 3 heights, its header says 4")
+        decode_asc(few.as_bytes())
+            .unwrap_err()
+            .to_string()
+            .contains("it has 3 heights, its header says 4")
     );
     // Two cells of a file far apart in a frame of small ones: a box of 100 km in cells of 1 m.
     let values = vec![5i16; 4];

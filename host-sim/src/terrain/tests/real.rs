@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::*;
 
 fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/height")).join(name);
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/height")).join(name);
     if path.is_file() {
         return Some(path);
     }
@@ -66,7 +67,8 @@ fn latitude_deg(northing_m: f64) -> f64 {
     lat.to_degrees()
 }
 
-/// Lambert's conformal conic of the file, by Snyder's formulas (1987, 15-7 to 15-11), in degrees: another way to its places.
+/// Lambert's conformal conic of the file, by Snyder's formulas (1987, 15-7 to 15-11), in degrees:
+/// another way to its places.
 fn autzen([x, y]: [f64; 2]) -> [f64; 2] {
     let e = 0.006_694_380_022_90f64.sqrt();
     let [lat1, lat2, lat0] = [43.0f64, 45.5, 41.75].map(f64::to_radians);
@@ -84,7 +86,8 @@ fn autzen([x, y]: [f64; 2]) -> [f64; 2] {
     let mut lat = std::f64::consts::FRAC_PI_2 - 2.0 * small.atan();
     for _ in 0..10 {
         let s = e * lat.sin();
-        lat = std::f64::consts::FRAC_PI_2 - 2.0 * (small * ((1.0 - s) / (1.0 + s)).powf(e / 2.0)).atan();
+        lat = std::f64::consts::FRAC_PI_2
+            - 2.0 * (small * ((1.0 - s) / (1.0 + s)).powf(e / 2.0)).atan();
     }
     let lon = (east / (rho0 - north)).atan() / n + (-120.5f64).to_radians();
     [lon.to_degrees(), lat.to_degrees()]
@@ -95,11 +98,16 @@ fn autzen_is_in_feet_and_where_its_system_says() {
     let Some(path) = data("autzen_trim.las") else { return };
     // The file read by hand: 34 bytes a return from byte 2038 on.
     let bytes = std::fs::read(&path).unwrap();
-    let number = |at: usize| f64::from(i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())) * 0.01;
-    let returns: Vec<[f64; 3]> = (0..110_000).map(|i| [0, 4, 8].map(|k| number(2038 + 34 * i + k))).collect();
+    let number =
+        |at: usize| f64::from(i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())) * 0.01;
+    let returns: Vec<[f64; 3]> =
+        (0..110_000).map(|i| [0, 4, 8].map(|k| number(2038 + 34 * i + k))).collect();
     let [lon_deg, lat_deg] = autzen([636_600.0, 849_200.0]);
     // The stadium is at 44.058° north, 123.068° west.
-    assert!((lat_deg - 44.054).abs() < 0.006 && (lon_deg + 123.071).abs() < 0.006, "{lat_deg} {lon_deg}");
+    assert!(
+        (lat_deg - 44.054).abs() < 0.006 && (lon_deg + 123.071).abs() < 0.006,
+        "{lat_deg} {lon_deg}"
+    );
     let origin = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };
     let grid = super::read(&path, &anywhere(&origin)).unwrap();
     let range = grid.range_m().unwrap();
@@ -121,7 +129,10 @@ fn autzen_is_in_feet_and_where_its_system_says() {
         let beside = Flat::repeat(cell_m);
         let inside = |by: Flat| {
             let held = places.iter().filter(move |(p, _)| {
-                p.x >= low.x - by.x && p.x <= high.x + by.x && p.y >= low.y - by.y && p.y <= high.y + by.y
+                p.x >= low.x - by.x
+                    && p.x <= high.x + by.x
+                    && p.y >= low.y - by.y
+                    && p.y <= high.y + by.y
             });
             held.map(|(_, z)| *z).fold(f32::MIN, f32::max)
         };
@@ -132,7 +143,10 @@ fn autzen_is_in_feet_and_where_its_system_says() {
         }
         compared += 1;
         let highest_m = found.highest_m.unwrap();
-        assert!(highest_m >= least - 0.01 && highest_m <= most + 0.01, "{k}: {highest_m} {least} {most}");
+        assert!(
+            highest_m >= least - 0.01 && highest_m <= most + 0.01,
+            "{k}: {highest_m} {least} {most}"
+        );
     }
     assert!(compared > 25, "{compared}");
     assert!(places.iter().all(|(place, height_m)| grid.height_at(place) >= Some(*height_m - 0.01)));
@@ -151,6 +165,7 @@ fn clouds_without_returns_or_a_system_are_refused_by_name() {
     assert!(range[0] >= 406.59 && (range[1] - 586.38).abs() < 0.01, "{range:?}");
     // Its place is far from any mission.
     let window = Some([Flat::repeat(-100.0), Flat::repeat(100.0)]);
-    let error = super::read(&simple, &Frame { metres: true, window, ..anywhere(&ORIGIN) }).unwrap_err();
+    let error =
+        super::read(&simple, &Frame { metres: true, window, ..anywhere(&ORIGIN) }).unwrap_err();
     assert!(error.to_string().contains("lies elsewhere"), "{error}");
 }

@@ -31,8 +31,9 @@ fn column(place: Flat, low_m: f32, high_m: f32, radius_m: f32) -> KeepOutZone {
 
 /// A field of 400 m, and zones in it: each in a cell of its own, so that none crosses another.
 fn field(zones: &[Option<(f32, f32, f32, u8)>]) -> (StdVec<Flat>, StdVec<Ring>) {
-    let mut vertices =
-        StdVec::from([(0.0, 0.0), (400.0, 0.0), (400.0, 400.0), (0.0, 400.0)].map(|(x, y)| Flat::new(x, y)));
+    let mut vertices = StdVec::from(
+        [(0.0, 0.0), (400.0, 0.0), (400.0, 400.0), (0.0, 400.0)].map(|(x, y)| Flat::new(x, y)),
+    );
     let mut rings = StdVec::from([Ring { end: 4, kind: RingKind::Outer }]);
     for (i, zone) in zones.iter().enumerate() {
         let Some((turn, far_m, slim, corners)) = *zone else { continue };
@@ -50,7 +51,8 @@ fn field(zones: &[Option<(f32, f32, f32, u8)>]) -> (StdVec<Flat>, StdVec<Ring>) 
 
 type Way = Result<StdVec<Point>, DetourError>;
 
-/// Plans, and holds the way against what every way must keep. Also the length of the shortest one around the zones alone.
+/// Plans, and holds the way against what every way must keep. Also the length of the shortest one
+/// around the zones alone.
 fn planned(
     zones: &[Option<(f32, f32, f32, u8)>],
     request: &DetourRequest,
@@ -85,7 +87,10 @@ fn planned(
         }
         let end = points.last().unwrap();
         if request.aside {
-            assert!((end - request.here).norm() <= MAX_SIDESTEP_RINGS as f32 + 0.01 && points.len() == 2);
+            assert!(
+                (end - request.here).norm() <= MAX_SIDESTEP_RINGS as f32 + 0.01
+                    && points.len() == 2
+            );
             assert!(!known.iter().any(|o| o.contains(end)), "{end:?} is no place to rest");
         } else {
             assert!((end - OVER).norm() <= SAME_CORNER_M, "{end:?}");
@@ -120,7 +125,8 @@ fn where_the_layer_is_barred_above_it_flies_at_its_own_height() {
 #[test]
 fn a_pad_below_somebody_is_no_home_and_nobody_flies_through_a_ring_of_columns() {
     let here = Point::new(300.0, 200.0, 25.0);
-    let (way, _) = planned(&[], &request(here, false), &[column(OVER.xy(), 0.0, 20.0, 3.0)]).unwrap();
+    let (way, _) =
+        planned(&[], &request(here, false), &[column(OVER.xy(), 0.0, 20.0, 3.0)]).unwrap();
     assert_eq!(way, Err(DetourError::GoalBlocked));
     let around = |i: usize| {
         let angle = core::f32::consts::TAU * i as f32 / 16.0;

@@ -24,7 +24,8 @@ fn a_zone_makes_four_cells() {
     let cells: Vec<u32> = lanes.iter().map(|lane| lane.first).collect();
     assert_eq!(cells, [0, 0, 1, 2, 1, 2, 1, 2, 1, 2, 3, 3, 3]);
     // A strip that is left out ends a cell, and so does a lane beside one that goes on.
-    let mut lanes = [lane(0, [0.0, 9.0]), lane(2, [0.0, 9.0]), lane(3, [0.0, 4.0]), lane(3, [5.0, 9.0])];
+    let mut lanes =
+        [lane(0, [0.0, 9.0]), lane(2, [0.0, 9.0]), lane(3, [0.0, 4.0]), lane(3, [5.0, 9.0])];
     group_into_cells(&mut lanes);
     assert_eq!(lanes.map(|lane| lane.first), [0, 1, 2, 3]);
 }

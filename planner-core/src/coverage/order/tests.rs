@@ -31,7 +31,11 @@ fn back_and_forth_begins_at_the_end_that_joins_lanes_by_less() {
             lanes.iter_mut().skip(first).step_by(2).for_each(Lane::reverse);
             way_m(&lanes)
         });
-        assert!(way_m(&sorted) <= ways[0].min(ways[1]) + 2.0 * MIN_GAIN_M, "{} of {ways:?}", way_m(&sorted));
+        assert!(
+            way_m(&sorted) <= ways[0].min(ways[1]) + 2.0 * MIN_GAIN_M,
+            "{} of {ways:?}",
+            way_m(&sorted)
+        );
         assert!(sorted.iter().zip(&laid).all(|(lane, own)| lane.strip == own.strip));
         turned += usize::from(sorted[0].from != laid[0].from);
     }
@@ -49,7 +53,11 @@ fn a_search_makes_no_way_longer_and_knows_its_length() {
         let mut laid = Vec::new();
         for k in 0..count {
             // Two lanes in each strip of those along strips; the others anywhere.
-            let v = if k < strips { 10.0 * (k / 2) as f32 } else { 10.0 * unit() * strips as f32 / 2.0 };
+            let v = if k < strips {
+                10.0 * (k / 2) as f32
+            } else {
+                10.0 * unit() * strips as f32 / 2.0
+            };
             let u = if k < strips { 60.0 * (k % 2) as f32 + 30.0 * unit() } else { 100.0 * unit() };
             let (from, to) = (Flat::new(u, v), Flat::new(u + 20.0 * unit(), v));
             let strip = if k < strips { (k / 2) as u16 } else { (v / 10.0) as u16 };
@@ -61,7 +69,8 @@ fn a_search_makes_no_way_longer_and_knows_its_length() {
             order_lanes(&mut lanes, strips, &Transit::<1>::empty(), looks);
             for own in &laid {
                 let same = |lane: &&Lane| {
-                    (lane.from, lane.to) == (own.from, own.to) || (lane.to, lane.from) == (own.from, own.to)
+                    (lane.from, lane.to) == (own.from, own.to)
+                        || (lane.to, lane.from) == (own.from, own.to)
                 };
                 assert_eq!(lanes.iter().filter(same).count(), 1, "{case}: {own:?}");
             }

@@ -19,8 +19,14 @@ fn meets_an_edge(area: &Area<'_>, from: &Flat, to: &Flat) -> bool {
 }
 
 /// The shortest way over corners, by Bellman and Ford over all of them.
-fn shortest_m<const N: usize>(transit: &Transit<'_, N>, area: &Area<'_>, from: &Flat, to: &Flat) -> f32 {
-    let places: Vec<Flat> = [*from, *to].into_iter().chain(transit.corners().iter().copied()).collect();
+fn shortest_m<const N: usize>(
+    transit: &Transit<'_, N>,
+    area: &Area<'_>,
+    from: &Flat,
+    to: &Flat,
+) -> f32 {
+    let places: Vec<Flat> =
+        [*from, *to].into_iter().chain(transit.corners().iter().copied()).collect();
     let mut far_m = std::vec![f32::INFINITY; places.len()];
     far_m[0] = 0.0;
     for _ in 0..places.len() {
@@ -41,12 +47,15 @@ fn ways_around_zones_are_the_shortest_there_are() {
     let mut unit = || random.next_u32() as f32 / u32::MAX as f32;
     let (mut led_around, mut straight) = (0, 0);
     for case in 0..60 {
-        let mut vertices: Vec<Flat> =
-            [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]].map(|[x, y]| Flat::new(x, y)).into();
+        let mut vertices: Vec<Flat> = [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]]
+            .map(|[x, y]| Flat::new(x, y))
+            .into();
         let mut rings = std::vec![Ring { end: 4, kind: RingKind::Outer }];
         for zone in 0..1 + case % 4 {
-            // One in each quarter, so that none meets another; slanted, and some with an inward corner.
-            let middle = Flat::new(25.0 + 50.0 * (zone % 2) as f32, 25.0 + 50.0 * (zone / 2) as f32);
+            // One in each quarter, so that none meets another; slanted, and some with an inward
+            // corner.
+            let middle =
+                Flat::new(25.0 + 50.0 * (zone % 2) as f32, 25.0 + 50.0 * (zone / 2) as f32);
             let count = 3 + (unit() * 4.0) as usize;
             for k in 0..count {
                 let angle = core::f32::consts::TAU * (k as f32 + 0.6 * unit()) / count as f32;
@@ -64,8 +73,12 @@ fn ways_around_zones_are_the_shortest_there_are() {
             }
             let clear = transit.is_line_clear(&from, &to);
             assert_eq!(clear, !meets_an_edge(&area, &from, &to), "{case}: {from:?} {to:?}");
-            let (found, least) = (transit.distance_m(&from, &to), shortest_m(&transit, &area, &from, &to));
-            assert!(found == least || (found - least).abs() < 1e-2, "{case}: {found} instead of {least}");
+            let (found, least) =
+                (transit.distance_m(&from, &to), shortest_m(&transit, &area, &from, &to));
+            assert!(
+                found == least || (found - least).abs() < 1e-2,
+                "{case}: {found} instead of {least}"
+            );
             let mut corners = Vec::new();
             corners.push(from);
             let mut way: heapless::Vec<Flat, 32> = heapless::Vec::new();

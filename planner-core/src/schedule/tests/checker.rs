@@ -7,8 +7,9 @@ use std::vec::Vec as StdVec;
 use super::super::*;
 use crate::Point;
 
-/// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the smallest distance
-/// between two of which one moves, or that were still under way after `steps` of 50 ms.
+/// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the
+/// smallest distance between two of which one moves, or that were still under way after `steps` of
+/// 50 ms.
 pub(crate) fn fly<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -23,7 +24,9 @@ pub(crate) fn fly<const W: usize>(
             out
         })
         .collect();
-    let end = |f: &Flight<W>| if f.task.leaves_pad() { f.path.length_m() + f.descent_m } else { -f.climb_m };
+    let end = |f: &Flight<W>| {
+        if f.task.leaves_pad() { f.path.length_m() + f.descent_m } else { -f.climb_m }
+    };
     let place = |f: &Flight<W>, m: f32| {
         let below = fmaxf(-m, fmaxf(m - f.path.length_m(), 0.0));
         f.path.point_at(m).unwrap() - Point::new(0.0, 0.0, below)
@@ -52,5 +55,8 @@ pub(crate) fn fly<const W: usize>(
             return Ok(smallest);
         }
     }
-    Err((0..flights.len()).filter(|&i| along[i] < end(&flights[i])).map(|i| flights[i].id).collect())
+    Err((0..flights.len())
+        .filter(|&i| along[i] < end(&flights[i]))
+        .map(|i| flights[i].id)
+        .collect())
 }

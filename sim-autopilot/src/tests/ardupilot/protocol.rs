@@ -12,7 +12,11 @@ fn unasked_it_says_heartbeat_and_next_to_nothing() {
     assert!((30..=31).contains(&count(0)));
     assert_eq!((count(1), count(111)), (1, 3), "one SYS_STATUS, TIMESYNC every 10 s");
     for (_, frame) in &bench.received {
-        assert!([0, 1, 22, 111, 253, 49, 242].contains(&frame.message_id), "{} unasked", frame.message_id);
+        assert!(
+            [0, 1, 22, 111, 253, 49, 242].contains(&frame.message_id),
+            "{} unasked",
+            frame.message_id
+        );
     }
     let beat = bench.of(0).last().unwrap().1.padded();
     assert_eq!((beat[4], beat[5], beat[6]), (2, 3, 0x51), "quadrotor, ArduPilot, STABILIZE");
@@ -124,7 +128,12 @@ fn ned_is_in_its_own_projection_about_its_own_origin() {
     let truth = frames::enu_to_geodetic(&world, &bench.at());
     let expected = frames::geodetic_to_ned(Projection::ArduPilot, &ekf, &truth);
     for (k, at) in [4, 8, 12].into_iter().enumerate() {
-        assert!((said(at) - expected[k]).abs() < 0.01, "axis {k}: {} for {}", said(at), expected[k]);
+        assert!(
+            (said(at) - expected[k]).abs() < 0.01,
+            "axis {k}: {} for {}",
+            said(at),
+            expected[k]
+        );
     }
     assert!((expected - frames::geodetic_to_ned(Projection::Px4, &ekf, &truth)).norm() > 0.5);
 }

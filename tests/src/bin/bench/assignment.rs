@@ -1,7 +1,9 @@
-//! Assignment beside the crate `lapjv`, on the same f32 matrices: uniform reals, and small integers full of ties.
+//! Assignment beside the crate `lapjv`, on the same f32 matrices: uniform reals, and small integers
+//! full of ties.
 //!
-//! Both are run alternately, so that a slow spell of the machine strikes both, and the medians are compared. Each run of
-//! ours includes the check of the input; each run of theirs the allocation it cannot do without.
+//! Both are run alternately, so that a slow spell of the machine strikes both, and the medians are
+//! compared. Each run of ours includes the check of the input; each run of theirs the allocation it
+//! cannot do without.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -45,8 +47,12 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
             theirs.push(start.elapsed());
             let their_total: f64 =
                 columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
-            // Theirs sums prices in f32 and may miss the optimum by that rounding; ours must never be worse.
-            assert!(result.total <= their_total + 1e-9 * their_total, "seed {seed}: not the optimum");
+            // Theirs sums prices in f32 and may miss the optimum by that rounding; ours must never
+            // be worse.
+            assert!(
+                result.total <= their_total + 1e-9 * their_total,
+                "seed {seed}: not the optimum"
+            );
         }
     }
     let (ours, theirs) = (median_us(ours), median_us(theirs));

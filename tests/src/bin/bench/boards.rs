@@ -22,8 +22,10 @@ pub fn run() -> Result<()> {
     let plan = mission.plan()?;
     let fly = || swarm::fly(&mission, &plan, "fly", false, &progress);
     let alone = fly()?;
-    let busy = || Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();
-    let others: Vec<_> = (0..BUSY).map(|_| busy().map(Guard)).collect::<Result<_, _>>().context("no sh")?;
+    let busy =
+        || Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();
+    let others: Vec<_> =
+        (0..BUSY).map(|_| busy().map(Guard)).collect::<Result<_, _>>().context("no sh")?;
     let beside = fly()?;
     drop(others);
     println!(

@@ -1,12 +1,15 @@
-//! Coverage beside the public C++ BINPAT, on its kind of area: five vertices, 300 by 150 m, lanes of 10 m.
+//! Coverage beside the public C++ BINPAT, on its kind of area: five vertices, 300 by 150 m, lanes
+//! of 10 m.
 //!
-//! `--binpat DIR` is a checkout of cvar-upm/multi_uav_planning_binpat; `tests/peers/binpat.cpp` times it. Both are run
-//! alternately. Both do the same work: from the vertices to the flights, written out as points with heights (place, layer,
-//! both ends of every lane, home). For the loss, each vehicle has flown ten waypoints of its route, 90 m, and stands there;
-//! the first one is lost. What each has not flown is divided among the rest from where they stand, and written out.
+//! `--binpat DIR` is a checkout of cvar-upm/multi_uav_planning_binpat; `tests/peers/binpat.cpp`
+//! times it. Both are run alternately. Both do the same work: from the vertices to the flights,
+//! written out as points with heights (place, layer, both ends of every lane, home). For the loss,
+//! each vehicle has flown ten waypoints of its route, 90 m, and stands there; the first one is
+//! lost. What each has not flown is divided among the rest from where they stand, and written out.
 //!
-//! What differs: theirs cuts the path anywhere, ours between waypoints. Theirs layers flights by the way to and from their
-//! part, ours by the time of all. Theirs also compares the new longest flight with the old one.
+//! What differs: theirs cuts the path anywhere, ours between waypoints. Theirs layers flights by
+//! the way to and from their part, ours by the time of all. Theirs also compares the new longest
+//! flight with the old one.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -20,7 +23,9 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, TrackUnit, Vehicle, Work, binpat};
+use planner_core::coverage::pack::{
+    Heading, Heights, PackWorkspace, Plan, TrackUnit, Vehicle, Work, binpat,
+};
 use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
@@ -36,9 +41,11 @@ const RUNS: usize = 301;
 const ROUNDS: usize = 5;
 const LANES: usize = 512;
 const VEHICLES: usize = 32;
-const VERTICES: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
+const VERTICES: [[f32; 2]; 5] =
+    [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 
-/// Plan and replanning at 3 and 10 vehicles; POWELL at 3, beside what it may take; the costs of all methods.
+/// Plan and replanning at 3 and 10 vehicles; POWELL at 3, beside what it may take; the costs of all
+/// methods.
 ///
 /// # Errors
 /// Theirs cannot be built or run.
@@ -46,7 +53,9 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     let peer = checkout.map(build).transpose()?;
     if peer.is_none() {
-        println!("coverage: no --binpat DIR, a checkout of cvar-upm/multi_uav_planning_binpat; only POWELL");
+        println!(
+            "coverage: no --binpat DIR, a checkout of cvar-upm/multi_uav_planning_binpat; only POWELL"
+        );
     }
     for n in [3, 10] {
         let Some(peer) = &peer else { break };
@@ -63,25 +72,50 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
             };
             let (ours, theirs) = (middle(&ours), middle(&theirs));
             let name = name.to_owned();
-            rows.push(Row { name, ours, theirs, ratio: theirs / ours, required: 1.1, unit: "us", n });
+            rows.push(Row {
+                name,
+                ours,
+                theirs,
+                ratio: theirs / ours,
+                required: 1.1,
+                unit: "us",
+                n,
+            });
         }
     }
     let ours = powell_us();
     let name = "coverage, POWELL".to_owned();
-    rows.push(Row { name, ours, theirs: 5000.0, ratio: 5000.0 / ours, required: 1.0, unit: "us", n: 3 });
+    rows.push(Row {
+        name,
+        ours,
+        theirs: 5000.0,
+        ratio: 5000.0 / ours,
+        required: 1.0,
+        unit: "us",
+        n: 3,
+    });
     rows.extend(costs());
     Ok(rows)
 }
 
-/// The largest costs of the methods on random convex areas for 2 to 10 vehicles: shares of the areas beside what they must be, and the median
-/// gap of POWELL to the best division beside what it may be.
+/// The largest costs of the methods on random convex areas for 2 to 10 vehicles: shares of the
+/// areas beside what they must be, and the median gap of POWELL to the best division beside what it
+/// may be.
 fn costs() -> Vec<Row> {
     let costs = Costs::of(0..AREAS);
     println!("coverage: {costs:?}");
     let share = |name: &str, but: usize, required: f64| {
         let ours = 100.0 * (1.0 - but as f64 / costs.areas as f64);
         let name = format!("coverage, {name}, areas");
-        Row { name, ours, theirs: required, ratio: ours / required, required: 1.0, unit: "%", n: costs.areas }
+        Row {
+            name,
+            ours,
+            theirs: required,
+            ratio: ours / required,
+            required: 1.0,
+            unit: "%",
+            n: costs.areas,
+        }
     };
     // At no gap at all the ratio is still a number.
     let gap = f64::from(costs.gaps[2]).max(0.01);
@@ -90,7 +124,15 @@ fn costs() -> Vec<Row> {
         share("POWELL <= BINPAT", costs.powell_over_binpat, 100.0),
         share("POWELL <= SIMPLE", costs.powell_over_simple, 95.0),
         share("exact <= all", costs.below_exact, 100.0),
-        Row { name, ours: gap, theirs: 8.0, ratio: 8.0 / gap, required: 1.0, unit: "%", n: costs.areas },
+        Row {
+            name,
+            ours: gap,
+            theirs: 8.0,
+            ratio: 8.0 / gap,
+            required: 1.0,
+            unit: "%",
+            n: costs.areas,
+        },
     ]
 }
 
@@ -159,7 +201,8 @@ impl Desk {
         let footprint = Footprint { along_m: 10.0, across_m: 10.0 };
         let spacing = Spacing { footprint, lane_m: 10.0, waypoint_m: 10.0 };
         let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: 10_000 };
-        tracks::build(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks).expect("lanes");
+        tracks::build(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks)
+            .expect("lanes");
         let work = work(&self.tracks, &transit, &self.vehicles);
         binpat(&work, &mut self.pack, &mut self.plan).expect("routes");
         write_out(&work, &self.plan, &mut self.points);
@@ -235,7 +278,8 @@ fn powell_us() -> f64 {
     let mut ws: Box<powell::Workspace<VEHICLES>> = Box::default();
     let work = work(&desk.tracks, &transit, &desk.vehicles);
     median_us(|| {
-        powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut desk.plan).expect("routes");
+        powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut desk.plan)
+            .expect("routes");
     })
 }
 

@@ -1,8 +1,9 @@
 //! Simulated autopilots beside the recorded ones: recorded setpoints replayed, estimates compared.
 //!
-//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded errors of the estimate, the
-//! setpoints as they were sent, "theirs" what is allowed. Flights in which a person or a failsafe took the vehicle are printed and
-//! not rated: each error of theirs adds up in what follows.
+//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded
+//! errors of the estimate, the setpoints as they were sent, "theirs" what is allowed. Flights in
+//! which a person or a failsafe took the vehicle are printed and not rated: each error of theirs
+//! adds up in what follows.
 
 use flockmate_tests::fidelity::{
     Comparison, Correction, Difference, Estimator, RUNS, Recording, allowed_m, recordings,
@@ -67,8 +68,8 @@ pub fn rows() -> Vec<Row> {
     rows
 }
 
-/// PX4's plain flights under the errors of each flight that lasts as long: how alike both erred, how far the replay is off the
-/// recording, and how far these errors move it.
+/// PX4's plain flights under the errors of each flight that lasts as long: how alike both erred,
+/// how far the replay is off the recording, and how far these errors move it.
 fn print_others() {
     println!(
         "under the errors of another flight: correlation of the errors; off the recording; moved by them"

@@ -1,12 +1,13 @@
-//! Coverage beside Fields2Cover 2.1: its test fields, 12 and 13, and fields with obstacles: those of its tests, and ours in its
-//! test fields.
+//! Coverage beside Fields2Cover 2.1: its test fields, 12 and 13, and fields with obstacles: those
+//! of its tests, and ours in its test fields.
 //!
-//! `--fields2cover DIR` is a checkout of Fields2Cover/Fields2Cover; `tests/peers/fields2cover.cpp` is built with it, once. The same
-//! fields in metres, lane angle (ours of least width) and lane width; no headland, straight connections, one vehicle, no
-//! transit. Ours is from the vertices to all lanes in order, around obstacles; theirs is the best of what it offers
-//! ([`routes`]). Its route planner on OR-tools is not built.
-//! Lengths are of all lanes and the connections between them. Ours twice: as boards plan, which look at few changes of the
-//! lanes' order, and `searched` as long as the desk does. `length for what is swept` is theirs divided by the share of the field
+//! `--fields2cover DIR` is a checkout of Fields2Cover/Fields2Cover; `tests/peers/fields2cover.cpp`
+//! is built with it, once. The same fields in metres, lane angle (ours of least width) and lane
+//! width; no headland, straight connections, one vehicle, no transit. Ours is from the vertices to
+//! all lanes in order, around obstacles; theirs is the best of what it offers ([`routes`]). Its
+//! route planner on OR-tools is not built. Lengths are of all lanes and the connections between
+//! them. Ours twice: as boards plan, which look at few changes of the lanes' order, and `searched`
+//! as long as the desk does. `length for what is swept` is theirs divided by the share of the field
 //! that its lanes sweep: ours show all of it, by the test `coverage`.
 //!
 //! Our lanes are longer by what photographs slanted borders whole; theirs end at the border.
@@ -39,7 +40,8 @@ const VERTICES: usize = 1024;
 /// At most 3 % longer than theirs.
 const LENGTH: f64 = 0.971;
 /// What is compiled of theirs: neither its route planner, which needs OR-tools, nor what draws.
-const SOURCES: [&str; 5] = ["types", "route_planning", "swath_generator", "objectives", "decomposition"];
+const SOURCES: [&str; 5] =
+    ["types", "route_planning", "swath_generator", "objectives", "decomposition"];
 const LEFT_OUT: [&str; 3] = ["route_planner_base.cpp", "Path.cpp", "pp_obj"];
 /// Fields, lane widths in metres.
 const FIELDS: [(&str, f32, &str); 4] = [
@@ -49,7 +51,8 @@ const FIELDS: [(&str, f32, &str); 4] = [
     ("13.json", 1.0, "metres"),
 ];
 
-/// Outer ring and obstacles of a field of its tests: their corners, and by how much they are scaled.
+/// Outer ring and obstacles of a field of its tests: their corners, and by how much they are
+/// scaled.
 type Rings = (&'static [&'static [[f32; 2]]], f32);
 
 /// `route_planner_base_test.cpp` and `visualizer_test.cpp`.
@@ -85,7 +88,8 @@ const WITH_OBSTACLES: [(&str, f32, Rings); 4] = [
     ("two slots", 5.0, TWO_SLOTS),
     ("ring", 5.0, RING),
 ];
-/// Side of the squares that are put into fields without obstacles, of the square root of the field's area.
+/// Side of the squares that are put into fields without obstacles, of the square root of the
+/// field's area.
 const OBSTACLE_SHARE: f32 = 0.12;
 /// Places of an edge at which it is looked whether it is inside.
 const EDGE_STEPS: u8 = 50;
@@ -111,7 +115,8 @@ impl Field {
         self.rings.push(Ring { end: self.vertices.len() as u16, kind });
     }
 
-    /// The same with up to three squares, in a row through its middle across its longer side, that lie inside.
+    /// The same with up to three squares, in a row through its middle across its longer side, that
+    /// lie inside.
     fn with_squares(&self) -> Self {
         let mut field = Self { vertices: self.vertices.clone(), rings: self.rings.clone() };
         let outer = self.vertices.clone();
@@ -119,7 +124,8 @@ impl Field {
         outer.iter().for_each(|at| (low, high) = (low.inf(at), high.sup(at)));
         let side = OBSTACLE_SHARE * ((high.x - low.x) * (high.y - low.y)).sqrt();
         for [east, north] in [[0.3, 0.35], [0.5, 0.5], [0.68, 0.6]] {
-            let middle = Flat::new(low.x + east * (high.x - low.x), low.y + north * (high.y - low.y));
+            let middle =
+                Flat::new(low.x + east * (high.x - low.x), low.y + north * (high.y - low.y));
             // Its surroundings too: no corridor between it and the border.
             let square = |half: f32| {
                 [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
@@ -128,7 +134,8 @@ impl Field {
             let corners = square(side);
             let edges = corners.iter().zip(corners.iter().cycle().skip(1));
             let inside = |(a, b): (&Flat, &Flat)| {
-                (0..EDGE_STEPS).all(|k| ring_holds(&outer, &(a + (b - a) * (k as f32 / EDGE_STEPS as f32))))
+                (0..EDGE_STEPS)
+                    .all(|k| ring_holds(&outer, &(a + (b - a) * (k as f32 / EDGE_STEPS as f32))))
             };
             if edges.into_iter().all(inside) {
                 field.add_ring(square(side / 2.0).into_iter());
@@ -146,12 +153,18 @@ impl Field {
             let at = Flat::new(at[0] as f32, at[1] as f32);
             ring_holds(outer, &at) && !self.obstacles().any(|ring| ring_holds(ring, &at))
         };
-        best.swept_share(f64::from(lane_m), holds, [low, high].map(|at| [f64::from(at.x), f64::from(at.y)]))
+        best.swept_share(
+            f64::from(lane_m),
+            holds,
+            [low, high].map(|at| [f64::from(at.x), f64::from(at.y)]),
+        )
     }
 
     /// Corners of the obstacles.
     fn obstacles(&self) -> impl Iterator<Item = &[Flat]> {
-        self.rings.windows(2).map(|pair| &self.vertices[usize::from(pair[0].end)..usize::from(pair[1].end)])
+        self.rings
+            .windows(2)
+            .map(|pair| &self.vertices[usize::from(pair[0].end)..usize::from(pair[1].end)])
     }
 }
 
@@ -180,7 +193,9 @@ struct Way {
 /// Theirs cannot be built or run.
 pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let Some(checkout) = checkout else {
-        println!("fields2cover: skipped, no --fields2cover DIR, a checkout of Fields2Cover/Fields2Cover");
+        println!(
+            "fields2cover: skipped, no --fields2cover DIR, a checkout of Fields2Cover/Fields2Cover"
+        );
         return Ok(Vec::new());
     };
     let folder = tempfile::tempdir()?;
@@ -279,7 +294,8 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let mut times = Vec::new();
     for _ in 0..RUNS {
         let began = Instant::now();
-        let area = Area::new(&field.vertices, &field.rings).map_err(|error| anyhow::anyhow!("{error:?}"))?;
+        let area = Area::new(&field.vertices, &field.rings)
+            .map_err(|error| anyhow::anyhow!("{error:?}"))?;
         transit.set_area(area).map_err(|error| anyhow::anyhow!("{error:?}"))?;
         tracks::build(&area, &pattern, &transit, &mut workspace, &mut found)
             .map_err(|error| anyhow::anyhow!("{error:?}"))?;
@@ -290,7 +306,9 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let mut crossings = 0;
     for (from, to) in legs {
         let mut corners = heapless::Vec::<Flat, MAX_CORNERS>::new();
-        transit.shortest_path(&from, &to, &mut corners).map_err(|error| anyhow::anyhow!("{error:?}"))?;
+        transit
+            .shortest_path(&from, &to, &mut corners)
+            .map_err(|error| anyhow::anyhow!("{error:?}"))?;
         let way = [&[from], corners.as_slice(), &[to]].concat();
         crossings += way.windows(2).filter(|leg| crosses(field, &leg[0], &leg[1])).count();
     }
@@ -307,9 +325,9 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
 /// Whether a leg comes into an obstacle: looked at every centimetre.
 fn crosses(field: &Field, from: &Flat, to: &Flat) -> bool {
     let steps = ((to - from).norm() / 0.01).ceil().max(1.0) as usize;
-    field
-        .obstacles()
-        .any(|ring| (0..=steps).any(|k| ring_holds(ring, &(from + (to - from) * (k as f32 / steps as f32)))))
+    field.obstacles().any(|ring| {
+        (0..=steps).any(|k| ring_holds(ring, &(from + (to - from) * (k as f32 / steps as f32))))
+    })
 }
 
 /// Its best ways: in one cell, and by cells.
@@ -366,7 +384,9 @@ fn build(checkout: &Path, folder: &Path) -> Result<PathBuf> {
 }
 
 fn collect(folder: &Path, sources: &mut Vec<PathBuf>) -> Result<()> {
-    for entry in std::fs::read_dir(folder).with_context(|| format!("no sources in {}", folder.display()))? {
+    for entry in
+        std::fs::read_dir(folder).with_context(|| format!("no sources in {}", folder.display()))?
+    {
         let path = entry?.path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_owned();
         if LEFT_OUT.contains(&name.as_str()) {

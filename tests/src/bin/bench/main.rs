@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: our times beside those of the programs we are compared to, measured alternately in one run.
+//! `cargo xtask bench`: our times beside those of the programs we are compared to, measured
+//! alternately in one run.
 //!
 //! Prints a table; `--out FILE` writes the rows as JSON,
 //! `[{ "name", "ours", "theirs", "ratio", "required", "unit", "n" }]`.
@@ -27,14 +28,15 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover, swarm, steps,
-    /// worst-case, fidelity, boards.
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover,
+    /// swarm, steps, worst-case, fidelity, boards.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
     #[arg(long, value_name = "PROGRAM")]
     peer: Option<PathBuf>,
-    /// A checkout of cvar-upm/multi_uav_planning_binpat for the coverage rows; without it most are skipped.
+    /// A checkout of cvar-upm/multi_uav_planning_binpat for the coverage rows; without it most are
+    /// skipped.
     #[arg(long, value_name = "DIR")]
     binpat: Option<PathBuf>,
     /// A checkout of Fields2Cover/Fields2Cover for its rows; without it they are skipped.
@@ -82,9 +84,14 @@ fn main() -> Result<()> {
     if "boards".contains(&args.only) {
         boards::run()?;
     }
-    println!("{:24} {:>5} {:>13} {:>13} {:>8} {:>9}", "name", "n", "ours", "theirs", "ratio", "required");
+    println!(
+        "{:24} {:>5} {:>13} {:>13} {:>8} {:>9}",
+        "name", "n", "ours", "theirs", "ratio", "required"
+    );
     for Row { name, ours, theirs, ratio, required, unit, n } in &rows {
-        println!("{name:24} {n:>5} {ours:>10.3} {unit} {theirs:>10.3} {unit} {ratio:>7.2}x {required:>8}x");
+        println!(
+            "{name:24} {n:>5} {ours:>10.3} {unit} {theirs:>10.3} {unit} {ratio:>7.2}x {required:>8}x"
+        );
     }
     if let Some(out) = &args.out {
         std::fs::write(out, serde_json::to_string_pretty(&rows)?)

@@ -1,16 +1,20 @@
-//! Roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, all pairs, OctoMap's `castRay`.
+//! Roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, all pairs, OctoMap's
+//! `castRay`.
 //!
-//! Both get the same map (the built-in building at 0.25 m, for theirs written as `.bt`), the same ten starts and goals,
-//! 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run alternately. Loading the map is in neither time:
-//! they hold an octree, we the voxel grid. All else is: random nodes, the index of nodes, neighbours, rays, and the
-//! graph both ways with the lengths of its edges (theirs an adjacency list, ours the roadmap file with its CRC-32 and a
-//! list of lengths beside it). Nothing is kept from one repeat to the next. Checking the file as a reader does is in
-//! neither time: theirs is read by nobody else.
+//! Both get the same map (the built-in building at 0.25 m, for theirs written as `.bt`), the same
+//! ten starts and goals, 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run
+//! alternately. Loading the map is in neither time: they hold an octree, we the voxel grid. All
+//! else is: random nodes, the index of nodes, neighbours, rays, and the graph both ways with the
+//! lengths of its edges (theirs an adjacency list, ours the roadmap file with its CRC-32 and a list
+//! of lengths beside it). Nothing is kept from one repeat to the next. Checking the file as a
+//! reader does is in neither time: theirs is read by nobody else.
 //!
-//! `roadmap_s of plan` is what `host-sim plan` reports for the same building, on two cores, for vehicles of 0.3 m without a
-//! safety margin: beside the above, starts and goals are checked and every edge gets its clearance, which theirs has not.
+//! `roadmap_s of plan` is what `host-sim plan` reports for the same building, on two cores, for
+//! vehicles of 0.3 m without a safety margin: beside the above, starts and goals are checked and
+//! every edge gets its clearance, which theirs has not.
 //!
-//! Ten A*: both search each pair by itself. The matrix: theirs is a hundred A*, ours [`cost_matrix`].
+//! Ten A*: both search each pair by itself. The matrix: theirs is a hundred A*, ours
+//! [`cost_matrix`].
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -58,7 +62,8 @@ struct Theirs {
     matrix_search_ms: f64,
 }
 
-/// A row for the roadmap on one core and on two, for ten A* and for the 10 × 10 cost matrix, milliseconds.
+/// A row for the roadmap on one core and on two, for ten A* and for the 10 × 10 cost matrix,
+/// milliseconds.
 pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     let map = building::building_map(building::DEFAULT_SEED, RESOLUTION_M)?;
     let dir = tempfile::tempdir()?;
@@ -81,9 +86,13 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
             let by_two = two.install(|| ours.build(seed, true))?;
             let built_by_two = ours.bytes.clone();
             let by_one = ours.build(seed, false)?;
-            ensure!(ours.bytes == built_by_two, "seed {seed}: two cores built another roadmap than one");
+            ensure!(
+                ours.bytes == built_by_two,
+                "seed {seed}: two cores built another roadmap than one"
+            );
             let [lengths, labelled, matrix] = ours.search()?;
-            for (times, time) in times.iter_mut().zip([by_one + lengths, by_two + lengths, labelled, matrix])
+            for (times, time) in
+                times.iter_mut().zip([by_one + lengths, by_two + lengths, labelled, matrix])
             {
                 times.push(time);
             }
@@ -106,8 +115,10 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         .into_iter()
         .map(|(name, value, required, n, times)| {
             // Of each round by itself: a slow spell of the machine strikes both.
-            let ratios =
-                theirs.iter().zip(times.chunks(REPEATS)).map(|(t, ours)| value(t) / median(ours.to_vec()));
+            let ratios = theirs
+                .iter()
+                .zip(times.chunks(REPEATS))
+                .map(|(t, ours)| value(t) / median(ours.to_vec()));
             let ratio = median(ratios.collect());
             Row {
                 name: name.into(),
@@ -122,8 +133,8 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         .collect())
 }
 
-/// What a user waits for: `host-sim plan`'s map and roadmap with all their parts, of the same building, for ten vehicles whose
-/// safety margin is 0.
+/// What a user waits for: `host-sim plan`'s map and roadmap with all their parts, of the same
+/// building, for ten vehicles whose safety margin is 0.
 fn planned() -> Result<Timing> {
     let mut text = format!(
         "[map]\nfile = \"builtin:building\"\nresolution_m = {RESOLUTION_M}\n\
@@ -139,7 +150,13 @@ fn planned() -> Result<Timing> {
     }
     text += "]\n";
     for (i, start) in starts.iter().enumerate() {
-        text += &format!("[[vehicles]]\nid = {}\nstart = [{}, {}, {}]\n", i + 1, start.x, start.y, start.z);
+        text += &format!(
+            "[[vehicles]]\nid = {}\nstart = [{}, {}, {}]\n",
+            i + 1,
+            start.x,
+            start.y,
+            start.z
+        );
     }
     Ok(Mission::prepare(scenario::parse(&text, "bench.toml")?, &Progress::hidden())?.timing)
 }
@@ -192,7 +209,11 @@ fn terminals() -> Vec<Point> {
     let starts = (0..VEHICLES).map(|i| Point::new(along(i), 4.0, 1.5));
     let goals = (0..VEHICLES).map(|i| {
         let floor = 1 + i % (building::FLOORS as usize - 1);
-        Point::new(if i % 2 == 0 { 12.1 } else { 29.1 }, 12.1, floor as f32 * building::FLOOR_HEIGHT_M + 1.6)
+        Point::new(
+            if i % 2 == 0 { 12.1 } else { 29.1 },
+            12.1,
+            floor as f32 * building::FLOOR_HEIGHT_M + 1.6,
+        )
     });
     starts.chain(goals).collect()
 }
@@ -200,12 +221,18 @@ fn terminals() -> Vec<Point> {
 fn run(peer: &Path, files: &[std::path::PathBuf]) -> Result<Theirs> {
     let out = Command::new(peer)
         .args(files)
-        .args([EDGE_MIN_M.to_string(), EDGE_MAX_M.to_string(), NODES.to_string(), REPEATS.to_string()])
+        .args([
+            EDGE_MIN_M.to_string(),
+            EDGE_MAX_M.to_string(),
+            NODES.to_string(),
+            REPEATS.to_string(),
+        ])
         .output()
         .with_context(|| format!("cannot run {}", peer.display()))?;
     let text = String::from_utf8_lossy(&out.stdout);
     let line = text.lines().find(|line| line.starts_with('{'));
-    let line = line.with_context(|| format!("{} printed no JSON line but: {text}", peer.display()))?;
+    let line =
+        line.with_context(|| format!("{} printed no JSON line but: {text}", peer.display()))?;
     Ok(serde_json::from_str(line)?)
 }
 
@@ -251,11 +278,13 @@ impl<'a> Ours<'a> {
         self.bytes = Vec::new();
         let start = Instant::now();
         self.nodes = vec![Point::zeros(); self.terminals.len() + NODES];
-        prm::sample_nodes(self.grid, None, self.terminals, &config, &mut self.nodes).map_err(named)?;
+        prm::sample_nodes(self.grid, None, self.terminals, &config, &mut self.nodes)
+            .map_err(named)?;
         let edge = |e: Edge| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
         if threads {
-            let edges = host_sim::roadmap::connect(self.grid, &self.nodes, &config, &mut self.workspace)
-                .map_err(named)?;
+            let edges =
+                host_sim::roadmap::connect(self.grid, &self.nodes, &config, &mut self.workspace)
+                    .map_err(named)?;
             self.edges = edges.into_iter().map(edge).collect();
         } else {
             self.workspace.build_index(&self.nodes, &config).map_err(named)?;
@@ -311,7 +340,8 @@ impl<'a> Ours<'a> {
         let goals: Vec<u16> = (VEHICLES as u16..2 * VEHICLES as u16).collect();
         let mut matrix = [0.0; VEHICLES * VEHICLES];
         let start = Instant::now();
-        cost_matrix(&graph, &starts, &goals, |_, _| true, &mut self.search, &mut matrix).map_err(named)?;
+        cost_matrix(&graph, &starts, &goals, |_, _| true, &mut self.search, &mut matrix)
+            .map_err(named)?;
         std::hint::black_box(&matrix);
         Ok([measured, labelled, start.elapsed()].map(|time| time.as_secs_f64() * 1e3))
     }
@@ -319,9 +349,12 @@ impl<'a> Ours<'a> {
     /// Pairs in the range of lengths: what Algorithm 1 casts a ray for.
     fn rays(&self) -> usize {
         let range = EDGE_MIN_M * EDGE_MIN_M..=EDGE_MAX_M * EDGE_MAX_M;
-        let near =
-            |k: usize, l: usize| range.contains(&squared_length(self.nodes[k].into(), self.nodes[l].into()));
-        (0..self.nodes.len()).map(|k| (k + 1..self.nodes.len()).filter(|&l| near(k, l)).count()).sum()
+        let near = |k: usize, l: usize| {
+            range.contains(&squared_length(self.nodes[k].into(), self.nodes[l].into()))
+        };
+        (0..self.nodes.len())
+            .map(|k| (k + 1..self.nodes.len()).filter(|&l| near(k, l)).count())
+            .sum()
     }
 }
 

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-/// One line of the bench: `ratio` is theirs / ours, or ours / theirs of a share that is to be large: more is better.
+/// One line of the bench: `ratio` is theirs / ours, or ours / theirs of a share that is to be
+/// large: more is better.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// What was done.

@@ -1,10 +1,12 @@
 //! One step of `priority` deconfliction in instructions, the worst of ten thousand random cases.
 //!
-//! The bench runs itself under valgrind's callgrind, which counts the instructions of [`priority_step`] alone and writes the
-//! count down each time it returns: every case is counted, so the worst is the worst. In these rows "ours" is that worst
-//! case, "theirs" what a step may cost. It is this machine's instruction set; a board's differs by a small factor.
+//! The bench runs itself under valgrind's callgrind, which counts the instructions of
+//! [`priority_step`] alone and writes the count down each time it returns: every case is counted,
+//! so the worst is the worst. In these rows "ours" is that worst case, "theirs" what a step may
+//! cost. It is this machine's instruction set; a board's differs by a small factor.
 //!
-//! The cases are those that a board is measured with ([`StepCase`]); half of them are made to be hard.
+//! The cases are those that a board is measured with ([`StepCase`]); half of them are made to be
+//! hard.
 
 use std::hint::black_box;
 use std::process::{Command, Stdio};

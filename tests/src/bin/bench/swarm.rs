@@ -1,8 +1,9 @@
 //! The swarm simulation beside the clock: simulated seconds for each second on one core.
 //!
-//! In these rows "ours" is the time [`swarm::fly`] took, "theirs" the time that passed in it, and the ratio how many times
-//! faster than the clock it ran. The simulation is one thread, so this is one core, whatever the machine has. Planning
-//! and the map's distance field are not in it; how long they took is printed. A flight that is not complete and clean is an error.
+//! In these rows "ours" is the time [`swarm::fly`] took, "theirs" the time that passed in it, and
+//! the ratio how many times faster than the clock it ran. The simulation is one thread, so this is
+//! one core, whatever the machine has. Planning and the map's distance field are not in it; how
+//! long they took is printed. A flight that is not complete and clean is an error.
 
 use std::path::Path;
 use std::time::Instant;
@@ -36,7 +37,8 @@ const WAY_M: f32 = 36.0;
 
 /// A row for the demo's ten vehicles, one for two hundred on open ground, seconds.
 pub fn rows() -> Result<Vec<Row>> {
-    let mut flights = (0..DEMO_FLIGHTS).map(|_| fly(DEMO, "demo.toml")).collect::<Result<Vec<_>>>()?;
+    let mut flights =
+        (0..DEMO_FLIGHTS).map(|_| fly(DEMO, "demo.toml")).collect::<Result<Vec<_>>>()?;
     flights.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (took_s, simulated_s) = flights[DEMO_FLIGHTS / 2];
     let ten = row("swarm of ten", took_s, simulated_s, 100.0, 10);
@@ -94,11 +96,13 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
 /// A floor with pillars between the lanes.
 fn ground() -> Result<OccupancyMap> {
     let cells = |metres: f32| (metres / RESOLUTION_M) as u32;
-    let shape = GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
+    let shape =
+        GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
     let mut map = OccupancyMap::all_unknown(shape, "ground")?;
     // One metre wide, in every second gap between two lanes, 20 m apart.
-    let pillar =
-        |x: f32, y: f32| (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0);
+    let pillar = |x: f32, y: f32| {
+        (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0)
+    };
     let [nx, ny, nz] = shape.dims;
     for k in 0..nz {
         for j in 0..ny {

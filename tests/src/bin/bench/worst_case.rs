@@ -1,7 +1,8 @@
-//! Every public call of planner-core and companion: its work bound, the most instructions seen on the emulated board, and the
-//! bytes it is lent. Written as the table of docs/worst-case.md.
+//! Every public call of planner-core and companion: its work bound, the most instructions seen on
+//! the emulated board, and the bytes it is lent. Written as the table of docs/worst-case.md.
 //!
-//! The program `calls` counts, in QEMU with `-icount shift=0`; the bounds are in [`flockmate_tests::bounds`].
+//! The program `calls` counts, in QEMU with `-icount shift=0`; the bounds are in
+//! [`flockmate_tests::bounds`].
 
 use std::fs;
 
@@ -25,7 +26,8 @@ pub fn rows() -> Result<Vec<Row>> {
     let Some(program) = board::program("calls") else { return Ok(Vec::new()) };
     let calls = bounds::counted(&program)?;
     let path = workspace().join(bounds::PAGE);
-    let page = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let page =
+        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let [before, _, behind] = bounds::parts(&page)?;
     let table = bounds::table(&calls)?;
     fs::write(&path, [before, &table, behind].concat())
@@ -34,9 +36,10 @@ pub fn rows() -> Result<Vec<Row>> {
     LIMITS
         .iter()
         .map(|&(name, call, limit)| {
-            let ours = calls.get(call).with_context(|| format!("{call} was not counted"))?.instructions
-                as f64
-                * 1e-3;
+            let ours =
+                calls.get(call).with_context(|| format!("{call} was not counted"))?.instructions
+                    as f64
+                    * 1e-3;
             let row = Row {
                 name: name.into(),
                 ours,

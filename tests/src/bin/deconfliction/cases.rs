@@ -1,4 +1,5 @@
-//! The meetings: maps of corridors and open halls, which vehicles swap places, and the disturbances each is flown under.
+//! The meetings: maps of corridors and open halls, which vehicles swap places, and the disturbances
+//! each is flown under.
 
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
@@ -19,11 +20,14 @@ const HEIGHT_M: f32 = 1.5;
 /// The gusts of every case: what a mission is planned for.
 pub const GUSTS: &str = "gust_mps = 3.0\n";
 
-/// A map and the vehicles that fly on it: planned once a seed, flown once for each disturbance and method.
+/// A map and the vehicles that fly on it: planned once a seed, flown once for each disturbance and
+/// method.
 pub struct Meeting {
-    /// What is flown, one row of the table each: the name, and more lines of `[simulation]` and `[[faults]]`.
+    /// What is flown, one row of the table each: the name, and more lines of `[simulation]` and
+    /// `[[faults]]`.
     pub cases: Vec<(&'static str, &'static str)>,
-    /// The vehicle that faults strike when it has taken off; `None`: another with each seed, somewhere on its way.
+    /// The vehicle that faults strike when it has taken off; `None`: another with each seed,
+    /// somewhere on its way.
     struck: Option<u8>,
     map: PathBuf,
     vehicles: Vec<(Point, Point)>,
@@ -41,11 +45,14 @@ pub struct Meeting {
 }
 
 impl Meeting {
-    /// The vehicle that the faults of the cases strike, and which share of its flight it has behind it then.
+    /// The vehicle that the faults of the cases strike, and which share of its flight it has behind
+    /// it then.
     pub fn strikes(&self, seed: u64) -> (u8, f32) {
         match self.struck {
             Some(id) => (id, 0.0),
-            None => ((1 + seed % self.vehicles.len() as u64) as u8, (seed * 37 % 100) as f32 * 0.01),
+            None => {
+                ((1 + seed % self.vehicles.len() as u64) as u8, (seed * 37 % 100) as f32 * 0.01)
+            }
         }
     }
 
@@ -56,10 +63,15 @@ impl Meeting {
 
     /// The scenario's text, flown with `method` under the disturbances of one case.
     pub fn scenario(&self, method: &str, simulation: &str, seed: u64) -> String {
-        let mut text =
-            format!("seed = {seed}\n[map]\nfile = {:?}\nresolution_m = {}\n", self.map, self.resolution_m);
-        let goals: Vec<String> =
-            self.vehicles.iter().map(|(_, g)| format!("[{:.3}, {:.3}, {:.3}]", g.x, g.y, g.z)).collect();
+        let mut text = format!(
+            "seed = {seed}\n[map]\nfile = {:?}\nresolution_m = {}\n",
+            self.map, self.resolution_m
+        );
+        let goals: Vec<String> = self
+            .vehicles
+            .iter()
+            .map(|(_, g)| format!("[{:.3}, {:.3}, {:.3}]", g.x, g.y, g.z))
+            .collect();
         let _ = write!(
             text,
             "[roadmap]\nnodes = {}\nedge_min_m = 0.3\nedge_max_m = {}\nsafety_margin_m = {}\nsampling = {:?}\n\
@@ -128,7 +140,11 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     let z = RESOLUTION_M + HEIGHT_M;
     let ends = [Point::new(1.5, 2.0, z), Point::new(28.5, 2.0, z)];
     let corridor = Meeting {
-        cases: three(["corridor, head-on", "corridor, 30 % radio loss", "corridor, 300 ms radio delay"]),
+        cases: three([
+            "corridor, head-on",
+            "corridor, 30 % radio loss",
+            "corridor, 300 ms radio delay",
+        ]),
         map: corridor(dir)?,
         vehicles: vec![(ends[0], ends[1]), (ends[1], ends[0])],
         ..indoors()
@@ -143,10 +159,14 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     };
     // High enough to fly over a vehicle that lies somewhere on the floor.
     let radios = Meeting {
-        cases: ["radio only hears, crossing", "radio only sends, crossing", "radio is dead, crossing"]
-            .into_iter()
-            .zip(FAILED)
-            .collect(),
+        cases: [
+            "radio only hears, crossing",
+            "radio only sends, crossing",
+            "radio is dead, crossing",
+        ]
+        .into_iter()
+        .zip(FAILED)
+        .collect(),
         map: crossing_map(dir, "high.bt", 4.5)?,
         vehicles: crossing_vehicles(z),
         nodes: 400,
@@ -226,9 +246,9 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, forty, hundred])
 }
 
-/// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
-/// The vehicle in front crosses straight to the far goal, the one behind turns left to the near one: so
-/// everybody crosses the way of everybody else from another arm.
+/// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are
+/// on the left. The vehicle in front crosses straight to the far goal, the one behind turns left to
+/// the near one: so everybody crosses the way of everybody else from another arm.
 fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
     let place = |arm: usize, along: f32, left: f32| {
         let (x, y) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][arm % 4];
@@ -251,8 +271,8 @@ fn carve(
     let dims = [0, 1, 2].map(|a| (size[a] / resolution_m).round() as u32);
     let shape = GridShape { dims, min: Point::zeros(), resolution_m };
     let mut map = OccupancyMap::all_unknown(shape, name)?;
-    for (i, j, k) in
-        (0..dims[0]).flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
+    for (i, j, k) in (0..dims[0])
+        .flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
     {
         let inside = k > 0 && k + 1 < dims[2] && free(shape.center([i, j, k]));
         map.set([i, j, k], if inside { Occupancy::Free } else { Occupancy::Occupied });
@@ -271,7 +291,8 @@ fn corridor(dir: &Path) -> Result<PathBuf> {
     })
 }
 
-/// Two rooms of 8 m × 9 m with a doorway 1.6 m wide and 2.2 m high between them, and the long way round through a passage 3 m wide.
+/// Two rooms of 8 m × 9 m with a doorway 1.6 m wide and 2.2 m high between them, and the long way
+/// round through a passage 3 m wide.
 fn doorway(dir: &Path) -> Result<PathBuf> {
     carve(dir, "doorway.bt", DOORWAY_RESOLUTION_M, Point::new(17.0, 13.6, 3.6), |p| {
         let rooms = (0.2..16.8).contains(&p.x) && (0.2..9.2).contains(&p.y);

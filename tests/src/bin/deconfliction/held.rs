@@ -1,7 +1,9 @@
-//! Reason why a vehicle that nothing struck landed short of its goal: by the truth, on the map, by a search of its own.
+//! Reason why a vehicle that nothing struck landed short of its goal: by the truth, on the map, by
+//! a search of its own.
 //!
-//! Places of a lattice are joined where the map leaves the vehicle its clearance and everything that
-//! lies on the ground is further away than the safety distance. Neither the roadmap nor the companion is asked.
+//! Places of a lattice are joined where the map leaves the vehicle its clearance and everything
+//! that lies on the ground is further away than the safety distance. Neither the roadmap nor the
+//! companion is asked.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -46,8 +48,14 @@ pub enum Cause {
 
 impl Cause {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::AtGoal, Self::OnlyRoute, Self::MayBeAtGoal, Self::MayBeOnRoute, Self::Others, Self::WayLeft];
+    pub const ALL: [Self; 6] = [
+        Self::AtGoal,
+        Self::OnlyRoute,
+        Self::MayBeAtGoal,
+        Self::MayBeOnRoute,
+        Self::Others,
+        Self::WayLeft,
+    ];
 }
 
 impl fmt::Display for Cause {
@@ -75,7 +83,13 @@ pub struct Struck {
 }
 
 /// What held up vehicle `held`.
-pub fn cause(mission: &Mission, plan: &SwarmPlan, flight: &Flight, struck: Struck, held: usize) -> Cause {
+pub fn cause(
+    mission: &Mission,
+    plan: &SwarmPlan,
+    flight: &Flight,
+    struck: Struck,
+    held: usize,
+) -> Cause {
     let apart_m = mission.scenario.deconfliction.safety_distance_m;
     let Some((left_s, from)) = gave_up(&flight.tracks[held]) else { return Cause::WayLeft };
     let path = &plan.flights[held].path;
@@ -87,7 +101,13 @@ pub fn cause(mission: &Mission, plan: &SwarmPlan, flight: &Flight, struck: Struc
         .map(|place| (place, apart_m))
         .collect();
     let lies = flight.tracks[struck.index].last().map(|(_, place)| (*place, apart_m));
-    let search = Search { mission, required_m: mission.tasks[held].required_clearance_m, from, over, ground };
+    let search = Search {
+        mission,
+        required_m: mission.tasks[held].required_clearance_m,
+        from,
+        over,
+        ground,
+    };
     if !search.finds(&others) {
         return Cause::Others;
     }
@@ -99,7 +119,8 @@ pub fn cause(mission: &Mission, plan: &SwarmPlan, flight: &Flight, struck: Struc
     if !search.finds(&with(&known)) {
         return Cause::OnlyRoute;
     }
-    let may = if struck.silent { may_lie(plan, flight, struck, apart_m + BESIDE_M) } else { Vec::new() };
+    let may =
+        if struck.silent { may_lie(plan, flight, struck, apart_m + BESIDE_M) } else { Vec::new() };
     if search.goal_held(&may) {
         return Cause::MayBeAtGoal;
     }
@@ -120,7 +141,8 @@ fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
     track.get(after).or(track.last()).map(|(_, place)| *place)
 }
 
-/// How far a silent vehicle lies beside its path, and how far along it from where it was last heard, metres.
+/// How far a silent vehicle lies beside its path, and how far along it from where it was last
+/// heard, metres.
 pub fn lies(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2]> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
@@ -174,15 +196,19 @@ impl Search<'_> {
             return false;
         }
         // What is too near already may be flown off from.
-        let here = |&(place, radius_m): &Ball| (place, radius_m.min((place - self.from).norm() - 1e-3));
+        let here =
+            |&(place, radius_m): &Ball| (place, radius_m.min((place - self.from).norm() - 1e-3));
         let balls: Vec<Ball> = balls.iter().map(here).collect();
         let grid = self.mission.map.grid();
-        let free =
-            |a: &Point, b: &Point| segment_is_clear(&grid, a, b, self.required_m) && apart(a, b, &balls);
+        let free = |a: &Point, b: &Point| {
+            segment_is_clear(&grid, a, b, self.required_m) && apart(a, b, &balls)
+        };
         let shape = self.mission.map.shape;
         let extent = shape.max() - shape.min;
         let sizes = [extent.x, extent.y, extent.z].map(|m| (m / LATTICE_M) as usize + 1);
-        let at = |[i, j, k]: [usize; 3]| shape.min + Point::new(i as f32, j as f32, k as f32) * LATTICE_M;
+        let at = |[i, j, k]: [usize; 3]| {
+            shape.min + Point::new(i as f32, j as f32, k as f32) * LATTICE_M
+        };
         let index = |[i, j, k]: [usize; 3]| (k * sizes[1] + j) * sizes[0] + i;
         let mut seen = vec![false; sizes.iter().product()];
         let mut queue = VecDeque::new();
@@ -204,8 +230,12 @@ impl Search<'_> {
             }
             for step in 0..27_usize {
                 let offsets = [step % 3, step / 3 % 3, step / 9];
-                let next: [usize; 3] = std::array::from_fn(|a| (cell[a] + offsets[a]).wrapping_sub(1));
-                if (0..3).all(|a| next[a] < sizes[a]) && !seen[index(next)] && free(&place, &at(next)) {
+                let next: [usize; 3] =
+                    std::array::from_fn(|a| (cell[a] + offsets[a]).wrapping_sub(1));
+                if (0..3).all(|a| next[a] < sizes[a])
+                    && !seen[index(next)]
+                    && free(&place, &at(next))
+                {
                     seen[index(next)] = true;
                     queue.push_back(next);
                 }

@@ -1,7 +1,9 @@
-//! How early the last vehicle could land: a search over orders, with straight paths and paths of two legs at right angles.
+//! How early the last vehicle could land: a search over orders, with straight paths and paths of
+//! two legs at right angles.
 //!
-//! It is no planner: it knows the open map and looks at 152 orders, in each of which every vehicle takes the path that lands
-//! it first. Separation, speeds, climbs and the schedule's rules are those of the mission.
+//! It is no planner: it knows the open map and looks at 152 orders, in each of which every vehicle
+//! takes the path that lands it first. Separation, speeds, climbs and the schedule's rules are
+//! those of the mission.
 
 use host_sim::capacity::WAYPOINTS;
 use host_sim::mission::{Mission, SwarmPlan};
@@ -28,7 +30,8 @@ pub struct Landings {
 
 /// The schedule of a plan beside that of flights alone and the best found here.
 pub fn landings(mission: &Mission, plan: &SwarmPlan, alone: &SwarmPlan) -> Option<Landings> {
-    let last = |plan: &SwarmPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
+    let last =
+        |plan: &SwarmPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
     let ideal_s = ideal_s(mission, plan)?;
     Some(Landings { alone_s: last(alone), planned_s: last(plan), ideal_s })
 }
@@ -38,7 +41,8 @@ fn landed_s(mission: &Mission, flight: &Flight<WAYPOINTS>) -> f32 {
     flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps
 }
 
-/// The flights of a vehicle: straight, or with a corner where one coordinate of start and goal is that of each.
+/// The flights of a vehicle: straight, or with a corner where one coordinate of start and goal is
+/// that of each.
 fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<WAYPOINTS>>> {
     let waypoints = flight.path.waypoints();
     let (from, to) = (waypoints.first()?.position, waypoints.last()?.position);
@@ -53,14 +57,18 @@ fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<W
         }
         let mut path = Path::new();
         corners.iter().for_each(|&corner| path.push(corner, required_m).expect("three points fit"));
-        path.label_times(flight.climb_m / mission.schedule().vertical_mps, mission.schedule().cruise_mps);
+        path.label_times(
+            flight.climb_m / mission.schedule().vertical_mps,
+            mission.schedule().cruise_mps,
+        );
         all.push(Flight { path, depart_s: 0.0, segment_m: MAX_TIMED_SEGMENT_M, ..flight.clone() });
     }
     Some(all)
 }
 
 fn ideal_s(mission: &Mission, plan: &SwarmPlan) -> Option<f32> {
-    let choices: Vec<_> = plan.flights.iter().map(|f| flights(mission, f)).collect::<Option<_>>()?;
+    let choices: Vec<_> =
+        plan.flights.iter().map(|f| flights(mission, f)).collect::<Option<_>>()?;
     let mut ws = ScheduleWorkspace::default();
     let mut rng = Pcg32::seed_from_u64(1);
     let mut order: Vec<usize> = (0..choices.len()).collect();
@@ -70,10 +78,12 @@ fn ideal_s(mission: &Mission, plan: &SwarmPlan) -> Option<f32> {
         for &i in &order {
             let departs = choices[i].iter().filter_map(|flight| {
                 let cfg = mission.schedule();
-                let depart_s = earliest_departure(cfg, flight, 0.0, scheduled.iter(), &mut ws).ok()?;
+                let depart_s =
+                    earliest_departure(cfg, flight, 0.0, scheduled.iter(), &mut ws).ok()?;
                 Some(Flight { depart_s, ..flight.clone() })
             });
-            let first = departs.min_by(|a, b| landed_s(mission, a).total_cmp(&landed_s(mission, b)));
+            let first =
+                departs.min_by(|a, b| landed_s(mission, a).total_cmp(&landed_s(mission, b)));
             scheduled.extend(first);
         }
         if scheduled.len() == choices.len() {

@@ -1,8 +1,9 @@
-//! The deconfliction suite: meetings that are hard, flown over many seeds with each method. Prints one line per case and
-//! method; `cargo xtask bench --only deconfliction` runs it.
+//! The deconfliction suite: meetings that are hard, flown over many seeds with each method. Prints
+//! one line per case and method; `cargo xtask bench --only deconfliction` runs it.
 //!
-//! Every meeting is a map made here, written as OctoMap and read back like any other, and a scenario's text, so that each
-//! can be flown again alone. A meeting is planned once a seed; every case of it and both methods fly that plan.
+//! Every meeting is a map made here, written as OctoMap and read back like any other, and a
+//! scenario's text, so that each can be flown again alone. A meeting is planned once a seed; every
+//! case of it and both methods fly that plan.
 
 mod cases;
 mod held;
@@ -73,7 +74,8 @@ struct Row {
     held_up: usize,
     /// Why those were held up, by their causes in the order of [`Cause::ALL`].
     held_up_by: [usize; Cause::ALL.len()],
-    /// How far silent vehicles lie at most: beside their path, and along it from where they were last heard, metres.
+    /// How far silent vehicles lie at most: beside their path, and along it from where they were
+    /// last heard, metres.
     lies_m: [f32; 2],
     /// Smallest separation seen, metres.
     min_separation_m: f64,
@@ -84,7 +86,8 @@ struct Row {
     /// The same share by the schedule alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     planned_makespan: Option<f64>,
-    /// The same of the best schedule that a search over orders with straight and square paths finds.
+    /// The same of the best schedule that a search over orders with straight and square paths
+    /// finds.
     #[serde(skip_serializing_if = "Option::is_none")]
     ideal_makespan: Option<f64>,
     /// What went wrong: seed, seconds, vehicle and what.
@@ -188,9 +191,10 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
         sum.min_separation_m = sum.min_separation_m.min(row.min_separation_m);
         sum.extra_flight += row.extra_flight;
         sum.extra_makespan += row.extra_makespan;
-        for (sum, extra) in
-            [(&mut sum.planned_makespan, row.planned_makespan), (&mut sum.ideal_makespan, row.ideal_makespan)]
-        {
+        for (sum, extra) in [
+            (&mut sum.planned_makespan, row.planned_makespan),
+            (&mut sum.ideal_makespan, row.ideal_makespan),
+        ] {
             *sum = extra.map(|extra| sum.unwrap_or(0.0) + extra).or(*sum);
         }
         sum.flights += row.flights;
@@ -254,14 +258,18 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
     let shortest = mission.plan()?;
     let alone = fly(&mission, &shortest)?.result;
     mission.set_separation(apart.separation_m, apart.parked_separation_m)?;
-    let landings = if meeting.has_ideal { ideal::landings(&mission, &plan, &shortest) } else { None };
+    let landings =
+        if meeting.has_ideal { ideal::landings(&mission, &plan, &shortest) } else { None };
     if let (Some(landings), Some(row)) = (landings, rows.first_mut()) {
         let extra = |last_s: f32| Some(f64::from(last_s / landings.alone_s) - 1.0);
-        (row.planned_makespan, row.ideal_makespan) = (extra(landings.planned_s), extra(landings.ideal_s));
+        (row.planned_makespan, row.ideal_makespan) =
+            (extra(landings.planned_s), extra(landings.ideal_s));
     }
     let (struck, at_s) = strike(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
-    for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases).filter(|(row, _)| row.seeds > 0) {
+    for (row, (&(name, simulation), method)) in
+        rows.iter_mut().zip(cases).filter(|(row, _)| row.seeds > 0)
+    {
         let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck.to_string());
         mission.scenario = parsed(meeting, method, &simulation, seed, dir)?;
         let flight = fly(&mission, &plan)?;
@@ -280,14 +288,21 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
                 .with_context(|| format!("cannot write {}", file.display()))?;
         }
         let errors = flight.log.iter().filter(|event| event.level == Level::Error);
-        row.incidents
-            .extend(errors.map(|e| format!("seed {seed}, {:.1} s, {:?}: {}", e.t_s, e.vehicle, e.text)));
+        row.incidents.extend(
+            errors.map(|e| format!("seed {seed}, {:.1} s, {:?}: {}", e.t_s, e.vehicle, e.text)),
+        );
     }
     Ok(rows)
 }
 
 /// Notes what held up each vehicle that landed short of its goal, and where the one struck lies.
-fn explain(row: &mut Row, mission: &Mission, plan: &SwarmPlan, flight: &swarm::Flight, struck: Struck) {
+fn explain(
+    row: &mut Row,
+    mission: &Mission,
+    plan: &SwarmPlan,
+    flight: &swarm::Flight,
+    struck: Struck,
+) {
     if let Some([beside_m, along_m]) = held::lies(plan, flight, struck).filter(|_| struck.silent) {
         row.lies_m = [row.lies_m[0].max(beside_m), row.lies_m[1].max(along_m)];
     }

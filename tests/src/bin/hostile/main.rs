@@ -1,4 +1,5 @@
-//! Forged frames for companions in flight; `cargo xtask bench --only hostile --n N` gives N of them.
+//! Forged frames for companions in flight; `cargo xtask bench --only hostile --n N` gives N of
+//! them.
 
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! Random meetings of whole companions, judged by the truth; `cargo xtask bench --only meetings` runs ten thousand.
+//! Random meetings of whole companions, judged by the truth; `cargo xtask bench --only meetings`
+//! runs ten thousand.
 
 use std::time::Instant;
 
@@ -22,7 +23,8 @@ struct Args {
     /// Print what happens in one meeting.
     #[arg(long)]
     trace: bool,
-    /// Two vehicles that pass at exactly the scheduled separation, instead: nobody is to be stopped.
+    /// Two vehicles that pass at exactly the scheduled separation, instead: nobody is to be
+    /// stopped.
     #[arg(long)]
     passing: bool,
     /// Only meetings of this geometry.
@@ -36,7 +38,8 @@ fn trace(scene: &scene::Scene) {
     println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");
     for vehicle in &scene.vehicles {
         let plan = &vehicle.plan;
-        let points: Vec<_> = plan.path.waypoints().iter().map(|w| w.position.as_slice().to_vec()).collect();
+        let points: Vec<_> =
+            plan.path.waypoints().iter().map(|w| w.position.as_slice().to_vec()).collect();
         println!(
             "{}: {:?}, pad {:.2?}, departs {:.1} s, path {points:.1?}, gates {:.1?}",
             vehicle.id,

@@ -1,7 +1,8 @@
-//! The demo with a radio that does not reach far; `cargo xtask bench --only range` flies twenty seeds of each range.
+//! The demo with a radio that does not reach far; `cargo xtask bench --only range` flies twenty
+//! seeds of each range.
 //!
-//! Where vehicles lose one another they may land short of their goals, but they touch nothing, come near nobody, and each
-//! names why.
+//! Where vehicles lose one another they may land short of their goals, but they touch nothing, come
+//! near nobody, and each names why.
 
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -25,7 +26,8 @@ struct Args {
     /// Only this range, metres.
     #[arg(long, value_name = "METRES")]
     range: Option<f32>,
-    /// Strike each seed so often: a vehicle fails near the place where the radio no longer reaches it.
+    /// Strike each seed so often: a vehicle fails near the place where the radio no longer reaches
+    /// it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     strikes: usize,
     /// The first seed of the strikes.
@@ -60,18 +62,28 @@ fn main() -> Result<()> {
                 println!("  {:7.2} s, vehicle {:?}: {}", event.t_s, event.vehicle, event.text);
             }
             complete += usize::from(result.complete);
-            let counts = [result.safety.violations, result.safety.wall_contacts, result.safety.deadlocks];
+            let counts =
+                [result.safety.violations, result.safety.wall_contacts, result.safety.deadlocks];
             safety.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
-            for vehicle in result.vehicles.iter().filter(|v| v.goal.is_some() && !(v.reached && v.landed)) {
+            for vehicle in
+                result.vehicles.iter().filter(|v| v.goal.is_some() && !(v.reached && v.landed))
+            {
                 // What it said when it gave up its goal.
-                let said = log.iter().rfind(|e| e.vehicle == Some(vehicle.id) && e.text.contains("→ Land: "));
+                let said = log
+                    .iter()
+                    .rfind(|e| e.vehicle == Some(vehicle.id) && e.text.contains("→ Land: "));
                 let why = said.map_or("no reason", |event| &event.text);
-                println!("  range {range_m} m, seed {seed}, vehicle {}: {}; {why}", vehicle.id, vehicle.end);
+                println!(
+                    "  range {range_m} m, seed {seed}, vehicle {}: {}; {why}",
+                    vehicle.id, vehicle.end
+                );
                 left += usize::from(!vehicle.landed && !vehicle.end.starts_with("Ready"));
                 unnamed += usize::from(said.is_none());
             }
             if counts != [0; 3] {
-                println!("  range {range_m} m, seed {seed}: violations, contacts, deadlocks {counts:?}");
+                println!(
+                    "  range {range_m} m, seed {seed}: violations, contacts, deadlocks {counts:?}"
+                );
             }
         }
         println!(
@@ -109,7 +121,11 @@ fn strike(args: &Args) -> Result<()> {
             counts.iter_mut().zip(all).for_each(|(sum, count)| *sum += count);
             if found != [0; 3] {
                 println!("  seed {seed}, {}, {} deadlocks", outcome.what, outcome.deadlocks);
-                outcome.log.iter().filter(|_| args.seed.is_some()).for_each(|line| println!("  {line}"));
+                outcome
+                    .log
+                    .iter()
+                    .filter(|_| args.seed.is_some())
+                    .for_each(|line| println!("  {line}"));
                 let lines = [outcome.wrong, outcome.near_struck, outcome.aloft];
                 lines.iter().flatten().for_each(|line| println!("    {line}"));
             }

@@ -10,7 +10,8 @@ use super::{ARDUPILOT_LOITER, Autopilot, Catch, PX4_POSITION, STEP_S};
 
 /// Slowest setpoint with which PX4 looks for the ground, m/s.
 const MIN_SINK_MPS: f32 = 0.275;
-/// Half of the way that a vehicle in a net swings, metres, and its phase by time, 1/s: up to 0.7 m/s.
+/// Half of the way that a vehicle in a net swings, metres, and its phase by time, 1/s: up to 0.7
+/// m/s.
 const SWING_M: f32 = 0.25;
 const SWING_PER_S: f32 = 2.8;
 /// How fast the wind carries a vehicle off, m/s.
@@ -88,9 +89,10 @@ impl Autopilot {
             Catch::Wall | Catch::Ledge => (0.0, 0.0),
             // On the ground its net lies still.
             Catch::Net if self.grounded_since.is_some() => (self.position.x - place.x, 0.0),
-            Catch::Net => {
-                (SWING_M * (SWING_PER_S * t_s).sin(), SWING_M * SWING_PER_S * (SWING_PER_S * t_s).cos())
-            }
+            Catch::Net => (
+                SWING_M * (SWING_PER_S * t_s).sin(),
+                SWING_M * SWING_PER_S * (SWING_PER_S * t_s).cos(),
+            ),
             Catch::Wind => (self.position.x - place.x + WIND_MPS * STEP_S, WIND_MPS),
         };
         (self.position.x, self.position.y) = (place.x + away_m, place.y);
@@ -101,8 +103,8 @@ impl Autopilot {
         ledge.then_some(place.z)
     }
 
-    /// Whether the land detector looks for the ground: PX4's does while the setpoint's velocity sinks, above 1.1 times
-    /// `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
+    /// Whether the land detector looks for the ground: PX4's does while the setpoint's velocity
+    /// sinks, above 1.1 times `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
     fn detects_ground(&self) -> bool {
         self.kind != AutopilotKind::Px4
             || self.mode != self.kind.setpoint_mode()
@@ -142,7 +144,8 @@ impl Autopilot {
             self.airborne = true;
             self.lifted_at = Some(now);
         }
-        let rests = (-0.3..0.03).contains(&height) && self.velocity.z < 0.05 && self.detects_ground();
+        let rests =
+            (-0.3..0.03).contains(&height) && self.velocity.z < 0.05 && self.detects_ground();
         self.grounded_since = if rests { self.grounded_since.or(Some(now)) } else { None };
         let rested_s = self.grounded_since.map_or(0.0, |at| (now - at).as_secs_f32());
         if rested_s > 0.6 {

@@ -27,7 +27,12 @@ impl Autopilot {
         }
     }
 
-    fn handle_parameter(&mut self, id: &mavlink::types::CharArray<16>, set: Option<f32>, out: &mut Vec<u8>) {
+    fn handle_parameter(
+        &mut self,
+        id: &mavlink::types::CharArray<16>,
+        set: Option<f32>,
+        out: &mut Vec<u8>,
+    ) {
         let Ok(name) = id.to_str() else { return };
         let known: &[(&str, f32)] = match self.kind {
             AutopilotKind::Px4 => &[
@@ -78,7 +83,8 @@ impl Autopilot {
             let place = frames::ned_to_geodetic(self.kind.projection(), &self.ekf_origin, &ned);
             frames::geodetic_to_enu(&self.mission_origin, &place)
         });
-        let acceleration = if mask & 0x1C0 == 0 { enu(data.afx, data.afy, data.afz) } else { Point::zeros() };
+        let acceleration =
+            if mask & 0x1C0 == 0 { enu(data.afx, data.afy, data.afz) } else { Point::zeros() };
         let velocity = enu(data.vx, data.vy, data.vz);
         let fields = velocity.iter().chain(acceleration.iter()).chain(position.iter().flatten());
         if fields.clone().any(|field| !field.is_finite()) {
@@ -136,7 +142,9 @@ impl Autopilot {
                 self.enter(self.kind.land_mode());
                 self.landing_commanded = true;
             }
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => result = self.arm_or_disarm(now, data.param1 == 1.0),
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {
+                result = self.arm_or_disarm(now, data.param1 == 1.0)
+            }
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
                 if self.armed && self.mode == self.kind.setpoint_mode() {
                     self.takeoff_z = Some(self.home.z + data.param7);

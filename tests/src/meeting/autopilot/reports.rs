@@ -14,7 +14,8 @@ use super::Autopilot;
 impl Autopilot {
     pub(super) fn send<M: MessageData>(&mut self, message: &M, out: &mut Vec<u8>) {
         let mut buffer = [0; MAX_FRAME_LEN];
-        let header = Header { system: self.id, component: AUTOPILOT_COMPONENT, sequence: self.sequence };
+        let header =
+            Header { system: self.id, component: AUTOPILOT_COMPONENT, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         let len = frame::encode(header, message, &mut buffer);
         out.extend_from_slice(&buffer[..len]);
@@ -26,7 +27,8 @@ impl Autopilot {
         payload[..2].copy_from_slice(&(command as u16).to_le_bytes());
         payload[2] = result as u8;
         payload[8..].copy_from_slice(&[self.id, companion::COMPANION_COMPONENT]);
-        let header = Header { system: self.id, component: AUTOPILOT_COMPONENT, sequence: self.sequence };
+        let header =
+            Header { system: self.id, component: AUTOPILOT_COMPONENT, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         let mut buffer = [0; MAX_FRAME_LEN];
         let (id, extra) = (COMMAND_ACK_DATA::ID, COMMAND_ACK_DATA::EXTRA_CRC);
@@ -69,11 +71,16 @@ impl Autopilot {
     }
 
     fn report_each_second(&mut self, out: &mut Vec<u8>) {
-        let armed = if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
+        let armed =
+            if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
         if self.kind == AutopilotKind::Px4 {
             let (pos_horiz_accuracy, pos_vert_accuracy) = (0.02, 0.03);
             self.send(
-                &ESTIMATOR_STATUS_DATA { pos_horiz_accuracy, pos_vert_accuracy, ..Default::default() },
+                &ESTIMATOR_STATUS_DATA {
+                    pos_horiz_accuracy,
+                    pos_vert_accuracy,
+                    ..Default::default()
+                },
                 out,
             );
         }

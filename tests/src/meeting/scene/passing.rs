@@ -10,10 +10,11 @@ use super::ways::{Way, at_height, flight};
 use crate::meeting::dice::Dice;
 
 /// How two vehicles pass in [`passing`].
-pub const PASSINGS: [&str; 6] = ["opposite", "alongside", "overhead", "climb beside", "crossing", "lane"];
+pub const PASSINGS: [&str; 6] =
+    ["opposite", "alongside", "overhead", "climb beside", "crossing", "lane"];
 
-/// Two vehicles of one plan that pass at exactly the separation of the schedule, or one after the other; nothing else happens.
-/// The radio loses 30 % and takes 0.3 s.
+/// Two vehicles of one plan that pass at exactly the separation of the schedule, or one after the
+/// other; nothing else happens. The radio loses 30 % and takes 0.3 s.
 pub fn passing(seed: u64) -> Scene {
     let mut dice = Dice::new(seed ^ 0xFA15E);
     let kind = PASSINGS[seed as usize % PASSINGS.len()];
@@ -23,11 +24,14 @@ pub fn passing(seed: u64) -> Scene {
     let z = dice.real(1.5, 5.0);
     // What is a hair nearer would get a gate.
     let apart_m = SCHEDULE.separation_m + 1e-3;
-    let place = |x: f32, y: f32, z: f32| at_height(Point::new(12.0, 12.0, 0.0) + along * x + across * y, z);
+    let place =
+        |x: f32, y: f32, z: f32| at_height(Point::new(12.0, 12.0, 0.0) + along * x + across * y, z);
     let (a, b) = (dice.real(5.0, 9.0), dice.real(5.0, 9.0));
     let first = vec![place(-a, 0.0, z), place(b, 0.0, z)];
     let second = match kind {
-        "opposite" => vec![place(b + dice.real(-2.0, 2.0), apart_m, z), place(-a + 1.0, apart_m, z)],
+        "opposite" => {
+            vec![place(b + dice.real(-2.0, 2.0), apart_m, z), place(-a + 1.0, apart_m, z)]
+        }
         "alongside" => {
             let shift = dice.real(-2.0, 2.0);
             vec![place(-a + shift, apart_m, z), place(b + shift, apart_m, z)]
@@ -35,7 +39,8 @@ pub fn passing(seed: u64) -> Scene {
         "overhead" => vec![place(0.0, -a, z + apart_m), place(0.0, b, z + apart_m)],
         "climb beside" => {
             let x = dice.real(-2.0, 2.0);
-            let mut points = vec![place(x, apart_m, z + dice.real(1.0, 10.0)), place(x, 8.0, z + 2.0)];
+            let mut points =
+                vec![place(x, apart_m, z + dice.real(1.0, 10.0)), place(x, 8.0, z + 2.0)];
             points[1].z = points[0].z;
             if dice.chance(0.5) {
                 points.reverse();
@@ -44,7 +49,12 @@ pub fn passing(seed: u64) -> Scene {
         }
         "crossing" => vec![place(0.0, -a, z), place(0.0, b, z)],
         _ => {
-            vec![place(-a, 4.0, z), place(-a + 2.0, 0.0, z), place(b - 3.0, 0.0, z), place(b - 3.0, -5.0, z)]
+            vec![
+                place(-a, 4.0, z),
+                place(-a + 2.0, 0.0, z),
+                place(b - 3.0, 0.0, z),
+                place(b - 3.0, -5.0, z),
+            ]
         }
     };
     let mut workspace = Box::new(ScheduleWorkspace::new());
@@ -53,7 +63,8 @@ pub fn passing(seed: u64) -> Scene {
         let pad = at_height(points[0], 0.0);
         let way = Way { pad, points, ground_z: 0.0 };
         let mut flight = flight(i as u8 + 1, &way).expect("a short flight");
-        let departs = schedule::earliest_departure(&SCHEDULE, &flight, 0.0, flights.iter(), &mut workspace);
+        let departs =
+            schedule::earliest_departure(&SCHEDULE, &flight, 0.0, flights.iter(), &mut workspace);
         flight.depart_s = departs.expect("room for two");
         flights.push(flight);
     }

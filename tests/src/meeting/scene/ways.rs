@@ -10,7 +10,8 @@ use crate::meeting::dice::Dice;
 /// No flight is longer, seconds.
 const LONGEST_S: f32 = 60.0;
 /// The geometries.
-pub(super) const KINDS: [&str; 6] = ["crossing", "shared", "vertical", "beside", "corridor", "random"];
+pub(super) const KINDS: [&str; 6] =
+    ["crossing", "shared", "vertical", "beside", "corridor", "random"];
 
 /// A way: ground of the pad, points of the path, ground of the goal.
 pub(super) struct Way {
@@ -25,7 +26,8 @@ pub(super) fn at_height(place: Point, z: f32) -> Point {
 
 /// A way of vehicle `i` of `n` in a geometry whose numbers are in `shape`.
 pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
-    let up = |dice: &mut Dice| if dice.chance(0.2) { dice.real(1.0, 29.0) } else { dice.real(1.0, 5.0) };
+    let up =
+        |dice: &mut Dice| if dice.chance(0.2) { dice.real(1.0, 29.0) } else { dice.real(1.0, 5.0) };
     let (middle, z) = (shape.middle, shape.z);
     match kind {
         "crossing" => {
@@ -38,10 +40,12 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
             grounded(vec![from, at_height(middle, level), to], dice)
         }
         "shared" => {
-            let mut points = vec![middle + Point::new(dice.real(-7.0, -3.0), dice.real(-5.0, 5.0), 0.0)];
+            let mut points =
+                vec![middle + Point::new(dice.real(-7.0, -3.0), dice.real(-5.0, 5.0), 0.0)];
             points.extend([middle, middle + shape.along * 7.0]);
             points.push(
-                points[2] + Point::new(dice.real(2.0, 6.0), dice.real(-6.0, 6.0), dice.real(-0.5, 2.0)),
+                points[2]
+                    + Point::new(dice.real(2.0, 6.0), dice.real(-6.0, 6.0), dice.real(-0.5, 2.0)),
             );
             if dice.chance(0.25) {
                 points.reverse();
@@ -54,13 +58,21 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
             let here = middle + Point::new(dice.real(-0.8, 0.8), dice.real(-0.8, 0.8), 0.0);
             let away = middle + Point::new(dice.real(-9.0, 9.0), dice.real(-9.0, 9.0), 0.0);
             let (low, high) = (up(dice), up(dice));
-            let beside =
-                |p: Point, dice: &mut Dice| p + Point::new(dice.real(2.0, 4.0), dice.real(2.0, 4.0), 0.0);
+            let beside = |p: Point, dice: &mut Dice| {
+                p + Point::new(dice.real(2.0, 4.0), dice.real(2.0, 4.0), 0.0)
+            };
             match i % 3 {
-                0 => grounded(vec![at_height(here, low), at_height(away, low + dice.real(-0.5, 2.0))], dice),
+                0 => grounded(
+                    vec![at_height(here, low), at_height(away, low + dice.real(-0.5, 2.0))],
+                    dice,
+                ),
                 1 => grounded(vec![at_height(away, high), at_height(here, high)], dice),
                 _ => grounded(
-                    vec![at_height(away, high), at_height(here, high), at_height(beside(here, dice), high)],
+                    vec![
+                        at_height(away, high),
+                        at_height(here, high),
+                        at_height(beside(here, dice), high),
+                    ],
                     dice,
                 ),
             }
@@ -68,14 +80,19 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
         "beside" => {
             // A path, and pads close to it.
             let across = Point::new(-shape.along.y, shape.along.x, 0.0);
-            let line =
-                |along: f32, off: f32, z: f32| at_height(middle + shape.along * along + across * off, z);
+            let line = |along: f32, off: f32, z: f32| {
+                at_height(middle + shape.along * along + across * off, z)
+            };
             if i == 0 {
                 grounded(vec![line(-8.0, 0.0, z), line(8.0, 0.0, z)], dice)
             } else {
                 let off = dice.real(1.6, 3.0) * if dice.chance(0.5) { 1.0 } else { -1.0 };
                 let (along, top) = (dice.real(-5.0, 5.0), z + dice.real(-1.0, 3.0));
-                let to = line(along + dice.real(-4.0, 4.0), off + off.signum() * dice.real(3.0, 8.0), top);
+                let to = line(
+                    along + dice.real(-4.0, 4.0),
+                    off + off.signum() * dice.real(3.0, 8.0),
+                    top,
+                );
                 let mut points = vec![line(along, off, top.max(1.0)), to];
                 if dice.chance(0.5) {
                     points.reverse();
@@ -88,13 +105,16 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
             let end = dice.real(5.0, 9.0);
             let mut points = vec![
                 at_height(
-                    middle - along * end + Point::new(dice.real(-4.0, 4.0), dice.real(-4.0, 4.0), 0.0),
+                    middle - along * end
+                        + Point::new(dice.real(-4.0, 4.0), dice.real(-4.0, 4.0), 0.0),
                     z,
                 ),
                 at_height(middle - along * 4.0, z),
                 at_height(middle + along * 4.0, z),
                 at_height(
-                    middle + along * end + Point::new(dice.real(-4.0, 4.0), dice.real(-4.0, 4.0), 0.0),
+                    middle
+                        + along * end
+                        + Point::new(dice.real(-4.0, 4.0), dice.real(-4.0, 4.0), 0.0),
                     z,
                 ),
             ];
@@ -142,22 +162,27 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
     path.label_times(climb_m / SCHEDULE.vertical_mps, SCHEDULE.cruise_mps);
     let descent_m = way.points.last()?.z - way.ground_z;
     let length_s = path.length_m() / SCHEDULE.cruise_mps + climb_m + descent_m;
-    (path.length_m() > 2.0 && climb_m > 0.5 && descent_m > 0.5 && length_s < LONGEST_S).then_some(Flight {
-        id,
-        task: Task::Goto(u16::from(id)),
-        path,
-        climb_m,
-        descent_m,
-        depart_s: 0.0,
-        segment_m: schedule::MAX_TIMED_SEGMENT_M,
-    })
+    (path.length_m() > 2.0 && climb_m > 0.5 && descent_m > 0.5 && length_s < LONGEST_S).then_some(
+        Flight {
+            id,
+            task: Task::Goto(u16::from(id)),
+            path,
+            climb_m,
+            descent_m,
+            depart_s: 0.0,
+            segment_m: schedule::MAX_TIMED_SEGMENT_M,
+        },
+    )
 }
 
 /// Where a flight begins and ends, on the ground.
 pub(super) fn pads(flight: &Flight<WAYPOINTS>) -> [Point; 2] {
     let down = |length| Point::new(0.0, 0.0, length);
     let points = flight.path.waypoints();
-    [points[0].position - down(flight.climb_m), points[points.len() - 1].position - down(flight.descent_m)]
+    [
+        points[0].position - down(flight.climb_m),
+        points[points.len() - 1].position - down(flight.descent_m),
+    ]
 }
 
 /// Whether the flights leave one another's platforms room, and their pads lie apart.
@@ -173,9 +198,11 @@ pub(super) fn fits(flights: &[Flight<WAYPOINTS>], next: &Flight<WAYPOINTS>) -> b
         && flights.iter().all(|other| {
             let theirs = pads(other);
             let apart = own.iter().zip(&theirs).all(|(a, b)| {
-                (a - b).norm() > SAFETY_M + 0.5 && ((a - b).xy().norm() > 1.6 || (a.z - b.z).abs() < 0.1)
+                (a - b).norm() > SAFETY_M + 0.5
+                    && ((a - b).xy().norm() > 1.6 || (a.z - b.z).abs() < 0.1)
             });
-            let crossed = (own[0] - theirs[1]).norm().min((own[1] - theirs[0]).norm()) > SAFETY_M + 0.3;
+            let crossed =
+                (own[0] - theirs[1]).norm().min((own[1] - theirs[0]).norm()) > SAFETY_M + 0.3;
             apart && crossed && !over(&theirs, &next.path) && !over(&own, &other.path)
         })
 }

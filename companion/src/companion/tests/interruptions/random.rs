@@ -1,5 +1,5 @@
-//! Random sequences of commands, faults and the pilot's acts: what must hold at every tick, and that
-//! all end on the ground.
+//! Random sequences of commands, faults and the pilot's acts: what must hold at every tick, and
+//! that all end on the ground.
 
 use std::string::String;
 
@@ -33,15 +33,29 @@ impl Watch {
         let state = b.state();
         let ours = b.mode == b.kind.setpoint_mode();
         let lifts = b.kind == AutopilotKind::ArduPilot && state == State::TakeOff;
-        let nobody =
-            b.armed && !b.on_ground() && ours && !b.silent && !sent && !lifts && state != State::Failsafe;
+        let nobody = b.armed
+            && !b.on_ground()
+            && ours
+            && !b.silent
+            && !sent
+            && !lifts
+            && state != State::Failsafe;
         self.unattended = if nobody { self.unattended + 1 } else { 0 };
-        assert!(self.unattended < 30, "nobody flies it in {state:?}: {:#?} {:?}", self.log, b.texts);
+        assert!(
+            self.unattended < 30,
+            "nobody flies it in {state:?}: {:#?} {:?}",
+            self.log,
+            b.texts
+        );
         let foreign = !ours && b.mode != b.kind.land_mode() && b.armed && !b.silent;
         self.piloted = if foreign { self.piloted + 1 } else { 0 };
         for &(command, param1, ..) in &b.commands[self.commands..] {
             let acts = matches!(command, SET_MODE | TAKE_OFF) || (command, param1) == (ARM, 1.0);
-            assert!(self.piloted < 30 || !acts, "{command} under the pilot in {state:?}: {:#?}", self.log);
+            assert!(
+                self.piloted < 30 || !acts,
+                "{command} under the pilot in {state:?}: {:#?}",
+                self.log
+            );
             assert!(
                 (command, param1) != (ARM, 1.0) || !self.armed_once,
                 "armed again in {state:?}: {:#?} {:?}",
@@ -51,10 +65,16 @@ impl Watch {
         }
         self.commands = b.commands.len();
         // What the companion can know: the armed bit, or the ack.
-        let acked = b.companion.requests.handshake().is_armed_bit_overdue(b.now + Duration::from_secs(9));
+        let acked =
+            b.companion.requests.handshake().is_armed_bit_overdue(b.now + Duration::from_secs(9));
         self.armed_once |= b.companion.telemetry.armed || (acked && state == State::Arming);
-        let flies_on = matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);
-        assert!(!self.landing || !flies_on, "an accepted landing is forgotten in {state:?}: {:#?}", self.log);
+        let flies_on =
+            matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);
+        assert!(
+            !self.landing || !flies_on,
+            "an accepted landing is forgotten in {state:?}: {:#?}",
+            self.log
+        );
         assert!(
             !b.companion.mission.pending().pause || !matches!(state, State::Climb | State::Follow),
             "a pause is forgotten in {state:?}: {:#?}",
@@ -66,14 +86,20 @@ impl Watch {
     fn happen(&mut self, b: &mut Bench, what: Happens) {
         use Happens::*;
         let state = b.state();
-        self.log.push(format!("{:.2} s {state:?} {:?}: {what:?}", b.now.as_micros() as f64 * 1e-6, b.enu));
+        self.log.push(format!(
+            "{:.2} s {state:?} {:?}: {what:?}",
+            b.now.as_micros() as f64 * 1e-6,
+            b.enu
+        ));
         match what {
             Pause => _ = pause(b),
             Resume => {
                 let resumed = resume(b) == Some(ACCEPTED);
                 self.armed_once &= b.armed || !resumed;
             }
-            Land => self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted,
+            Land => {
+                self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted
+            }
             Return => _ = order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
             Start => {
                 let started = order(b, MavCmd::MAV_CMD_MISSION_START, 0.0) == Some(ACCEPTED);

@@ -1,4 +1,5 @@
-//! Another vehicle comes down, led by nobody, over one that holds its place: whatever it waits for, it makes room and goes on.
+//! Another vehicle comes down, led by nobody, over one that holds its place: whatever it waits for,
+//! it makes room and goes on.
 
 use std::collections::VecDeque;
 
@@ -61,7 +62,8 @@ impl Faller {
         b.drain();
     }
 
-    /// The planner of the vehicle below: aside, away from what comes down, at once; around in a while, over an area once that is down.
+    /// The planner of the vehicle below: aside, away from what comes down, at once; around in a
+    /// while, over an area once that is down.
     fn plan_away(&mut self, b: &mut Bench) {
         let over_area = b.companion.config.division.is_some();
         let answered = |request: &DetourRequest| request.aside || !over_area;
@@ -115,7 +117,11 @@ impl Faller {
         let (mut payload, mut out) = ([0; 133], [0; MAX_FRAME_LEN]);
         let mut head = || {
             self.sequence = self.sequence.wrapping_add(1);
-            Header { system: self.id, component: crate::COMPANION_COMPONENT, sequence: self.sequence }
+            Header {
+                system: self.id,
+                component: crate::COMPANION_COMPONENT,
+                sequence: self.sequence,
+            }
         };
         let length = intent.encode(&mut payload);
         let (id, seed) = (TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC);
@@ -162,7 +168,10 @@ fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
         // Of two vehicles this one goes on.
         faller.id = 77;
     } else {
-        config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
+        config
+            .roster
+            .push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) })
+            .unwrap();
     }
     if state == Follow {
         wanted.gates.push(Gate { at_m: flown_m, id: 77, until_m: 6.0 }).unwrap();
@@ -177,7 +186,11 @@ fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
     b.start();
     assert!(faller.until(&mut b, 30.0, |b| b.state() == Follow), "{:?}", b.texts);
     let over_m = flown_m - 3.0;
-    assert!(faller.until(&mut b, 30.0, |b| b.companion.guidance.along_m() > over_m), "{:?}", b.texts);
+    assert!(
+        faller.until(&mut b, 30.0, |b| b.companion.guidance.along_m() > over_m),
+        "{:?}",
+        b.texts
+    );
     match state {
         Follow => {}
         Paused => pause(&mut b),
@@ -205,7 +218,8 @@ fn faller(state: State, seed: u64) -> Faller {
     }
 }
 
-/// The least distance to what comes down, and whether the vehicle is down in the end; over an area its part is flown by then.
+/// The least distance to what comes down, and whether the vehicle is down in the end; over an area
+/// its part is flown by then.
 fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
     let mut faller = faller(state, seed);
     let mut b = holding(state, over_area, &mut faller);
@@ -245,7 +259,8 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
     (least_m, ended && (!over_area || b.state() == Done))
 }
 
-/// Of 400 falls in each state two are left in `Blocked`, and two in `Replanning`: right above it, where every way leads nearer.
+/// Of 400 falls in each state two are left in `Blocked`, and two in `Replanning`: right above it,
+/// where every way leads nearer.
 #[test]
 fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
     let safety_m = config().safety_distance_m;
@@ -253,13 +268,16 @@ fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
     for (state, over_area) in
         [Follow, Blocked, Replanning, Paused].map(|state| (state, false)).into_iter().chain(area)
     {
-        let falls: Vec<_> = (0..FALLS).map(|seed| (seed, falls_over(state, over_area, seed))).collect();
-        let bad: Vec<_> = falls.iter().filter(|(_, (least_m, down))| *least_m < safety_m || !down).collect();
+        let falls: Vec<_> =
+            (0..FALLS).map(|seed| (seed, falls_over(state, over_area, seed))).collect();
+        let bad: Vec<_> =
+            falls.iter().filter(|(_, (least_m, down))| *least_m < safety_m || !down).collect();
         assert!(bad.is_empty(), "{state:?}, {over_area}, {} of {FALLS}: {bad:?}", bad.len());
     }
 }
 
-/// What came down lies on the ground: the place where the vehicle left its path is free again, and so no picture is left out.
+/// What came down lies on the ground: the place where the vehicle left its path is free again, and
+/// so no picture is left out.
 #[test]
 fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
     let mut returns = 0;
@@ -284,7 +302,8 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
     assert!(returns > FALLS / 8, "{returns}");
 }
 
-/// Its planner does not answer before it is paused: what it sought is forgotten, and it flies its part all the same.
+/// Its planner does not answer before it is paused: what it sought is forgotten, and it flies its
+/// part all the same.
 #[test]
 fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
     let mut sought = 0;

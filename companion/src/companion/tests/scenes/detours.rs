@@ -144,7 +144,8 @@ pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
 fn who_sways_beside_the_path_over_a_field_blocks_it_once_or_not() {
     let safety_m = config().safety_distance_m;
     let mut rng = Pcg32::seed_from_u64(9);
-    let mut real = |low: f32, high: f32| low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0;
+    let mut real =
+        |low: f32, high: f32| low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0;
     let flights: Vec<(usize, State)> = (0..40)
         .map(|_| {
             let mut b = losses::over_a_field(Follow);
@@ -152,7 +153,8 @@ fn who_sways_beside_the_path_over_a_field_blocks_it_once_or_not() {
             let (sway_m, turns) = (real(0.02, 0.24), real(0.3, 3.0));
             for step in 0..6000 {
                 let sways_m = sway_m * libm::sinf(turns * 0.05 * step as f32);
-                b.neighbour = flies(Point::new(along_m, 12.0 + beside_m + sways_m, 1.5), OUT_OF_PLAN);
+                b.neighbour =
+                    flies(Point::new(along_m, 12.0 + beside_m + sways_m, 1.5), OUT_OF_PLAN);
                 b.run(0.05);
                 if matches!(b.state(), Done | Aborted) {
                     break;

@@ -143,7 +143,8 @@ fn an_interrupted_way_home_is_flown_to_its_end() {
     }
 }
 
-/// Another vehicle stops it on its way around, for so long that there it is blocked too, and flies on.
+/// Another vehicle stops it on its way around, for so long that there it is blocked too, and flies
+/// on.
 #[test]
 fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
     let mut b = over_a_field(Follow);

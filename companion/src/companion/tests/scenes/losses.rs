@@ -32,7 +32,8 @@ pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
 fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
-    let roster = RosterReport { system_id: 77, mission_crc: 0xC0FFEE, entries, ..RosterReport::default() };
+    let roster =
+        RosterReport { system_id: 77, mission_crc: 0xC0FFEE, entries, ..RosterReport::default() };
     let mut payload = [0; roster::MAX_LEN];
     let len = roster.encode(&mut payload);
     tunnels(b, &payload[..len]);
@@ -54,7 +55,8 @@ pub(super) fn leaves(b: &mut Bench) {
 
 pub(super) fn another_leaves(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), leaves, Done, 120.0);
-    // A promise binds until the division counts, whatever is heard later: others may have divided on it.
+    // A promise binds until the division counts, whatever is heard later: others may have divided
+    // on it.
     let had_finished = |b: &mut Bench| {
         b.answer_division = false;
         leaves(b);

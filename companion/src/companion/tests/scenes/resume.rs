@@ -60,7 +60,8 @@ fn who_comes_late_takes_the_set_of_those_that_fly() {
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
 }
 
-/// What a vehicle in flight photographs changes no plan on the ground, nor does a round before; a later round takes all back.
+/// What a vehicle in flight photographs changes no plan on the ground, nor does a round before; a
+/// later round takes all back.
 #[test]
 fn only_what_others_on_the_ground_know_changes_the_plan() {
     let mut bench = over_a_field(Ready);

@@ -157,7 +157,8 @@ pub(super) fn arming(scenes: &mut Scenes) {
     scenes.play(denied(), lifted_off, Land, 2.0);
 }
 
-/// Another vehicle comes over the pad so late that the mode is entered first: arming is not requested, and the start waits again.
+/// Another vehicle comes over the pad so late that the mode is entered first: arming is not
+/// requested, and the start waits again.
 fn arming_held(scenes: &mut Scenes) {
     let comes_after = |b: &mut Bench, steps: u32| {
         b.neighbour = on_pad(ON_PLAN);
@@ -180,8 +181,9 @@ fn arming_held(scenes: &mut Scenes) {
     scenes.play(Bench::new(two_vehicles()), |b| comes_after(b, steps), Scheduled, 2.0);
 }
 
-/// One flies by and falls silent: where it may go then would bar the climb, and the autopilot disarms a vehicle that waits on the
-/// ground. So arming is requested only where it was heard just now.
+/// One flies by and falls silent: where it may go then would bar the climb, and the autopilot
+/// disarms a vehicle that waits on the ground. So arming is requested only where it was heard just
+/// now.
 #[test]
 fn nobody_arms_where_one_beside_was_not_heard_just_now() {
     let (mut waits, mut latest_s) = (0, 0.0_f32);
@@ -206,5 +208,8 @@ fn nobody_arms_where_one_beside_was_not_heard_just_now() {
             false => waits += usize::from(b.state() == Scheduled && !b.armed),
         }
     }
-    assert!(latest_s < 0.75 && waits > 15, "armed up to {latest_s} s after it was heard, {waits} wait");
+    assert!(
+        latest_s < 0.75 && waits > 15,
+        "armed up to {latest_s} s after it was heard, {waits} wait"
+    );
 }

@@ -1,4 +1,5 @@
-//! Whatever is lost and however the flight is interrupted, no gap between two pictures is wider than it may be.
+//! Whatever is lost and however the flight is interrupted, no gap between two pictures is wider
+//! than it may be.
 
 extern crate std;
 
@@ -23,7 +24,8 @@ const LOST_M: f32 = LATE_M + MPS * 0.3 * (MAX_TRIES as f32 - 1.0);
 
 fn path() -> Path<16> {
     let mut path = Path::new();
-    for (x, y) in [(0.0, 0.0), (10.0, 0.0), (70.0, 0.0), (70.0, 9.0), (10.0, 9.0), (10.0, 18.0), (0.0, 18.0)]
+    for (x, y) in
+        [(0.0, 0.0), (10.0, 0.0), (70.0, 0.0), (70.0, 9.0), (10.0, 9.0), (10.0, 18.0), (0.0, 18.0)]
     {
         path.push(Point::new(x, y, 30.0), 1.0).unwrap();
     }
@@ -77,7 +79,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
     let path = path();
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut chance = |share: f64| f64::from(rng.next_u32()) < share * f64::from(u32::MAX);
-    let (mut camera, mut links, mut fake) = (CameraControl::default(), Links::default(), Fake::default());
+    let (mut camera, mut links, mut fake) =
+        (CameraControl::default(), Links::default(), Fake::default());
     let (mut framer, mut now, mut at_m, mut held) = (Framer::default(), Instant::ZERO, 0.0, 0);
     // Of a command's tries one is heard: one that is not is given up and reported.
     let (mut settle, mut lost) = (0, 0);
@@ -110,7 +113,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
             lost = 0;
             fake.command(&command, at_m);
             if !chance(loss) {
-                let ack = Ack { command: command.command as u32 as u16, result: ACCEPTED, to: (1, 191) };
+                let ack =
+                    Ack { command: command.command as u32 as u16, result: ACCEPTED, to: (1, 191) };
                 camera.handle_ack(&ack, &mut links);
             }
         }
@@ -122,7 +126,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
 fn widest(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
     for shots in photographs.stretches(&path()) {
         let mut before_m = shots.from_m - shots.step_m;
-        let inside = pictures_m.iter().filter(|m| **m >= shots.from_m - 0.1 && **m <= shots.to_m + late_m);
+        let inside =
+            pictures_m.iter().filter(|m| **m >= shots.from_m - 0.1 && **m <= shots.to_m + late_m);
         for &at_m in inside.chain([&(shots.to_m + shots.step_m)]) {
             if at_m - before_m > shots.step_m + late_m {
                 return Err((before_m, at_m));
@@ -167,7 +172,11 @@ fn a_vehicle_looks_along_the_next_lane_or_one_way() {
     let ahead = photographs(Trigger::Distance);
     let at = |m: f32| heading(&ahead, &path, m).unwrap().to_degrees();
     assert_eq!((at(0.0), at(30.0)), (0.0, 0.0), "before and on the first lane");
-    assert_eq!((at(75.0), at(100.0), at(160.0)), (180.0, 180.0, 180.0), "it turns on the way to the second");
+    assert_eq!(
+        (at(75.0), at(100.0), at(160.0)),
+        (180.0, 180.0, 180.0),
+        "it turns on the way to the second"
+    );
     let fixed = PicturePlan::new(8.0, HeadingMode::Fixed(1.0), Trigger::Distance);
     assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
     let mut point = PicturePlan::new(8.0, HeadingMode::Ahead, Trigger::Distance);

@@ -1,4 +1,5 @@
-//! A coverage mission's file: what is written comes back and can be planned, what is not sound is refused by name.
+//! A coverage mission's file: what is written comes back and can be planned, what is not sound is
+//! refused by name.
 
 extern crate std;
 use std::boxed::Box;
@@ -60,7 +61,8 @@ fn header() -> CoverageHeader {
     }
 }
 
-const RINGS: [Ring; 2] = [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 7, kind: RingKind::NoFly }];
+const RINGS: [Ring; 2] =
+    [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 7, kind: RingKind::NoFly }];
 
 fn vertices() -> [Flat; 7] {
     [(0.0, 0.0), (90.0, 0.0), (100.0, 60.0), (0.0, 70.0), (40.0, 30.0), (50.0, 30.0), (45.0, 40.0)]
@@ -79,7 +81,8 @@ fn file() -> List<u8> {
         speed_max_mps: 5.0,
     };
     let (shares, vertices) = (shares(), vertices());
-    let parts = CoverageParts { header: header(), shares: &shares, rings: &RINGS, vertices: &vertices };
+    let parts =
+        CoverageParts { header: header(), shares: &shares, rings: &RINGS, vertices: &vertices };
     let block = MissionBlock::Coverage(parts);
     let mut out = vec![0xAA; block.file_len(2)];
     assert_eq!(
@@ -115,9 +118,20 @@ fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Erro
     let view = MissionView::parse(file).ok()?;
     let MissionKind::Coverage(area) = view.kind() else { return None };
     let (ws, schedule, plan) = memory;
-    let request =
-        coverage::Request { mission: &view, view: area, max_gates: 128, field: None, photographed: &[] };
-    Some(coverage::plan_flights::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan))
+    let request = coverage::Request {
+        mission: &view,
+        view: area,
+        max_gates: 128,
+        field: None,
+        photographed: &[],
+    };
+    Some(coverage::plan_flights::<64, 128, 8, 16, 4, 64>(
+        &request,
+        core::iter::empty(),
+        ws,
+        schedule,
+        plan,
+    ))
 }
 
 #[test]
@@ -162,12 +176,27 @@ fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
         assert_eq!(view.companion_config::<2>(2).unwrap().ground, area.header().ground);
         let mut memory = Box::<Memory>::default();
         let (ws, schedule, plan) = &mut *memory;
-        let request =
-            coverage::Request { mission: &view, view: area, field, max_gates: 128, photographed: &[] };
-        coverage::plan_flights::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan)?;
-        let points = plan.flights.iter().flat_map(|flight| flight.path.waypoints()).map(|w| w.position);
+        let request = coverage::Request {
+            mission: &view,
+            view: area,
+            field,
+            max_gates: 128,
+            photographed: &[],
+        };
+        coverage::plan_flights::<64, 128, 8, 16, 4, 64>(
+            &request,
+            core::iter::empty(),
+            ws,
+            schedule,
+            plan,
+        )?;
+        let points =
+            plan.flights.iter().flat_map(|flight| flight.path.waypoints()).map(|w| w.position);
         // Over their pads they are lower.
-        Ok(points.filter(|p| p.z > 4.0).map(|p| p.z - field.map_or(0.0, |f| f.height_at(&p.xy()))).collect())
+        Ok(points
+            .filter(|p| p.z > 4.0)
+            .map(|p| p.z - field.map_or(0.0, |f| f.height_at(&p.xy())))
+            .collect())
     };
     assert_eq!(with(field.crc(), None), Err(coverage::Error::NoField));
     assert_eq!(with(field.crc() ^ 1, Some(field)), Err(coverage::Error::NoField));
@@ -208,7 +237,11 @@ fn what_is_not_sound_is_refused_by_name() {
     assert_eq!(MissionView::parse(&sealed(other)).err(), Some(FileError::Header("kind").into()));
     let mut old = file();
     old[8] = 2;
-    assert_eq!(MissionView::parse(&sealed(old)).err(), Some(FileError::Length.into()), "it had no kinds");
+    assert_eq!(
+        MissionView::parse(&sealed(old)).err(),
+        Some(FileError::Length.into()),
+        "it had no kinds"
+    );
 }
 
 proptest! {

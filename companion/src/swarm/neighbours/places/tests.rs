@@ -8,8 +8,8 @@ use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
 
-/// Whatever way a vehicle reports over an area: wherever on it it is after it fell silent, nobody lands below, and no place below
-/// is taken for free.
+/// Whatever way a vehicle reports over an area: wherever on it it is after it fell silent, nobody
+/// lands below, and no place below is taken for free.
 #[test]
 fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
     let mut rng = Pcg32::seed_from_u64(14);
@@ -26,13 +26,18 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         let count = 2 + rng.next_u32() % 7;
         let points: heapless::Vec<Point, MAX_POINTS> = (0..count)
             .map(|_| {
-                at += Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
+                at +=
+                    Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
                 at
             })
             .collect();
         let beyond = (rng.next_u32() % count) as u8;
-        let told =
-            Intent { points: points.clone(), first_unheard_point: beyond, ground_m: 0.0, ..intent(0, 1, 2) };
+        let told = Intent {
+            points: points.clone(),
+            first_unheard_point: beyond,
+            ground_m: 0.0,
+            ..intent(0, 1, 2)
+        };
         table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
         let leg = rng.next_u32() as usize % points.len();
         let before = if leg == 0 { from } else { points[leg - 1] };
@@ -46,7 +51,8 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         for up_m in [-10.0, 10.0] {
             let (mut ends, mut columns) = (false, false);
             let place = here + Point::new(0.0, 0.0, up_m);
-            table.for_each_landing_zone(now, [apart_m, place.z], |off| ends |= off.contains(&place));
+            table
+                .for_each_landing_zone(now, [apart_m, place.z], |off| ends |= off.contains(&place));
             let low = place - Point::new(0.0, 0.0, 20.0);
             table.landing_column(1, now, apart_m, |off| columns |= off.contains(&low));
             table.for_each_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
@@ -56,7 +62,8 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
             );
         }
         // What is far from all of the way is free.
-        let aside = from + Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
+        let aside =
+            from + Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
         let legs = core::iter::once(&from).chain(&points).zip(&points);
         let away_m = legs.fold(f32::INFINITY, |least, (a, b)| {
             let share = ((aside - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
@@ -69,8 +76,9 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
     assert!(far > 1000 && near > 10, "{far} {near}");
 }
 
-/// Wherever a vehicle whose motors stop falls, from any height and in any wind up to 3 m/s, however long before that it was last heard:
-/// nobody lands beside it, and no place beside it is taken for free.
+/// Wherever a vehicle whose motors stop falls, from any height and in any wind up to 3 m/s, however
+/// long before that it was last heard: nobody lands beside it, and no place beside it is taken for
+/// free.
 #[test]
 fn where_a_vehicle_may_have_fallen_nobody_lands() {
     let mut rng = Pcg32::seed_from_u64(16);
@@ -92,7 +100,8 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
             contact.flags |= OUT_OF_PLAN;
         }
         // As it is simulated: air holds it back, and half of the wind carries it.
-        let wind = 0.5 * 3.0 * Point::new(uniform(&mut rng, -0.7, 0.7), uniform(&mut rng, -0.7, 0.7), 0.0);
+        let wind =
+            0.5 * 3.0 * Point::new(uniform(&mut rng, -0.7, 0.7), uniform(&mut rng, -0.7, 0.7), 0.0);
         let mut at = from + velocity * uniform(&mut rng, 0.0, 1.0);
         while at.z > 0.0 {
             velocity += (wind - velocity - Point::new(0.0, 0.0, 9.81)) * 0.01;
@@ -101,22 +110,27 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
         let beside = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0);
         let here = at + beside.normalize() * (0.9 * apart_m);
         let now = Instant::from_millis(3100 + u64::from(rng.next_u32() % 200_000));
-        assert!(table.may_lie_below(1, &here, 0.0, apart_m, Some(now)), "{case}: {from:?}, {here:?}");
+        assert!(
+            table.may_lie_below(1, &here, 0.0, apart_m, Some(now)),
+            "{case}: {from:?}, {here:?}"
+        );
         let mut ends = false;
         table.for_each_landing_zone(now, [apart_m, here.z], |off| ends |= off.contains(&here));
         assert!(ends, "{case}: {from:?}, {here:?}");
         off_its_way += usize::from(!table.may_lie_below(1, &here, 0.0, apart_m, None));
         // While it is heard it has not fallen, and it has not fallen far away.
         let heard = Instant::from_millis(2900);
-        assert!(here.xy().norm() < apart_m || !table.may_lie_below(1, &here, 0.0, apart_m, Some(heard)));
+        assert!(
+            here.xy().norm() < apart_m || !table.may_lie_below(1, &here, 0.0, apart_m, Some(heard))
+        );
         let far = here.normalize() * 60.0;
         free += usize::from(!table.may_lie_below(1, &far, 0.0, apart_m, Some(now)));
     }
     assert!(off_its_way > 1000 && free == 2000, "{off_its_way} {free}");
 }
 
-/// Wherever on the stretch a vehicle is that fell silent, a place that is kept off is half a spacing away at most: to its end, and
-/// around its corners.
+/// Wherever on the stretch a vehicle is that fell silent, a place that is kept off is half a
+/// spacing away at most: to its end, and around its corners.
 #[test]
 fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     let mut rng = Pcg32::seed_from_u64(15);
@@ -144,8 +158,12 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
             left_m -= leg.norm() * share;
         }
         at_the_end += usize::from(flown_m >= upto_m && left_m <= 0.0);
-        let nearest_m = places.iter().map(|place| (place - from).norm()).fold(f32::INFINITY, f32::min);
-        assert!(nearest_m <= 0.5 * UNHEARD_STRETCH_STEP_M + 0.01, "{case}: {nearest_m} m beside {places:?}");
+        let nearest_m =
+            places.iter().map(|place| (place - from).norm()).fold(f32::INFINITY, f32::min);
+        assert!(
+            nearest_m <= 0.5 * UNHEARD_STRETCH_STEP_M + 0.01,
+            "{case}: {nearest_m} m beside {places:?}"
+        );
     }
     assert!(at_the_end > 300, "{at_the_end}");
 }
@@ -155,8 +173,8 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
     let mut rng = Pcg32::seed_from_u64(13);
     let mut seen = [0; 3];
     for _ in 0..2000 {
-        let flags =
-            [0, OUT_OF_PLAN, GROUNDED, GROUNDED | OUT_OF_PLAN][(uniform(&mut rng, 0.0, 3.999)) as usize];
+        let flags = [0, OUT_OF_PLAN, GROUNDED, GROUNDED | OUT_OF_PLAN]
+            [(uniform(&mut rng, 0.0, 3.999)) as usize];
         let mut table = joined(0);
         table.contacts[0].flags = GROUNDED;
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));

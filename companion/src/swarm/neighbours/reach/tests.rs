@@ -1,5 +1,6 @@
-//! Vehicles in a row, each of which follows the one before it through gates, lose one another: what each reckons of the others
-//! is never more than they have flown, and it is enough for the whole row to come to its end.
+//! Vehicles in a row, each of which follows the one before it through gates, lose one another: what
+//! each reckons of the others is never more than they have flown, and it is enough for the whole
+//! row to come to its end.
 
 extern crate std;
 use std::vec::Vec as List;
@@ -63,13 +64,15 @@ impl Row {
     /// Gates of a vehicle that are still closed.
     fn closed(&self, rank: usize) -> &[Gate] {
         let gates = &self.gates[rank];
-        let open = gates.iter().take_while(|gate| self.tables[rank].has_passed(gate, self.now)).count();
+        let open =
+            gates.iter().take_while(|gate| self.tables[rank].has_passed(gate, self.now)).count();
         &gates[open..]
     }
 
     fn intent(&self, rank: usize) -> Intent {
         let progress_m = self.flown_m[rank];
-        let (closed_m, delay_s) = self.tables[rank].unheard_reach(self.closed(rank), progress_m, self.now);
+        let (closed_m, delay_s) =
+            self.tables[rank].unheard_reach(self.closed(rank), progress_m, self.now);
         Intent {
             system_id: rank as u8 + 1,
             flags: ON_PLAN,
@@ -83,7 +86,8 @@ impl Row {
         }
     }
 
-    /// All fly on; a vehicle hears those beside it, if `heard`, but for a quarter of their messages.
+    /// All fly on; a vehicle hears those beside it, if `heard`, but for a quarter of their
+    /// messages.
     fn step(&mut self, heard: bool) {
         self.now = self.now + Duration::from_millis(STEP_MS);
         for rank in 0..self.tables.len() {
@@ -110,9 +114,13 @@ impl Row {
     fn check(&mut self) {
         for of in 0..self.tables.len() {
             for state in self.tables[of].states_at(self.now).iter() {
-                let (other, believed_m) = (usize::from(state.id) - 1, state.progress_m.unwrap_or(0.0));
+                let (other, believed_m) =
+                    (usize::from(state.id) - 1, state.progress_m.unwrap_or(0.0));
                 let flown_m = self.flown_m[other];
-                assert!(believed_m <= flown_m + 0.01, "{of} believes {believed_m} of {other} at {flown_m}");
+                assert!(
+                    believed_m <= flown_m + 0.01,
+                    "{of} believes {believed_m} of {other} at {flown_m}"
+                );
             }
         }
     }
@@ -122,7 +130,8 @@ impl Row {
 fn no_vehicle_is_reckoned_to_be_further_than_it_is() {
     let mut rng = Pcg32::seed_from_u64(3);
     for seed in 0..300 {
-        let mut row = Row::new(2 + rng.next_u32() as u8 % 5, 20.0 + (rng.next_u32() % 40) as f32, seed);
+        let mut row =
+            Row::new(2 + rng.next_u32() as u8 % 5, 20.0 + (rng.next_u32() % 40) as f32, seed);
         let parts = rng.next_u32() % 60;
         for step in 0..300 {
             row.step(step < parts || (step > parts + 40 && step < parts + 50));

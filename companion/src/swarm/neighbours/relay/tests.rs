@@ -44,14 +44,20 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
             assert_eq!(Relay::decode(&bad, 5), None, "byte {at}");
         }
     }
-    let sound =
-        RelayedProgress { rank: 0, age: 0, progress_m: 1.0, gates_open_up_to_m: 2.0, unheard_delay_s: 0 };
+    let sound = RelayedProgress {
+        rank: 0,
+        age: 0,
+        progress_m: 1.0,
+        gates_open_up_to_m: 2.0,
+        unheard_delay_s: 0,
+    };
     for item in [
         RelayedProgress { progress_m: f32::NAN, ..sound },
         RelayedProgress { gates_open_up_to_m: f32::NAN, ..sound },
         RelayedProgress { gates_open_up_to_m: f32::INFINITY, ..sound },
     ] {
-        let relay = Relay { mission_crc: 1, plan_crc: 2, items: [sound, item].into_iter().collect() };
+        let relay =
+            Relay { mission_crc: 1, plan_crc: 2, items: [sound, item].into_iter().collect() };
         assert_eq!(Relay::decode(&padded(&relay), 5), None);
     }
 }
@@ -138,7 +144,8 @@ fn a_vehicle_that_was_heard_off_the_plan_is_not_believed_back_onto_it() {
     assert!(held_m.is_some_and(|m| m < swarm.progress_m(0) - 5.0), "{held_m:?}");
 }
 
-/// What was heard of a vehicle stays known, and is passed on, when it is not heard any more: nobody may have relayed it before.
+/// What was heard of a vehicle stays known, and is passed on, when it is not heard any more: nobody
+/// may have relayed it before.
 #[test]
 fn progress_outlives_the_sight_of_a_vehicle() {
     let mut rng = Pcg32::seed_from_u64(11);
@@ -155,7 +162,10 @@ fn progress_outlives_the_sight_of_a_vehicle() {
         for _ in 0..apart {
             swarm.step(&[true; 8], &lost, true);
             let held_m = swarm.believed_m(1, 0);
-            assert!(held_m.is_some_and(|m| before_m <= m && m <= last_m + 0.3), "{held_m:?} of {before_m}");
+            assert!(
+                held_m.is_some_and(|m| before_m <= m && m <= last_m + 0.3),
+                "{held_m:?} of {before_m}"
+            );
         }
         if apart > 40 {
             let passed_on_m = swarm.believed_m(usize::from(count) - 1, 0);
@@ -164,7 +174,8 @@ fn progress_outlives_the_sight_of_a_vehicle() {
     }
 }
 
-/// Those that heard it just as long pass on what they heard last: that does not make it one that flies on elsewhere.
+/// Those that heard it just as long pass on what they heard last: that does not make it one that
+/// flies on elsewhere.
 #[test]
 fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
     let mut rng = Pcg32::seed_from_u64(12);
@@ -184,25 +195,40 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
     }
 }
 
-/// How far it flies and with what delay belong to the progress that they came with: an older report changes none of them.
+/// How far it flies and with what delay belong to the progress that they came with: an older report
+/// changes none of them.
 #[test]
 fn the_delay_of_a_flight_goes_with_its_progress() {
     let roster = [1, 2, 3].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
     let mut table = Neighbours::<8>::new(&roster, 3, 2.0);
     let (first, second) = (Instant::from_millis(1000), Instant::from_millis(1100));
-    let by =
-        Intent { system_id: 2, flags: ON_PLAN, mission_crc: MISSION, plan_crc: PLAN, ..Intent::default() };
+    let by = Intent {
+        system_id: 2,
+        flags: ON_PLAN,
+        mission_crc: MISSION,
+        plan_crc: PLAN,
+        ..Intent::default()
+    };
     table.handle_intent(first, 2, &by, MISSION, Some(PLAN));
     let report = |progress_m, unheard_delay_s| {
-        let item = RelayedProgress { rank: 0, age: 0, progress_m, gates_open_up_to_m: 20.0, unheard_delay_s };
+        let item = RelayedProgress {
+            rank: 0,
+            age: 0,
+            progress_m,
+            gates_open_up_to_m: 20.0,
+            unheard_delay_s,
+        };
         Relay { mission_crc: MISSION, plan_crc: PLAN, items: [item].into_iter().collect() }
     };
     table.handle_relay(first, 2, &report(5.0, 0));
     table.handle_relay(second, 2, &report(7.0, 10));
     table.handle_relay(second, 2, &report(6.0, 0));
     let believed_m = |after_s: u64, table: &mut Neighbours<8>| {
-        let state =
-            table.states_at(second + Duration::from_secs(after_s)).iter().find(|n| n.id == 1).copied();
+        let state = table
+            .states_at(second + Duration::from_secs(after_s))
+            .iter()
+            .find(|n| n.id == 1)
+            .copied();
         state.and_then(|n| n.progress_m).unwrap()
     };
     assert_eq!(believed_m(12, &mut table), 7.0);

@@ -1,9 +1,10 @@
 //! The best of what Fields2Cover makes of a field: the ways that its driver prints, judged here.
 //!
-//! Without obstacles all of its orders of lanes in one cell are compared, connections straight. With obstacles such a
-//! connection may cross one. So each is led around instead, by the shortest way there is; and beside its orders in one cell
-//! stand those of its boustrophedon decomposition: the cells in their best order, each in its best direction (it has only a
-//! planner on OR-tools for that). Both are gifts: nothing that it offers without OR-tools is shorter and crosses nothing.
+//! Without obstacles all of its orders of lanes in one cell are compared, connections straight.
+//! With obstacles such a connection may cross one. So each is led around instead, by the shortest
+//! way there is; and beside its orders in one cell stand those of its boustrophedon decomposition:
+//! the cells in their best order, each in its best direction (it has only a planner on OR-tools for
+//! that). Both are gifts: nothing that it offers without OR-tools is shorter and crosses nothing.
 
 use anyhow::{Context, Result};
 
@@ -36,13 +37,19 @@ pub struct Best {
 
 impl Best {
     /// Share of a field that lies no further beside a lane than half its width.
-    pub fn swept_share(&self, lane_m: f64, holds: impl Fn(&Place) -> bool, [low, high]: [Place; 2]) -> f64 {
+    pub fn swept_share(
+        &self,
+        lane_m: f64,
+        holds: impl Fn(&Place) -> bool,
+        [low, high]: [Place; 2],
+    ) -> f64 {
         let cell_m = lane_m / CELLS_ACROSS;
         let count = |axis: usize| ((high[axis] - low[axis]) / cell_m).ceil() as usize;
         let (mut all, mut swept) = (0_u64, 0_u64);
         for row in 0..count(1) {
             for column in 0..count(0) {
-                let at = [(column, low[0]), (row, low[1])].map(|(k, from)| from + (k as f64 + 0.5) * cell_m);
+                let at = [(column, low[0]), (row, low[1])]
+                    .map(|(k, from)| from + (k as f64 + 0.5) * cell_m);
                 if holds(&at) {
                     all += 1;
                     swept += u64::from(self.lanes.iter().any(|lane| is_swept(lane, lane_m, &at)));
@@ -101,24 +108,29 @@ impl Obstacles {
     /// Obstacles of these corners.
     pub fn new(rings: impl Iterator<Item = Vec<Place>>) -> Self {
         let shrunk = |ring: Vec<Place>| {
-            let middle = [0, 1].map(|axis| ring.iter().map(|at| at[axis]).sum::<f64>() / ring.len() as f64);
-            let corner = |at: &Place| [0, 1].map(|axis| middle[axis] + SHRUNK * (at[axis] - middle[axis]));
+            let middle =
+                [0, 1].map(|axis| ring.iter().map(|at| at[axis]).sum::<f64>() / ring.len() as f64);
+            let corner =
+                |at: &Place| [0, 1].map(|axis| middle[axis] + SHRUNK * (at[axis] - middle[axis]));
             ring.iter().map(corner).collect()
         };
         Self(rings.map(shrunk).collect())
     }
 
-    /// Whether a straight way crosses none: where it meets a convex ring, the middle between both crossings is inside.
+    /// Whether a straight way crosses none: where it meets a convex ring, the middle between both
+    /// crossings is inside.
     fn is_free(&self, from: &Place, to: &Place) -> bool {
         self.0.iter().all(|ring| {
             let (x, y) = (to[0] - from[0], to[1] - from[1]);
             let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
             let turn = ring_turn(ring);
             for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-                // Inside is to the left of an edge of a ring that turns left. Metres; a way along an edge is outside.
+                // Inside is to the left of an edge of a ring that turns left. Metres; a way along
+                // an edge is outside.
                 let edge = [b[0] - a[0], b[1] - a[1]];
                 let length_m = turn * edge[0].hypot(edge[1]);
-                let side = (edge[0] * (from[1] - a[1]) - edge[1] * (from[0] - a[0])) / length_m - TOUCHES_M;
+                let side = (edge[0] * (from[1] - a[1]) - edge[1] * (from[0] - a[0])) / length_m
+                    - TOUCHES_M;
                 let change = (edge[0] * y - edge[1] * x) / length_m;
                 match change {
                     change if change > 0.0 => enters = enters.max(-side / change),
@@ -147,7 +159,8 @@ impl Obstacles {
             done[here] = true;
             for next in 0..nodes.len() {
                 if !done[next] && self.is_free(nodes[here], nodes[next]) {
-                    length_m[next] = length_m[next].min(length_m[here] + apart_m(nodes[here], nodes[next]));
+                    length_m[next] =
+                        length_m[next].min(length_m[here] + apart_m(nodes[here], nodes[next]));
                 }
             }
         }
@@ -186,15 +199,18 @@ pub fn best(text: &str, obstacles: &Obstacles) -> Result<[Option<Best>; 2]> {
     Ok([whole, best_by_cells(&candidates, obstacles)])
 }
 
-/// All orders of the cells, by dynamic programming over those that are done and the way by which the last one was.
+/// All orders of the cells, by dynamic programming over those that are done and the way by which
+/// the last one was.
 fn best_by_cells(candidates: &[Candidate], obstacles: &Obstacles) -> Option<Best> {
-    let ways: Vec<&Candidate> = candidates.iter().filter(|c| c.cell > 0 && !c.lanes.is_empty()).collect();
+    let ways: Vec<&Candidate> =
+        candidates.iter().filter(|c| c.cell > 0 && !c.lanes.is_empty()).collect();
     let mut cells: Vec<usize> = ways.iter().map(|way| way.cell).collect();
     cells.dedup();
     if cells.is_empty() || cells.len() > MAX_CELLS {
         return None;
     }
-    let bit = |way: &Candidate| 1_usize << cells.iter().position(|cell| *cell == way.cell).unwrap_or(0);
+    let bit =
+        |way: &Candidate| 1_usize << cells.iter().position(|cell| *cell == way.cell).unwrap_or(0);
     let measured: Vec<(f64, f64, usize)> = ways.iter().map(|way| way.measure(obstacles)).collect();
     let between = |a: &Candidate, b: &Candidate| {
         let (from, to) = (a.lanes[a.lanes.len() - 1][1], b.lanes[0][0]);
@@ -225,7 +241,8 @@ fn best_by_cells(candidates: &[Candidate], obstacles: &Obstacles) -> Option<Best
             }
         }
     }
-    let (total_m, lanes_m, crossings) = found.last()?.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (total_m, lanes_m, crossings) =
+        found.last()?.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let name = format!("{} cells", cells.len());
     // The lanes of a cell are the same in each direction and order.
     let first = cells.iter().filter_map(|cell| ways.iter().find(|way| way.cell == *cell));
