@@ -33,6 +33,7 @@ pub mod exact;
 mod flat;
 pub mod flights;
 pub mod footprint;
+pub mod given;
 mod intervals;
 mod lanes;
 pub mod losses;

@@ -53,8 +53,8 @@ impl<const V: usize> Default for Workspace<V> {
 
 /// The lanes' frame: `u` along them and `v` across, metres from the first vertex.
 pub(super) struct LaneFrame {
-    base: Flat,
-    direction: LaneDirection,
+    pub(super) base: Flat,
+    pub(super) direction: LaneDirection,
 }
 
 impl LaneFrame {

@@ -27,7 +27,8 @@ impl LaneDirection {
         Self::along_vector(Flat::new(cos, sin))
     }
 
-    fn along_vector(along: Flat) -> Self {
+    /// Lanes along a vector of length 1.
+    pub(super) fn along_vector(along: Flat) -> Self {
         Self { along, across: Flat::new(-along.y, along.x) }
     }
 }

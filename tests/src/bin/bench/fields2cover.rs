@@ -5,14 +5,18 @@
 //! is built with it, once. The same fields in metres, lane angle (ours of least width) and lane
 //! width; no headland, straight connections, one vehicle, no transit. Ours is from the vertices to
 //! all lanes in order, around obstacles; theirs is the best of what it offers ([`routes`]). Its
-//! route planner on OR-tools is not built. Lengths are of all lanes and the connections between
-//! them. Ours twice: as boards plan, which look at few changes of the lanes' order, and `searched`
-//! as long as the desk does. `length for what is swept` is theirs divided by the share of the field
-//! that its lanes sweep: ours show all of it, by the test `coverage`.
+//! route planner on OR-tools is not built.
+//!
+//! Lengths are of all lanes and the connections between them. Ours twice: as boards plan, which look
+//! at few changes of the lanes' order, and `searched` as long as the desk does. `length with its
+//! lanes` is our order, as boards plan, of the very lanes of their best way ([`same_lanes`]).
+//! `length for what is swept` divides both lengths by the share of the field that lies beside a
+//! lane, no further than half its width.
 //!
 //! Our lanes are longer by what photographs slanted borders whole; theirs end at the border.
 
 mod routes;
+mod same_lanes;
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -31,7 +35,7 @@ use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 
-use self::routes::{Best, Obstacles};
+use self::routes::{Best, Obstacles, Place};
 use crate::row::Row;
 
 /// Runs of each field, of which the median counts.
@@ -144,8 +148,8 @@ impl Field {
         field
     }
 
-    /// Share of it that lanes of theirs sweep.
-    fn swept_share(&self, best: &Best, lane_m: f32) -> f64 {
+    /// Share of it that lanes sweep.
+    fn swept_share(&self, lanes: &[[Place; 2]], lane_m: f32) -> f64 {
         let outer = &self.vertices[..usize::from(self.rings[0].end)];
         let (mut low, mut high) = (outer[0], outer[0]);
         outer.iter().for_each(|at| (low, high) = (low.inf(at), high.sup(at)));
@@ -153,11 +157,12 @@ impl Field {
             let at = Flat::new(at[0] as f32, at[1] as f32);
             ring_holds(outer, &at) && !self.obstacles().any(|ring| ring_holds(ring, &at))
         };
-        best.swept_share(
-            f64::from(lane_m),
-            holds,
-            [low, high].map(|at| [f64::from(at.x), f64::from(at.y)]),
-        )
+        let corners = [low, high].map(wide);
+        routes::swept_share(lanes, f64::from(lane_m), holds, corners)
+    }
+
+    fn convex_obstacles(&self) -> Obstacles {
+        Obstacles::new(self.obstacles().map(|ring| ring.iter().copied().map(wide).collect()))
     }
 
     /// Corners of the obstacles.
@@ -185,6 +190,11 @@ struct Way {
     total_m: f64,
     time_us: f64,
     crossings: usize,
+    lanes: Vec<[Place; 2]>,
+}
+
+fn wide(at: Flat) -> Place {
+    [f64::from(at.x), f64::from(at.y)]
 }
 
 /// Length and time for each field; without a checkout none.
@@ -237,13 +247,15 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
             best.lanes_m,
             best.time_us,
             best.crossings,
-            100.0 * field.swept_share(best, lane_m)
+            100.0 * field.swept_share(&best.lanes, lane_m)
         );
     }
     let shortest =
         theirs.iter().min_by(|a, b| a.total_m.total_cmp(&b.total_m)).context("theirs has a way")?;
     let (total_m, time_us) = (shortest.total_m, shortest.time_us);
-    let swept_share = field.swept_share(shortest, lane_m);
+    let swept = [&first.lanes, &shortest.lanes].map(|lanes| field.swept_share(lanes, lane_m));
+    let same_lanes_m = same_lanes::way_m(field, &shortest.lanes, lane_m)?;
+    println!("  ours with its lanes: {same_lanes_m:.1} m; swept by ours {:.2} %", 100.0 * swept[0]);
     let row = |what, ours: f64, theirs: f64, required, unit| Row {
         name: format!("{name}, {what}"),
         ours,
@@ -255,7 +267,8 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
     };
     Ok(vec![
         row("length", first.total_m, total_m, LENGTH, "m"),
-        row("length for what is swept", first.total_m, total_m / swept_share, 0.0, "m"),
+        row("length with its lanes", same_lanes_m, total_m, LENGTH, "m"),
+        row("length for what is swept", first.total_m / swept[0], total_m / swept[1], 0.0, "m"),
         row("time", first.time_us, time_us, 10.0, "us"),
         row("searched, length", searched.total_m, total_m, 0.0, "m"),
         row("searched, time", searched.time_us, time_us, 0.0, "us"),
@@ -318,6 +331,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
         total_m: f64::from(found.length_m()),
         time_us: times[RUNS / 2],
         crossings,
+        lanes: found.lanes().iter().map(|lane| [lane.from, lane.to].map(wide)).collect(),
     };
     Ok((way, f64::from(found.lane_direction().y).atan2(f64::from(found.lane_direction().x))))
 }
@@ -349,8 +363,7 @@ fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Vec<
         .context("theirs does not start")?;
     child.stdin.take().context("its input is piped")?.write_all(input.as_bytes())?;
     let output = child.wait_with_output()?;
-    let wide = |ring: &[Flat]| ring.iter().map(|at| [f64::from(at.x), f64::from(at.y)]).collect();
-    let obstacles = Obstacles::new(field.obstacles().map(wide));
+    let obstacles = field.convex_obstacles();
     let best = routes::best(&String::from_utf8_lossy(&output.stdout), &obstacles)?;
     ensure!(best[0].is_some(), "theirs printed nothing");
     Ok(best.into_iter().flatten().collect())

@@ -8,7 +8,8 @@
 
 use anyhow::{Context, Result};
 
-type Place = [f64; 2];
+/// East and north, metres.
+pub type Place = [f64; 2];
 
 /// Obstacles are this much smaller: ways run along their borders, where its lanes end.
 const SHRUNK: f64 = 0.999;
@@ -32,32 +33,31 @@ pub struct Best {
     pub crossings: usize,
     /// How: an order, or `cells`.
     pub name: String,
-    lanes: Vec<[Place; 2]>,
+    /// The lanes, each by both ends.
+    pub lanes: Vec<[Place; 2]>,
 }
 
-impl Best {
-    /// Share of a field that lies no further beside a lane than half its width.
-    pub fn swept_share(
-        &self,
-        lane_m: f64,
-        holds: impl Fn(&Place) -> bool,
-        [low, high]: [Place; 2],
-    ) -> f64 {
-        let cell_m = lane_m / CELLS_ACROSS;
-        let count = |axis: usize| ((high[axis] - low[axis]) / cell_m).ceil() as usize;
-        let (mut all, mut swept) = (0_u64, 0_u64);
-        for row in 0..count(1) {
-            for column in 0..count(0) {
-                let at = [(column, low[0]), (row, low[1])]
-                    .map(|(k, from)| from + (k as f64 + 0.5) * cell_m);
-                if holds(&at) {
-                    all += 1;
-                    swept += u64::from(self.lanes.iter().any(|lane| is_swept(lane, lane_m, &at)));
-                }
+/// Share of a field that lies no further beside a lane than half its width.
+pub fn swept_share(
+    lanes: &[[Place; 2]],
+    lane_m: f64,
+    holds: impl Fn(&Place) -> bool,
+    [low, high]: [Place; 2],
+) -> f64 {
+    let cell_m = lane_m / CELLS_ACROSS;
+    let count = |axis: usize| ((high[axis] - low[axis]) / cell_m).ceil() as usize;
+    let (mut all, mut swept) = (0_u64, 0_u64);
+    for row in 0..count(1) {
+        for column in 0..count(0) {
+            let at =
+                [(column, low[0]), (row, low[1])].map(|(k, from)| from + (k as f64 + 0.5) * cell_m);
+            if holds(&at) {
+                all += 1;
+                swept += u64::from(lanes.iter().any(|lane| is_swept(lane, lane_m, &at)));
             }
         }
-        swept as f64 / all.max(1) as f64
     }
+    swept as f64 / all.max(1) as f64
 }
 
 fn is_swept([from, to]: &[Place; 2], lane_m: f64, at: &Place) -> bool {
@@ -87,13 +87,7 @@ impl Candidate {
 
     /// Lanes; lanes and connections; connections that are not straight.
     fn measure(&self, obstacles: &Obstacles) -> (f64, f64, usize) {
-        let lanes_m = self.lanes.iter().map(|[from, to]| apart_m(from, to)).sum::<f64>();
-        let mut found = (lanes_m, lanes_m, 0);
-        for pair in self.lanes.windows(2) {
-            found.1 += obstacles.way_m(&pair[0][1], &pair[1][0]);
-            found.2 += usize::from(!obstacles.is_free(&pair[0][1], &pair[1][0]));
-        }
-        found
+        obstacles.measure(&self.lanes)
     }
 }
 
@@ -115,6 +109,22 @@ impl Obstacles {
             ring.iter().map(corner).collect()
         };
         Self(rings.map(shrunk).collect())
+    }
+
+    /// Lanes; lanes and connections; connections that are not straight.
+    pub fn measure(&self, lanes: &[[Place; 2]]) -> (f64, f64, usize) {
+        let lanes_m = lanes.iter().map(|[from, to]| apart_m(from, to)).sum::<f64>();
+        let mut found = (lanes_m, lanes_m, 0);
+        for pair in lanes.windows(2) {
+            found.1 += self.way_m(&pair[0][1], &pair[1][0]);
+            found.2 += usize::from(!self.is_free(&pair[0][1], &pair[1][0]));
+        }
+        found
+    }
+
+    /// Corners, a little shrunk.
+    pub fn rings(&self) -> &[Vec<Place>] {
+        &self.0
     }
 
     /// Whether a straight way crosses none: where it meets a convex ring, the middle between both

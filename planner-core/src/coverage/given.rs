@@ -1,0 +1,61 @@
+//! Lanes that another tool has laid, put into the order in which one vehicle flies them.
+
+use libm::roundf;
+
+use super::cells;
+use super::footprint::Spacing;
+use super::lanes::{Lane, Tracks};
+use super::order;
+use super::strips::LaneFrame;
+use super::sweep::LaneDirection;
+use super::transit::Transit;
+use super::{CoverageError, Flat};
+use crate::{Length, sort};
+
+/// Orders lanes that are given by both their ends, all parallel, and turns them as they are flown:
+/// by the same search as the lanes of [`super::tracks::build`].
+///
+/// # Errors
+/// Spacings that are wrong, memory that is too small, [`CoverageError::NothingToCover`] where no
+/// lane has a length, [`CoverageError::Unreachable`] for an end inside a no-fly zone.
+pub fn order_given_lanes<const L: usize, const N: usize>(
+    given: &[[Flat; 2]],
+    spacing: &Spacing,
+    search_steps: u32,
+    transit: &Transit<'_, N>,
+    out: &mut Tracks<L>,
+) -> Result<(), CoverageError> {
+    spacing.check()?;
+    let longest = given.iter().map(|[from, to]| to - from);
+    let longest = longest.max_by(|a, b| a.length().total_cmp(&b.length()));
+    let along = longest.and_then(|lane| lane.try_normalize(1e-6));
+    let direction = LaneDirection::along_vector(along.ok_or(CoverageError::NothingToCover)?);
+    let frame = LaneFrame { base: given[0][0], direction };
+    out.lanes.clear();
+    out.along = direction.along;
+    for ends in given {
+        let [from, to] = ends.map(|end| frame.to_frame(&end));
+        let mut lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip: 0 };
+        if to.x < from.x {
+            lane.reverse();
+        }
+        out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)?;
+    }
+    sort::sort_by(&mut out.lanes, |a, b| {
+        a.from.y.total_cmp(&b.from.y).then(a.from.x.total_cmp(&b.from.x))
+    });
+    let low = out.lanes[0].from.y;
+    for lane in &mut out.lanes {
+        lane.strip = roundf((lane.from.y - low) / spacing.lane_m) as u16;
+    }
+    cells::group_into_cells(&mut out.lanes);
+    for lane in &mut out.lanes {
+        (lane.from, lane.to) = (frame.to_place(&lane.from), frame.to_place(&lane.to));
+    }
+    let count = out.lanes.len();
+    order::order_lanes(&mut out.lanes, count, transit, search_steps);
+    out.number_waypoints(spacing, transit)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,47 @@
+//! Our order of the lanes that Fields2Cover laid: what is left of the difference without the lanes.
+
+use anyhow::Result;
+use companion::planner::coverage::MAX_ORDER_CHANGES;
+use host_sim::coverage::{MAX_CORNERS, MAX_LANES};
+use planner_core::coverage::Flat;
+use planner_core::coverage::area::{Area, Ring, RingKind};
+use planner_core::coverage::footprint::{Footprint, Spacing};
+use planner_core::coverage::given::order_given_lanes;
+use planner_core::coverage::tracks::Tracks;
+use planner_core::coverage::transit::Transit;
+
+use super::Field;
+use super::routes::Place;
+
+/// Length of our way along these lanes and between them, metres: searched as long as boards search,
+/// measured as theirs is.
+///
+/// # Errors
+/// The field or its lanes are refused.
+pub fn way_m(field: &Field, lanes: &[[Place; 2]], lane_m: f32) -> Result<f64> {
+    let obstacles = field.convex_obstacles();
+    // Its lanes end at the obstacles: those of our graph are as much smaller as those it is
+    // measured with.
+    let mut vertices = field.vertices[..usize::from(field.rings[0].end)].to_vec();
+    let mut rings = vec![field.rings[0]];
+    for ring in obstacles.rings() {
+        vertices.extend(ring.iter().map(narrow));
+        rings.push(Ring { end: vertices.len() as u16, kind: RingKind::NoFly });
+    }
+    let area = Area::new(&vertices, &rings).map_err(|error| anyhow::anyhow!("{error:?}"))?;
+    let mut transit = Box::new(Transit::<MAX_CORNERS>::empty());
+    transit.set_area(area).map_err(|error| anyhow::anyhow!("{error:?}"))?;
+    let footprint = Footprint { along_m: lane_m, across_m: lane_m };
+    let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
+    let given: Vec<[Flat; 2]> = lanes.iter().map(|ends| [0, 1].map(|k| narrow(&ends[k]))).collect();
+    let mut found: Box<Tracks<MAX_LANES>> = Box::default();
+    order_given_lanes(&given, &spacing, MAX_ORDER_CHANGES, &transit, &mut found)
+        .map_err(|error| anyhow::anyhow!("{error:?}"))?;
+    let ordered: Vec<[Place; 2]> =
+        found.lanes().iter().map(|lane| [lane.from, lane.to].map(super::wide)).collect();
+    Ok(obstacles.measure(&ordered).1)
+}
+
+fn narrow(at: &Place) -> Flat {
+    Flat::new(at[0] as f32, at[1] as f32)
+}
