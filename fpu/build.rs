@@ -1,6 +1,7 @@
-//! Tells the crate whether the compiler lets assembly name the FPU's registers. `rustc` knows them
-//! by `vfp2`, which a stable compiler shows to no `cfg`, and which it does not count to the FPU of
-//! an Armv8-M.
+//! Sets the cfg `has_vfp2` where the compiler lets inline assembly name the FPU's registers.
+//! `rustc` decides that by the target feature `vfp2`, which stable Rust shows to no `cfg`, and
+//! which the FPU of an Armv8-M does not have in `rustc`. So it is set for `thumbv7em-none-eabihf`
+//! only.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -1,13 +1,13 @@
 //! The square root of an `f32` by the FPU of a Cortex-M4F or M7.
 //!
-//! `core` has no square root, and `libm` has an instruction for it on x86, Arm64 and wasm, but
-//! takes some fifty instructions on 32-bit Arm, where `vsqrt.f32` does the same. Elsewhere, on an
-//! Armv8-M too, it is `libm`'s. Both are rounded to the nearest `f32` (IEEE 754-2019, 5.4.1), so a
-//! board and a desk compute the same bits.
+//! `core` has no square root. `libm` uses the CPU's instruction on x86, Arm64 and wasm, but takes
+//! some fifty instructions on 32-bit Arm, where `vsqrt.f32` does the same. On other targets, and on
+//! Armv8-M, this crate calls `libm`. Both round to the nearest `f32` (IEEE 754-2019, 5.4.1), so a
+//! board and a desktop compute the same bits.
 #![no_std]
 
-/// Square root, rounded to the nearest; NaN for a negative number. The same bits on every target,
-/// but for the sign of a NaN.
+/// Square root, rounded to the nearest `f32`; NaN for a negative number. The same bits on every
+/// target, except for the sign of a NaN.
 ///
 /// ```
 /// assert_eq!(fpu::sqrtf(2.25), 1.5);
@@ -19,7 +19,7 @@ pub fn sqrtf(square: f32) -> f32 {
     #[expect(unsafe_code)]
     {
         let root;
-        // SAFETY: one instruction from one register to another; it touches neither memory nor
+        // SAFETY: one instruction from one register to another; it accesses neither memory nor
         // stack.
         unsafe {
             core::arch::asm!(

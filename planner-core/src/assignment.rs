@@ -1,17 +1,17 @@
-//! Which vehicle flies to which task: the linear sum assignment and the bottleneck assignment, on
-//! dense cost matrices.
+//! Assignment of vehicles to tasks on dense cost matrices: the linear sum assignment and the
+//! bottleneck assignment.
 //!
 //! Source: R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse
 //! linear assignment problems", Computing 38 (1987): column reduction with reduction transfer,
 //! augmenting row reduction, then one shortest augmenting path for each row still free. P3D §3.3
 //! names it the unlabelled allocation. O(n³) at worst.
 //!
-//! Beyond the paper: fewer rows than columns or the other way round, and pairs that cannot be
-//! (`f32::INFINITY`). The answer has the most pairs there can be and, among those, the least total.
-//! No large number stands in for infinity. Where every row of the shorter side can be served,
-//! Jonker–Volgenant answers; where one cannot, it begins again with shortest augmenting paths from *all*
-//! free rows at once. Each of those keeps the matching the cheapest of its size, so when no path is
-//! left it is the largest and the cheapest of that size.
+//! Beyond the paper: matrices that are not square, and pairs that are impossible (`f32::INFINITY`).
+//! The result has the largest possible number of pairs and, among those, the least total cost. No
+//! large number stands in for infinity. Jonker–Volgenant solves it if every row of the shorter side
+//! can be matched. If one cannot, the matching starts again, with shortest augmenting paths from
+//! all free rows at once. After each of those the matching is the cheapest of its size, so when no
+//! path is left it is the largest and the cheapest of that size.
 //!
 //! Costs are f32 in any unit (metres, seconds), sums and dual prices f64.
 
@@ -29,17 +29,17 @@ use self::state::{AugmentingPaths, MatchingState, UNASSIGNED};
 /// Result of an assignment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assignment {
-    /// Number of pairs: the most there can be.
+    /// Number of pairs: the largest possible.
     pub pairs: usize,
-    /// Sum of their costs.
+    /// Sum of the pairs' costs.
     pub total: f64,
-    /// The largest of their costs; minus infinity without a pair.
+    /// The largest cost of a pair; minus infinity if there is none.
     pub largest: f32,
 }
 
-/// Scratch memory for up to `N` rows and `N` columns: 46 bytes for each. All-zero when new.
+/// Memory for matrices of up to `N` rows and `N` columns: 46 bytes for each. All-zero when new.
 pub struct AssignmentWorkspace<const N: usize> {
-    /// Price of each column. Free columns keep 0 unless the matrix is square.
+    /// Dual price of each column. A free column's stays 0 unless the matrix is square.
     price: [f64; N],
     distance: [f64; N],
     settled_price: [f64; N],
@@ -53,7 +53,7 @@ pub struct AssignmentWorkspace<const N: usize> {
 }
 
 impl<const N: usize> AssignmentWorkspace<N> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         assert!(N < UNASSIGNED as usize, "indices are 16 bits");
         Self {
@@ -102,8 +102,8 @@ impl<const N: usize> Default for AssignmentWorkspace<N> {
 /// The assignment with the most pairs and, among those, the least total cost (mission objective
 /// "total").
 ///
-/// `costs` is row-major, `rows` × `cols`; infinity marks a pair that cannot be. `out[row]` becomes
-/// the row's column.
+/// `costs` is row-major, `rows` × `cols`; infinity marks an impossible pair. Writes the column of
+/// each row to `out[row]`, or `None`.
 pub fn assign<const N: usize>(
     costs: &[f32],
     rows: usize,
@@ -117,12 +117,12 @@ pub fn assign<const N: usize>(
 }
 
 /// The assignment with the most pairs, among those the least largest cost, and among those the
-/// least total (mission objective "makespan"). Arguments as [`assign`].
+/// least total cost (mission objective "makespan"). Arguments as for [`assign`].
 ///
-/// The least largest cost comes from augmenting paths that minimise their largest edge, from all
-/// free rows at once: a larger matching needs an edge out of what is reached below the present
-/// bound, so the bound is raised no further than it must be (O. Gross, "The bottleneck assignment
-/// problem", 1959).
+/// The least largest cost is found by augmenting paths that minimise their largest edge, from all
+/// free rows at once. A larger matching needs an edge that leaves the columns reached within the
+/// present bound, so the bound is raised no further than necessary (O. Gross, "The bottleneck
+/// assignment problem", 1959).
 pub fn assign_bottleneck<const N: usize>(
     costs: &[f32],
     rows: usize,

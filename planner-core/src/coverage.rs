@@ -1,28 +1,30 @@
-//! Coverage: a fleet photographs an area in the least time, each vehicle on one unbroken route.
+//! Coverage: a fleet photographs an area in the least time; each vehicle flies one continuous
+//! route.
 //!
 //! Source: CPP (Luna 2022). One algorithm a file:
 //!
 //! | file | is |
 //! |---|---|
-//! | `footprint.rs` | what a camera sees; spacing of lanes and waypoints (CPP eqs. 1, 2) |
-//! | `area.rs` | polygons, checked |
+//! | `footprint.rs` | ground that an image shows; spacing of lanes and waypoints (CPP eqs. 1, 2) |
+//! | `area.rs` | checked polygons: the area and its no-fly zones |
 //! | `sweep.rs` | the direction of the lanes: least width, rotating calipers |
-//! | `tracks.rs` | back-and-forth lanes over concave areas, holes and no-fly zones: `strips.rs` lays them, `lanes.rs` holds them |
-//! | `patches.rs` | more lanes where a no-fly zone covers a lane and not what it should photograph |
-//! | `cells.rs` | lanes in cells that are flown back and forth: a first order |
+//! | `tracks.rs` | back-and-forth lanes, also over concave areas, holes and no-fly zones |
+//! | `strips.rs`, `lanes.rs` | the lanes of one direction are laid; the memory that holds lanes |
+//! | `patches.rs` | extra lanes for ground that a no-fly zone keeps the lanes from photographing |
+//! | `cells.rs` | lanes grouped into cells that are flown back and forth: an initial order |
 //! | `order.rs` | the order and the directions in which lanes are flown |
-//! | `transit.rs` | shortest ways around no-fly zones |
-//! | `around.rs` | the path home, or aside, of a vehicle that leaves its route |
+//! | `transit.rs` | shortest paths around no-fly zones |
+//! | `around.rs` | the path of a vehicle that leaves its route: home, or around an obstacle |
 //! | `pack.rs` | CBinPack, SIMPLE-BINPAT and BINPAT: routes, vehicles, layers, costs |
 //! | `powell.rs` | POWELL-BINPAT: the shares that make the largest cost least |
-//! | `exact.rs` | the least largest cost of all contiguous divisions |
-//! | `bound.rs` | a lower bound on it |
+//! | `exact.rs` | the division into contiguous routes whose largest cost is least |
+//! | `bound.rs` | a lower bound on that cost |
 //! | `flights.rs` | routes as flights of the swarm: paths, pictures, order |
-//! | `divide.rs` | what is left after a loss, as a path of its own |
-//! | `losses.rs` | that divided among those that fly on, as flights from where they hold |
+//! | `divide.rs` | the lanes left after the loss of a vehicle, as a path of its own |
+//! | `losses.rs` | these lanes divided among the remaining vehicles, from where they hold |
 //!
-//! Places are metres, east and north, in the mission frame: [`Flat`]. A lane is two points; its
-//! waypoints follow from lane and index and are not stored.
+//! Points are metres east and north in the mission frame: [`Flat`]. A lane is two points; its
+//! waypoints are computed from lane and index, not stored.
 
 pub mod area;
 pub mod around;
@@ -48,29 +50,29 @@ pub mod transit;
 
 pub use self::flat::Flat;
 
-/// Reason why there is no coverage plan.
+/// Reason why a coverage plan could not be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CoverageError {
-    /// The area is not one: see [`area::AreaError`].
+    /// The polygon is invalid: see [`area::AreaError`].
     Area(area::AreaError),
-    /// The setting of this name is outside its range.
+    /// The setting with this name is outside its range.
     Setting(&'static str),
-    /// Lanes further apart than a footprint is wide, or waypoints further than it is long, leave
-    /// gaps.
+    /// Lanes are further apart than an image is wide, or waypoints further than it is long, so that
+    /// ground between images is missed.
     Gaps,
-    /// The path has more lanes, or more pieces of one lane, than the memory holds.
+    /// The path has more lanes, or one lane is cut into more parts, than the memory holds.
     LanesFull,
-    /// The no-fly zones have more corners than the memory holds.
+    /// The no-fly zones have more corners, transits included, than the memory holds.
     NoFlyFull,
-    /// No lane is left: the no-fly zones hold the whole area.
+    /// No lane is left: the no-fly zones cover the whole area.
     NothingToCover,
-    /// A vehicle's place is inside a no-fly zone: its index.
+    /// The vehicle with this index is inside a no-fly zone.
     InsideNoFly(u8),
-    /// No way leads to a lane: no-fly zones close it in.
+    /// No path around the no-fly zones leads to a lane.
     Unreachable,
     /// The fleet has no vehicles, or more than the memory holds.
     Vehicles,
-    /// The memory lent is too small.
+    /// The workspace that the caller lends is too small.
     WorkspaceTooSmall,
 }
 

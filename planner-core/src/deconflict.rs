@@ -1,10 +1,10 @@
-//! Keeping apart in flight: how fast, and how far, a vehicle may go given its neighbours.
+//! Deconfliction in flight: how fast and how far the own vehicle may fly, given its neighbours.
 //!
-//! [`Method::Algorithm2`] is P3D §3.4 as printed, kept for comparison. [`Method::Priority`] keeps
-//! the order of the swarm's schedule: before each stretch that conflicts with one an
-//! earlier-labelled vehicle has yet to leave, it stops (the gates of [`crate::schedule`]); a
-//! vehicle that is out of the plan opens its gates, and is flown around ([`crate::detour`]). A
-//! neighbour that flies no plan we know is an obstacle to stop in front of.
+//! [`Method::Algorithm2`] is P3D §3.4 as printed, for comparison. [`Method::Priority`] keeps the
+//! order of the swarm's schedule: the vehicle stops at each gate ([`crate::schedule`]) until the
+//! other vehicle has left the stretch that conflicts with the one behind the gate. A vehicle that
+//! is out of the plan opens all gates that wait for it, and is flown around ([`crate::detour`]).
+//! Before a neighbour that does not fly the shared plan the vehicle stops.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -13,32 +13,32 @@ use libm::{fmaxf, fminf};
 use crate::flight::{Gate, Path};
 use crate::{ConfigError, Length, Point, all_positive};
 
-/// Rule by which vehicles keep apart.
+/// Rule by which vehicles are kept apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// None.
+    /// No rule: neighbours are ignored.
     Off,
     /// P3D Algorithm 2.
     Algorithm2,
-    /// Right of way by the schedule.
+    /// Right of way in the order of the schedule, by gates.
     Priority,
 }
 
-/// Tunables of [`advise`].
+/// Settings of [`advise`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeconflictConfig {
-    /// The rule.
+    /// Rule by which vehicles are kept apart.
     pub method: Method,
-    /// Smallest distance between two vehicles' centres, metres.
+    /// Smallest distance between the centres of two vehicles, metres.
     pub safety_distance_m: f32,
-    /// Nominal speed, m/s.
+    /// Nominal speed along the path, m/s.
     pub cruise_mps: f32,
-    /// Braking that is counted on, m/s².
+    /// Deceleration that the advice counts on, m/s².
     pub accel_mps2: f32,
 }
 
 impl DeconflictConfig {
-    /// Whether all are positive and finite; the error names the first that is not.
+    /// Checks that all numbers are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         all_positive(&[
             ("safety_distance_m", self.safety_distance_m),
@@ -48,81 +48,83 @@ impl DeconflictConfig {
     }
 }
 
-/// A vehicle as last heard.
+/// Another vehicle of the swarm, as last heard over the radio.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Neighbour {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// Place in the roster sorted by id, from 0: the `h` of Algorithm 2.
+    /// Index of the neighbour in the roster sorted by id, from 0: the `h` of Algorithm 2.
     pub rank: u16,
-    /// ENU metres.
+    /// Position of the neighbour when it was last heard, ENU metres in the mission frame.
     pub position: Point,
-    /// ENU m/s.
+    /// Velocity of the neighbour when it was last heard, ENU m/s.
     pub velocity: Point,
-    /// Seconds since this was heard.
+    /// Seconds since position and velocity were heard.
     pub age_s: f32,
-    /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it
-    /// flies another plan.
+    /// Progress of the neighbour along its path of the shared plan, metres (negative in the climb);
+    /// `None` if it does not fly that plan.
     pub progress_m: Option<f32>,
-    /// Whether it is on the ground, or has to be assumed there.
+    /// Whether the neighbour is on the ground, or has to be assumed there.
     pub grounded: bool,
-    /// Whether it has left the plan for good: its gates are open, and it is an obstacle.
+    /// Whether the neighbour has left the plan for good: gates that wait for it are open, and it is
+    /// an obstacle.
     pub out_of_plan: bool,
-    /// Whether it flies around something on a path of its own.
+    /// Whether the neighbour flies a detour, off its path of the plan.
     pub detours: bool,
 }
 
-/// The vehicle that asks.
+/// The own vehicle, for which [`advise`] is called.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnVehicle<'a, const W: usize> {
-    /// Place in the roster sorted by id, from 0.
+    /// Index of the own vehicle in the roster sorted by id, from 0.
     pub rank: u16,
-    /// ENU metres.
+    /// Position of the own vehicle, ENU metres in the mission frame.
     pub position: Point,
-    /// Arc length of its reference, metres (minus the climb before take-off).
+    /// Arc length of the reference on `path`, metres; before take-off minus the climb.
     pub along_m: f32,
-    /// Path of the own vehicle.
+    /// The path that the vehicle flies.
     pub path: &'a Path<W>,
-    /// Whether that is one of its own, not the plan's.
+    /// Whether `path` is a detour, not the path of the plan.
     pub detours: bool,
 }
 
-/// Advice to the own vehicle, with which it stays clear of the neighbours.
+/// Limits of the own vehicle's speed and distance that keep it clear of its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advice {
-    /// Share of the nominal speed, 0…1.
+    /// Factor on the nominal speed, 0…1.
     pub speed_scale: f32,
-    /// Distance along the path within which to stop, metres; infinite when free.
+    /// Distance along the path within which the vehicle has to stop, metres; infinite if it need
+    /// not.
     pub stop_within_m: f32,
-    /// System id of the vehicle to stop for; 0 when free.
+    /// System id of the vehicle that it stops for; 0 if it need not stop.
     pub waiting_for: u8,
 }
 
 impl Advice {
-    /// Advice where no neighbour is near.
+    /// No limits: no gate and no neighbour asks for a stop.
     pub const FREE: Self = Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for: 0 };
 }
 
-/// Most samples of the own path that are compared with a neighbour without a known plan: four
+/// Most points of the own path that are compared with a neighbour's predicted positions: four
 /// seconds of flight at the nominal speed.
 const MAX_PATH_SAMPLES: usize = 16;
-/// Time of flight from one sample of the path to the next, seconds.
+/// Time of flight between neighbouring samples of the path, seconds.
 const PATH_SAMPLE_S: f32 = 0.25;
 
-/// Two distances that differ by less than this are the same, metres.
+/// Distances that differ by less than this count as equal, metres.
 const DISTANCE_ROUNDING_M: f32 = 0.05;
-/// A reference this little beyond a gate still stands at the gate, metres: a small overshoot of the
-/// stop must not carry the vehicle through.
+/// Distance beyond a gate at which the reference still counts as standing at it, metres: a small
+/// overshoot of the stop must not carry the vehicle through.
 const GATE_OVERSHOOT_M: f32 = 0.1;
-/// Overshoot of a braking vehicle beyond its reference, as seconds of flight at the cruise speed
-/// above [`BRAKING_OVERSHOOT_ABOVE_MPS`]: 0.5 m were seen from 5.8 m/s.
+/// Overshoot of a braking vehicle over its reference, as seconds of flight at the part of the
+/// cruise speed above [`BRAKING_OVERSHOOT_ABOVE_MPS`]: from 5.8 m/s 0.5 m were seen.
 const BRAKING_OVERSHOOT_S: f32 = 0.2;
-/// At a cruise speed up to this a braking vehicle does not overshoot its reference, m/s.
+/// Cruise speed up to which a braking vehicle does not overshoot its reference, m/s.
 const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 
-/// The advice to `own`; `gates` are sorted along the path. Work: the gates, a search through the
-/// neighbours for each gate within reach, and for each neighbour without a plan 16 points
-/// (`MAX_PATH_SAMPLES`) of the own path.
+/// Advice to the vehicle `own`; `gates` must be sorted along its path. Work: the gates, a search
+/// among the neighbours for each gate within reach, and for each neighbour that does not fly the
+/// shared plan 16 points (`MAX_PATH_SAMPLES`) of the own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &OwnVehicle<'_, W>,
@@ -136,9 +138,10 @@ pub fn advise<const W: usize>(
     }
 }
 
-/// P3D Algorithm 2, lines 12–17: within the safety distance of a higher-ranked vehicle `h` the
-/// nominal speed is divided by `(h + 1) · 1.5`; of several the last (highest) counts, as the loop
-/// overwrites. Restored when the neighbour leaves.
+/// P3D Algorithm 2, lines 12–17: within the safety distance of a vehicle of higher rank `h` the
+/// speed is the nominal one divided by `(h + 1) · 1.5`. Of several such vehicles the one with the
+/// highest rank counts, since the paper's loop overwrites. The speed is the nominal one again when
+/// no such vehicle is near.
 fn advise_by_algorithm2(
     cfg: &DeconflictConfig,
     rank: u16,
@@ -170,7 +173,7 @@ fn advise_by_priority<const W: usize>(
             advice.waiting_for = id;
         }
     };
-    // A gate beyond twice the braking distance asks for nothing yet.
+    // Gates further ahead than twice the braking distance, and one sample, are not looked at yet.
     let horizon_m = own.along_m
         + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2
         + cfg.cruise_mps * PATH_SAMPLE_S;
@@ -196,13 +199,13 @@ fn advise_by_priority<const W: usize>(
     advice
 }
 
-/// The neighbour with this id. Neighbours are usually sorted by id.
+/// The neighbour with this id. Neighbours are usually sorted by id; if not, all are searched.
 fn find_neighbour(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
     let sorted = neighbours.binary_search_by_key(&id, |n| n.id).ok();
     sorted.map(|at| &neighbours[at]).or_else(|| neighbours.iter().find(|n| n.id == id))
 }
 
-/// Samples of the own path ahead: the points where this vehicle will be, at equal distances.
+/// Samples of the own path ahead of the reference, at equal distances.
 struct PathAhead {
     points: Vec<Point, MAX_PATH_SAMPLES>,
     step_m: f32,
@@ -216,10 +219,10 @@ impl PathAhead {
         Self { points: points.collect(), step_m }
     }
 
-    /// Distance along the own path to where it first comes within the safety distance of a
-    /// neighbour that flies on as last heard; `None` if not within the look-ahead, or if flying on
-    /// only takes us further apart. Squares are compared: a board takes its square roots by
-    /// software. From far apart the next looks are left out that are too early for both to meet.
+    /// Distance along the own path at which the vehicle first comes within the safety distance of
+    /// neighbour `n`, if `n` flies on straight as last heard. `None` if that is not within the
+    /// samples, or if both only move apart. Squares are compared: square roots are slow on a board.
+    /// Samples at which both cannot meet yet are skipped.
     fn distance_to_conflict_m<const W: usize>(
         &self,
         cfg: &DeconflictConfig,
@@ -233,7 +236,7 @@ impl PathAhead {
         let apart_m = cfg.safety_distance_m
             + BRAKING_OVERSHOOT_S * fmaxf(cfg.cruise_mps - BRAKING_OVERSHOOT_ABOVE_MPS, 0.0);
         let near = fminf(apart_m * apart_m, now.norm_squared());
-        // No more than this do both fly from one look to the next.
+        // Upper bound of how far both fly between two samples.
         let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
         let look_m = self.step_m + PATH_SAMPLE_S * fastest_mps;
         let looks_a_metre = 1.0 / look_m;
@@ -250,15 +253,15 @@ impl PathAhead {
                 return Some(i as f32 * self.step_m);
             }
             last = (i + 1, to);
-            // The number is not below zero, and 0 where it is NaN.
+            // The cast gives 0 for NaN; the product is not negative otherwise.
             i = i.saturating_add(1).saturating_add((room_m * looks_a_metre) as usize);
         }
         None
     }
 }
 
-/// Square of the least distance from the origin on the way from one place to another, if it is at
-/// neither of them.
+/// Square of the least distance from the origin to the segment between two points, if that is
+/// inside the segment; `None` if it is at one of its ends.
 fn min_squared_distance(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
     let ahead = to.dot(&step);
@@ -266,7 +269,7 @@ fn min_squared_distance(from: &Point, to: &Point) -> Option<f32> {
         return None;
     }
     let behind = from.dot(&step);
-    // The square of the height of a triangle, below zero by rounding alone.
+    // Square of a triangle's height: only rounding can make it negative.
     (behind < 0.0).then(|| from.norm_squared() - behind * behind / (ahead - behind))
 }
 

@@ -1,15 +1,15 @@
-//! One vehicle's detour around a vehicle that left the plan and lies, stands or hovers off its
-//! schedule. Over a field, where there is no roadmap, [`crate::coverage::around`] plans it.
+//! One vehicle's detour around a vehicle that is out of the plan and lies, stands or hovers on its
+//! path. Over a height field, where there is no roadmap, [`crate::coverage::around`] plans it.
 //!
-//! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so
-//! there is no time in it: the shortest path on the roadmap from where the vehicle hovers to its
-//! goal that keeps clear of every [`KeepOutZone`]. It begins with the rest of the current leg,
-//! forward or back, which is known to be clear of walls. Where the vehicle is nearer to something
-//! already than it should be, it only comes no nearer. A column ends at the ground, as far as the
-//! roadmap says where that is.
+//! A detour is flown while all other vehicles stand (`companion/src/swarm/detour.rs` waits for
+//! that), so times do not matter. It is the shortest roadmap path from where the vehicle hovers to
+//! its goal that keeps out of every [`KeepOutZone`]. It begins with the rest of the current leg,
+//! forward or back, which is known to be clear of walls. A vehicle that is inside a zone already
+//! only must not fly deeper into it. A column ends at the ground, as far as the roadmap has its
+//! height.
 //!
-//! ENU metres. Cost: two A*, each edge checked against every [`KeepOutZone`]; each of these against
-//! every node.
+//! ENU metres. Cost: two A*, with each edge checked against every [`KeepOutZone`], and each zone
+//! checked against every node.
 
 use core::ops::Range;
 
@@ -23,48 +23,49 @@ use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::{ConfigError, Length, Point};
 
-/// Sway of a hovering vehicle, metres: an approach by less than this is not counted as one.
+/// Sway of a hovering vehicle, metres: flying deeper into a zone by less than this is allowed.
 const HOVER_SWAY_M: f32 = 0.05;
-/// Rounding of a planned path, metres: an approach by less than this is not counted as one. The
+/// Rounding of a planned path, metres: flying deeper into a zone by less than this is allowed. The
 /// safety filter allows no more.
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
-/// A capsule or column that a detour keeps clear of.
+/// A capsule, or the column below a vehicle, that a detour keeps out of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOutZone {
-    /// One end of the zone's axis.
+    /// One end of the zone's axis, ENU metres in the mission frame.
     pub from: Point,
-    /// The other end.
+    /// The other end of the zone's axis.
     pub to: Point,
-    /// Distance to keep, metres.
+    /// Distance from the axis that is to be kept, metres.
     pub radius_m: f32,
-    /// Kind of the zone.
+    /// Reason for the zone, which decides what part of it is kept clear.
     pub kind: ZoneKind,
 }
 
-/// Kind of a keep-out zone.
+/// Reason for a keep-out zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ZoneKind {
-    /// A zone that may be occupied all along its axis.
+    /// Another vehicle may be anywhere along the axis: all of the zone is kept clear.
     Static,
-    /// A vehicle at `from` that descends to `to`: not to be rested below, nor flown up to.
+    /// A vehicle at `from` that descends to `to`: a detour may cross below it, but neither rest
+    /// there nor climb to it.
     Descending,
-    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is
-    /// kept clear.
+    /// A vehicle on the ground below `from`: where the roadmap has the ground's height, only a
+    /// column at the ground is kept clear.
     Grounded,
 }
 
 impl KeepOutZone {
-    /// Whether its ends are finite and its radius is finite and not negative; the error names the
-    /// first that is not.
+    /// Checks that the ends are finite, and that the radius is finite and not negative; the error
+    /// names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         check_finite("from", &self.from)?;
         check_finite("to", &self.to)?;
         check_not_negative("radius_m", self.radius_m)
     }
 
-    /// The zone, shrunk so that `here` is not inside it: a vehicle that is too near already may fly
-    /// off.
+    /// The zone with its radius reduced to the distance of `here` less `nearer_m`, if `here` is
+    /// nearer than the radius: a vehicle that is too near already may still fly away.
     fn shrunk_to(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
         let far_m = self.radius_m + nearer_m;
@@ -75,8 +76,9 @@ impl KeepOutZone {
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - nearer_m, 0.0)), ..*self }
     }
 
-    /// The zone no deeper than the ground below it: a vehicle does not fall through a floor. A
-    /// vehicle that lies is on the ground.
+    /// The zone, ended at the ground below it as far as the roadmap has its height: a vehicle does
+    /// not fall through a floor. For [`ZoneKind::Grounded`] its top is moved down to the ground,
+    /// too.
     fn clipped_to_ground(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
         let Some((low_m, high_m)) = view.ground_range_near(&self.from).filter(|_| falls) else {
@@ -90,8 +92,9 @@ impl KeepOutZone {
         Self { from, to, ..*self }
     }
 
-    /// The part of the zone that may not be flown through. A vehicle that descends may be met half
-    /// way by one that climbs as fast: of its column the lower third above `here` is left to cross.
+    /// The part of the zone that may not be flown through. A descending vehicle may meet one that
+    /// climbs as fast half way: so of the space between `here` and the vehicle above, the lower
+    /// third may be crossed. If the vehicle above is within the radius already, no part is left.
     pub(crate) fn impassable_part(&self, here: &Point) -> Self {
         if self.kind != ZoneKind::Descending {
             return *self;
@@ -105,13 +108,14 @@ impl KeepOutZone {
         }
     }
 
-    /// Whether a place is inside the zone.
+    /// Whether a point is inside the zone.
     pub fn contains(&self, place: &Point) -> bool {
         self.intersects(place, place)
     }
 
     pub(crate) fn intersects(&self, a: &Point, b: &Point) -> bool {
-        // Most are apart along one axis alone, which is cheaper to see than a distance.
+        // Most legs are apart from the zone along one axis alone, which is cheaper to see than a
+        // distance.
         let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
         let beside = |axis: usize| {
             let (low, high) = sorted(a[axis], b[axis]);
@@ -126,7 +130,7 @@ impl KeepOutZone {
     }
 }
 
-/// Bounding box of a zone, for a quick check of many legs: most legs are outside it.
+/// Bounding box of a zone, radius included, by which most legs are ruled out quickly.
 struct BoundingBox {
     low: Point,
     high: Point,
@@ -139,8 +143,8 @@ impl BoundingBox {
         Self { low: from.inf(to) - radius, high: from.sup(to) + radius }
     }
 
-    /// Beyond which of its six sides a place is, a bit for each: what is between two places beyond
-    /// the same side is too.
+    /// For each of the box's six faces a bit: whether the point is beyond that face. If two points
+    /// are beyond the same face, the segment between them is outside the box.
     fn outer_faces(&self, p: &Point) -> u8 {
         let (low, high) = (&self.low, &self.high);
         u8::from(p.x < low.x)
@@ -152,9 +156,9 @@ impl BoundingBox {
     }
 }
 
-/// Whether a path between two arc lengths, `ahead`, comes too near: with the climb if that begins
-/// before 0, and with the descent if it ends beyond the path. Nearer than `here`, where the vehicle
-/// is, has to be: what it leaves is not in its way.
+/// Whether a path enters the zone between the two arc lengths of `ahead`: the climb included if
+/// that begins below 0, the descent if it ends beyond the path. A vehicle at `here` that is inside
+/// the zone already is blocked only where the path leads deeper into it.
 pub fn is_path_blocked<const W: usize>(
     path: &Path<W>,
     ahead: Range<f32>,
@@ -202,12 +206,13 @@ pub fn is_path_blocked<const W: usize>(
     false
 }
 
-/// Number of stretches that [`is_path_blocked`] checks: the legs ahead, the climb, the descent.
+/// Number of segments that [`is_path_blocked`] checks: the legs ahead of an arc length, the climb
+/// and the descent.
 pub fn count_segments_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().len() - count_legs_begun(path, along_m) + 2
 }
 
-/// Number of waypoints up to an arc length.
+/// Number of waypoints at or before an arc length.
 fn count_legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
@@ -215,43 +220,45 @@ fn count_legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
 /// Target of a detour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
-    /// A goal of the roadmap, by its index.
+    /// A goal of the roadmap, by its index among the goals.
     Node(u16),
-    /// Over a field, without a roadmap: to this place over the vehicle's pad.
+    /// Over a height field, without a roadmap: the vehicle's own pad.
     Home {
-        /// The place.
+        /// Point above the pad at which the detour ends, ENU metres in the mission frame.
         over: Point,
-        /// Height of the layer in which the vehicle crosses the field, metres.
+        /// Height of the layer in which the vehicle crosses the field, metres up in the mission
+        /// frame.
         layer_m: f32,
     },
 }
 
-/// The detour to plan.
+/// Request for a detour: where the vehicle hovers, where it has to go, and its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetourRequest {
-    /// Whether it is not the goal that is sought but the nearest node to rest at, away from all
-    /// there is to keep off.
+    /// Whether the target is not `goal` but the nearest roadmap node outside all zones, to land
+    /// below it.
     pub aside: bool,
-    /// Place where the vehicle hovers, on a leg whose ends follow.
+    /// Position where the vehicle hovers, on the leg `leg`.
     pub here: Point,
-    /// The ends of that leg; nodes of the roadmap, but that one may be where an earlier detour
-    /// began.
+    /// Ends of that leg. They are nodes of the roadmap, except that one may be where an earlier
+    /// detour began.
     pub leg: [Point; 2],
-    /// Clearance of that leg, metres.
+    /// Distance from that leg to the nearest obstacle, metres.
     pub leg_clearance_m: f32,
     /// Target of the detour.
     pub goal: Goal,
-    /// Height of the goal over its ground, metres.
+    /// Height of the goal above the ground below it, metres.
     pub descent_m: f32,
-    /// Radius + safety margin, metres.
+    /// Vehicle radius + safety margin, metres: edges must have more clearance.
     pub required_clearance_m: f32,
-    /// Lowest and highest corner of the volume that no leg over a field leaves, ENU metres.
+    /// Lowest and highest corner of the volume in which all legs over a height field have to be,
+    /// ENU metres; `None` if there is none.
     pub fence: Option<(Point, Point)>,
 }
 
 impl DetourRequest {
-    /// Whether its places are finite, and its height and clearances are finite and not negative;
-    /// the error names the first that is not.
+    /// Checks that all positions are finite, and that height and clearances are finite and not
+    /// negative; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         check_finite("here", &self.here)?;
         check_finite("leg", &self.leg[0])?;
@@ -281,21 +288,23 @@ fn check_not_negative(name: &'static str, number: f32) -> Result<(), ConfigError
 /// Reason why no detour was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DetourError {
-    /// The request, or something to keep off, holds a number that it may not.
+    /// A number of the request or of a keep-out zone is out of range.
     Config(ConfigError),
-    /// The search found none.
+    /// The search of the roadmap found no path.
     Search(SearchError),
-    /// The path was refused.
+    /// The path has too many waypoints, or a coordinate that is not finite.
     Path(PathError),
-    /// The goal, or the column below it, is too near something.
+    /// The goal, or the column below it, is inside a keep-out zone.
     GoalBlocked,
 }
 
-/// Greatest length of a path to a landing place aside, and greatest distance of that place, metres.
+/// Greatest length of a path to a landing place aside, which also bounds that place's distance,
+/// metres.
 const MAX_SIDESTEP_M: f32 = 20.0;
 
-/// The shortest path to the goal, or aside, that keeps clear of all `obstacles`, written to `out`.
-/// Of an obstacle that is nearer already the distance is shortened; `nodes` is scratch.
+/// Writes the shortest path to the goal, or to a node aside, that keeps out of all `obstacles` to
+/// `out`. Changes the zones: they end at the ground, and one that contains the vehicle is shrunk.
+/// `nodes` is scratch memory.
 pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -369,14 +378,15 @@ pub fn plan_detour<const N: usize, const W: usize>(
     failed
 }
 
-/// Shrinks each zone that already contains the vehicle, so that the vehicle is on its border.
+/// Shrinks each zone that contains the vehicle, so that the vehicle is on its border; zones of
+/// descending vehicles are not changed.
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
         *obstacle = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
     }
 }
 
-/// As [`plan_detour`], as the plan of one vehicle: without gates, since all others stand while it
+/// As [`plan_detour`], written as a vehicle's plan: without gates, since all others stand while it
 /// is flown.
 pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,

@@ -1,12 +1,13 @@
-//! Heights that vehicles fly above: the field, a grid of nodes read in place from `field.bin`.
+//! The height field that flights above terrain follow: a grid of node heights, read in place from
+//! `field.bin`.
 //!
 //! Little endian: magic `FLKFIELD`, version u16, columns u16, rows u16, 0 u16, east and north of
-//! the first node f32, metres from node to node f32, then one i16 a node, decimetres up in the
-//! mission frame, rows from south to north, and a CRC-32 of all before it. Between nodes heights
-//! are bilinear, beyond the border they are those of the border. The desk raises nodes to the
-//! highest ground that a vehicle's error and half a step of [`follow`] may reach, and flattens what
-//! is too steep; so a path that keeps above the field at samples half a node apart keeps above the
-//! ground everywhere.
+//! the first node f32, metres between nodes f32, then one i16 per node (decimetres up in the
+//! mission frame, rows from south to north), and a CRC-32 of all before it. Heights between nodes
+//! are bilinear; beyond the border they are those of the border. The desktop raises each node to
+//! the highest ground within a vehicle's position error and half a sample step of [`follow`], and
+//! flattens slopes that are too steep. So a path that is above the field at samples half a node
+//! spacing apart is above the ground everywhere.
 
 pub mod follow;
 
@@ -15,22 +16,22 @@ use libm::{floorf, fmaxf, fminf};
 use crate::coverage::Flat;
 use crate::file::{CRC32, FileError};
 
-/// First eight bytes of a height field's file.
+/// First eight bytes of a height-field file.
 pub const MAGIC: [u8; 8] = *b"FLKFIELD";
 /// Version of the file format that is written and read.
 pub const VERSION: u16 = 1;
-/// Bytes before the first node.
+/// Length of the header, the bytes before the first node.
 pub const HEADER_LEN: usize = 28;
-/// Most nodes: their bytes fit where a roadmap does.
+/// Most nodes of a field, so that the file fits a board's roadmap slot.
 pub const MAX_NODES: usize = 1 << 16;
-/// Unit in which a node's height is stored, metres.
+/// Unit of a stored node height, metres.
 pub const HEIGHT_STEP_M: f32 = 0.1;
 const CRC_LEN: usize = 4;
 
-/// Places of the nodes.
+/// Position, spacing and number of a height field's nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldShape {
-    /// The south-western node.
+    /// The south-western node, metres east and north in the mission frame.
     pub low: Flat,
     /// Distance from one node to the next, metres.
     pub cell_m: f32,
@@ -46,7 +47,7 @@ impl FieldShape {
         usize::from(self.columns) * usize::from(self.rows)
     }
 
-    /// Bytes of the file.
+    /// Length of the file in bytes.
     pub fn encoded_len(&self) -> usize {
         HEADER_LEN + 2 * self.node_count() + CRC_LEN
     }
@@ -63,7 +64,7 @@ impl FieldShape {
     }
 }
 
-/// A checked field over borrowed bytes.
+/// A checked height field over borrowed bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldView<'a> {
     shape: FieldShape,
@@ -73,10 +74,11 @@ pub struct FieldView<'a> {
 }
 
 impl<'a> FieldView<'a> {
-    /// Reads a file, which has its length.
+    /// Checks the file, which must be exactly as long as its header states, and returns a view of
+    /// it.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The reason why it is not a valid height field.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, FileError> {
         let Some((header, rest)) = bytes.split_first_chunk::<HEADER_LEN>() else {
             return Err(FileError::Truncated);
@@ -101,22 +103,23 @@ impl<'a> FieldView<'a> {
         Ok(Self { shape, nodes, highest_dm, crc })
     }
 
-    /// Places of the nodes.
+    /// Position, spacing and number of the nodes.
     pub fn shape(&self) -> &FieldShape {
         &self.shape
     }
 
-    /// The CRC-32 in the file.
+    /// The CRC-32 at the end of the file.
     pub fn crc(&self) -> u32 {
         self.crc
     }
 
-    /// The highest node, metres.
+    /// Height of the highest node, metres up in the mission frame.
     pub fn highest_m(&self) -> f32 {
         f32::from(self.highest_dm) * HEIGHT_STEP_M
     }
 
-    /// The height at a place, metres.
+    /// Height of the field at `place`, metres up in the mission frame; beyond the border that of
+    /// the border.
     pub fn height_at(&self, place: &Flat) -> f32 {
         let axis = |at: f32, low: f32, count: u16| {
             let most = f32::from(count - 1);
@@ -135,10 +138,11 @@ impl<'a> FieldView<'a> {
     }
 }
 
-/// The file length that a header states. The file's version has to be one that this code reads.
+/// The file length that a header states. Refuses a version that this code does not read.
 ///
 /// # Errors
-/// It is no field, of another version, or has nodes where none may be.
+/// The bytes are not a field's header, the version is unknown, or number or position of the nodes
+/// is out of range.
 pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, FileError> {
     Ok(parse_shape(head)?.encoded_len())
 }
@@ -158,10 +162,11 @@ fn parse_shape(header: &[u8; HEADER_LEN]) -> Result<FieldShape, FileError> {
     Ok(shape)
 }
 
-/// Writes a file: nodes in decimetres, rows from the south; returns its bytes.
+/// Writes a height-field file: node heights in decimetres, rows from south to north. Returns its
+/// length in bytes.
 ///
 /// # Errors
-/// The shape is none, or does not fit the nodes or the memory.
+/// The shape is out of range, or does not fit the number of nodes or the size of `out`.
 pub fn write(shape: &FieldShape, nodes_dm: &[i16], out: &mut [u8]) -> Result<usize, FileError> {
     shape.check()?;
     let length = shape.encoded_len();

@@ -1,35 +1,35 @@
-//! What can be wrong with any of our files: a magic number, a version, lengths, a header and a
-//! CRC-32 are common to all.
+//! Errors that all our file formats have in common, and the CRC-32 at their end. Each file has a
+//! magic number, a version, lengths and a header.
 
 use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final
-/// xor 0xFFFFFFFF. One set of tables serves every file and record.
+/// xor 0xFFFFFFFF. All files and records use this one instance, so its tables exist once.
 pub static CRC32: Crc<u32, CrcTable> = Crc::<u32, CrcTable>::new(&CRC_32_ISO_HDLC);
 
-/// Lookup tables: one (1 kB) on a board; sixteen (16 kB) on a desk, which process sixteen bytes at
-/// once.
+/// Lookup tables of [`CRC32`]: one table (1 kB) on a board, sixteen (16 kB) on a desktop, with
+/// which sixteen bytes are processed at once.
 #[cfg(target_os = "none")]
 type CrcTable = crc::Table<1>;
 #[cfg(not(target_os = "none"))]
 type CrcTable = crc::Table<16>;
 
-/// Reason why bytes are not a whole file of any kind. Its text has at most 41 characters.
+/// Reason why bytes are not a valid file. Its text has at most 41 characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileError {
-    /// The bytes end before the header, or before the length the header gives.
+    /// The bytes end before the end of the header, or before the length that the header states.
     Truncated,
-    /// The first eight bytes are not the magic number.
+    /// The first eight bytes are not the expected magic number.
     Magic,
-    /// A version this code does not know.
+    /// The format version is not one that this code reads.
     Version(u16),
-    /// The lengths and counts in the header contradict one another.
+    /// The lengths and counts in the header contradict one another, or the length of the bytes.
     Length,
-    /// The CRC-32 over the file does not match.
+    /// The CRC-32 at the end is not that of the bytes before it.
     Crc,
-    /// The named header field is not known, or not a finite number inside its range.
+    /// The named header field has an unknown value, or is not a finite number inside its range.
     Header(&'static str),
 }
 

@@ -1,8 +1,8 @@
-//! Plan types: a path, the gates along it, a vehicle's flight and what its companion needs of the
-//! swarm's plan.
+//! Plan types: a path, the gates along it, a vehicle's flight, and the part of the swarm's plan
+//! that its companion needs.
 //!
-//! They hold data and answer for geometry alone. Metres, seconds, ENU in the mission frame; arc
-//! length runs along the path.
+//! They hold data and compute geometry only. Metres, seconds, ENU in the mission frame; arc length
+//! is measured along the path from its first waypoint.
 
 mod done;
 mod photographs;
@@ -14,44 +14,45 @@ pub use self::done::{WaypointRange, WaypointSet};
 pub use self::photographs::{HeadingMode, PicturePlan, PictureStretch, Trigger};
 use crate::{Length, Point};
 
-/// A corner of a path.
+/// A corner of a path, with the times that the schedule gives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
-    /// Place, ENU metres.
+    /// Position, ENU metres in the mission frame.
     pub position: Point,
-    /// Clearance of the leg that ends here, metres from its line to the nearest obstacle.
+    /// Clearance of the leg that ends at this waypoint: distance from the leg to the nearest
+    /// obstacle, metres.
     pub clearance_m: f32,
-    /// Arc length from the first waypoint, metres.
+    /// Arc length from the first waypoint to this one, metres.
     pub along_m: f32,
-    /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its
-    /// order matters in flight.
+    /// Scheduled arrival, seconds after take-off at nominal speed. In flight only the order of
+    /// these times matters.
     pub arrive_s: f32,
-    /// Time of the departure, seconds: later than `arrive_s` where the schedule lets another
-    /// vehicle pass.
+    /// Scheduled departure, seconds after take-off: later than `arrive_s` where the vehicle hovers
+    /// here to let another one pass.
     pub leave_s: f32,
 }
 
 /// Reason why a path was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathError {
-    /// The path has more than `W` waypoints.
+    /// The path has more than `W` waypoints or stretches.
     PathFull,
     /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
-    /// The path is longer than vehicles can report to each other:
+    /// The path is longer than the progress that vehicles can report over the radio:
     /// [`crate::coverage::flights::MAX_PATH_LENGTH_M`].
     TooLong,
 }
 
-/// A polyline through free space, from the point above the pad to the goal. Arc length runs from 0
-/// at the first waypoint; take-off lies before 0, landing beyond [`Path::length_m`].
+/// A polyline through free space, from the point above the pad to the goal. Arc length is 0 at the
+/// first waypoint, negative during take-off, and beyond [`Path::length_m`] during landing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Path<const W: usize> {
     waypoints: Vec<Waypoint, W>,
 }
 
 impl<const W: usize> Path<W> {
-    /// A path without waypoints.
+    /// Creates a path without waypoints.
     pub const fn new() -> Self {
         Self { waypoints: Vec::new() }
     }
@@ -61,8 +62,8 @@ impl<const W: usize> Path<W> {
         self.waypoints.len().checked_sub(1)
     }
 
-    /// Labels every waypoint without a stop: the first at `first_s`, each other one `seconds` of
-    /// its leg later.
+    /// Sets the times of all waypoints for a flight without stops: `first_s` at the first one, and
+    /// `seconds` of each leg later at the one that ends it.
     pub fn label_times_by(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
         let mut before: Option<(Point, f32)> = None;
         for waypoint in &mut self.waypoints {
@@ -73,8 +74,8 @@ impl<const W: usize> Path<W> {
         }
     }
 
-    /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of
-    /// the two.
+    /// Appends a waypoint. One that does not add to the f32 arc length is dropped, and the last
+    /// waypoint keeps the smaller of both clearances.
     #[inline(never)]
     pub fn push(&mut self, position: Point, clearance_m: f32) -> Result<(), PathError> {
         if !(position.iter().all(|c| c.is_finite()) && clearance_m.is_finite()) {
@@ -98,8 +99,8 @@ impl<const W: usize> Path<W> {
         self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
     }
 
-    /// Labels every waypoint without a stop: the first at `first_s`, the others after their arc
-    /// length at `speed_mps`.
+    /// Sets the times of all waypoints for a flight without stops: `first_s` at the first one, at
+    /// the others later by arc length over `speed_mps`.
     pub fn label_times(&mut self, first_s: f32, speed_mps: f32) {
         for waypoint in &mut self.waypoints {
             waypoint.arrive_s = first_s + waypoint.along_m / speed_mps;
@@ -107,14 +108,14 @@ impl<const W: usize> Path<W> {
         }
     }
 
-    /// Labels the last waypoint.
+    /// Sets arrival and departure of the last waypoint, seconds after take-off.
     pub fn set_last_times(&mut self, at_s: f32, leave_s: f32) {
         if let Some(last) = self.waypoints.last_mut() {
             (last.arrive_s, last.leave_s) = (at_s, leave_s);
         }
     }
 
-    /// The waypoints in order.
+    /// All waypoints, in the order of flight.
     pub fn waypoints(&self) -> &[Waypoint] {
         &self.waypoints
     }
@@ -124,15 +125,16 @@ impl<const W: usize> Path<W> {
         self.waypoints.last().map_or(0.0, |w| w.along_m)
     }
 
-    /// The point at an arc length, clamped to the path; `None` on an empty path.
-    // Inlined in its many callers the search would take a board's flash.
+    /// The point at an arc length, which is clamped to the path; `None` if the path is empty.
+    // Not inlined: it has many callers, and the search in each would take a board's flash.
     #[inline(never)]
     pub fn point_at(&self, along_m: f32) -> Option<Point> {
         self.point_on(self.leg_at(along_m), along_m)
     }
 
-    /// The points at `from_m`, `from_m + step_m` and so on (a positive step), each as
-    /// [`Self::point_at`] has it, in one walk along the path; none on an empty path.
+    /// The points at arc lengths `from_m`, `from_m + step_m` and so on (`step_m` > 0), as
+    /// [`Self::point_at`] computes them, in one pass along the path. Never ends; empty on an empty
+    /// path.
     pub fn points_from(&self, from_m: f32, step_m: f32) -> impl Iterator<Item = Point> {
         let mut leg = self.leg_at(from_m);
         let mut steps = 0u16;
@@ -146,13 +148,13 @@ impl<const W: usize> Path<W> {
         })
     }
 
-    /// Index of the waypoint that ends the leg on which an arc length lies; beyond the last
-    /// waypoint there is none.
+    /// Index of the waypoint that ends the leg on which an arc length lies; the number of waypoints
+    /// beyond the last one.
     fn leg_at(&self, along_m: f32) -> usize {
         self.waypoints.partition_point(|w| w.along_m < along_m)
     }
 
-    /// The point at an arc length on the leg that ends at a waypoint.
+    /// The point at an arc length on the leg that ends at waypoint `leg`.
     fn point_on(&self, leg: usize, along_m: f32) -> Option<Point> {
         let (first, last) = (self.waypoints.first()?, self.waypoints.last()?);
         let Some(to) = self.waypoints.get(leg) else { return Some(last.position) };
@@ -164,8 +166,9 @@ impl<const W: usize> Path<W> {
         Some(from.position + (to.position - from.position) * share)
     }
 
-    /// Arc length of the point of the path nearest to `position` within `window_m` of `near_m`: how
-    /// far a vehicle has come, without jumping to another stretch that passes close by.
+    /// Arc length of the point of the path that is nearest to `position`, sought within `window_m`
+    /// of `near_m` only: a vehicle's progress, without a jump to another part of the path that
+    /// passes close by.
     pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
         let (low, high) = (near_m - window_m, near_m + window_m);
         let mut best = (f32::INFINITY, near_m);
@@ -189,33 +192,34 @@ impl<const W: usize> Path<W> {
     }
 }
 
-/// Greatest error of the progress that a standing vehicle reports, metres.
+/// Most metres by which the progress that a standing vehicle reports may be behind its reference.
 pub const PROGRESS_ERROR_M: f32 = 0.25;
 
-/// Task of a vehicle on its flight.
+/// Task of a vehicle on its flight: to stay, to fly to a goal, or to photograph.
 ///
-/// Every task's flight is one path: what differs is what happens along it, which the task says by
-/// arc length.
-// A tag of its own, so that one that stays is all zeros and a static of plans costs .bss alone.
+/// Whatever the task, the flight is one path. A task that acts along the path says where by arc
+/// length.
+// `repr(u8)`, so that `Stay` is all zeros and a static of plans takes .bss only.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Task {
     /// The vehicle stays on its pad.
     #[default]
     Stay,
-    /// The vehicle flies to the goal with this index and lands below it.
+    /// The vehicle flies to the goal with this index, and lands below it.
     Goto(u16),
-    /// The vehicle photographs along lanes and lands at the end of its path.
+    /// The vehicle takes pictures along lanes, and lands at the end of its path.
     Photograph(PicturePlan),
 }
 
 impl Task {
-    /// Whether the vehicle leaves its pad.
+    /// Whether the vehicle takes off.
     pub fn leaves_pad(&self) -> bool {
         *self != Self::Stay
     }
 
-    /// Index of the goal flown to. One that flies without a goal ends over its own pad.
+    /// Index of the goal; `None` for a vehicle that stays, or that photographs and lands on its own
+    /// pad.
     pub fn goal(&self) -> Option<u16> {
         match self {
             Self::Goto(goal) => Some(*goal),
@@ -225,51 +229,53 @@ impl Task {
 }
 
 impl From<Option<u16>> for Task {
-    /// The task of flying to the goal; without a goal the vehicle stays.
+    /// The task of flying to this goal; `None` is a vehicle that stays on its pad.
     fn from(goal: Option<u16>) -> Self {
         goal.map_or(Self::Stay, Self::Goto)
     }
 }
 
-/// One vehicle's flight from its pad to the ground below its goal.
+/// One vehicle's flight from its pad to the ground below the end of its path.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flight<const W: usize> {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
     /// Task of the vehicle.
     pub task: Task,
-    /// Air part, start to goal, labelled with seconds after take-off.
+    /// The part of the flight along the path, from above the pad to above the landing place; times
+    /// in seconds after take-off.
     pub path: Path<W>,
-    /// Height of the start above the pad, metres.
+    /// Height of the path's first waypoint above the pad, metres.
     pub climb_m: f32,
-    /// Height of the goal above the ground there, metres.
+    /// Height of the path's last waypoint above the ground below it, metres.
     pub descent_m: f32,
-    /// Scheduled take-off, seconds after the start at nominal speeds.
+    /// Scheduled take-off, seconds after the mission's start at nominal speeds.
     pub depart_s: f32,
-    /// Longest timed segment of this flight, metres: [`crate::schedule::MAX_TIMED_SEGMENT_M`], or
-    /// more on a flight that is long.
+    /// Length of the flight's longest timed segment, metres:
+    /// [`crate::schedule::MAX_TIMED_SEGMENT_M`], or a multiple of it on a long flight.
     pub segment_m: f32,
 }
 
-/// "Before my arc length `at_m`, vehicle `id` must have come past `until_m` of its own path."
+/// "Before arc length `at_m` of its own path the vehicle waits until vehicle `id` has reported
+/// progress of at least `until_m`."
 ///
-/// Progress is what opens a gate, so a vehicle must report it by these rules:
-/// - On its pad it reports −climb. In the climb it reports what is left of it, negative; in the
-///   descent the path's length and how far it has come down.
-/// - It reports no more than the reference that it follows has come to, and at most
+/// Reported progress opens gates, so vehicles report it by these rules:
+/// - On its pad a vehicle reports −climb, in its climb minus the height that is left; in its
+///   descent it reports the path's length plus the height that it has come down.
+/// - It reports no more than the arc length that its reference has reached, and at most
 ///   [`PROGRESS_ERROR_M`] less once it stands.
-/// - It reports more than the path's length and the descent only when it stands on the ground,
+/// - It reports more than the path's length plus the descent only when it stands on the ground,
 ///   disarmed.
 ///
-/// A vehicle that waits at its assigned place reports enough progress to open every gate for the
-/// part behind it.
+/// So a vehicle that waits at a gate of its own has reported enough progress to open every gate
+/// that waits for it to leave the part behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
-    /// Place of the gate, metres along the own path; −climb is the pad.
+    /// Arc length on the own path before which the vehicle waits, metres; −climb is on the pad.
     pub at_m: f32,
-    /// Which vehicle to wait for: its id.
+    /// Id of the vehicle to wait for.
     pub id: u8,
-    /// Progress of the other that opens the gate, metres along its path.
+    /// Reported progress of that vehicle from which the gate is open, metres along its path.
     pub until_m: f32,
 }
 
@@ -278,24 +284,24 @@ pub struct Gate {
 pub struct VehiclePlan<const W: usize, const G: usize> {
     /// Task of the vehicle.
     pub task: Task,
-    /// Air part, start to goal.
+    /// The part of the flight along the path, from above the pad to above the landing place.
     pub path: Path<W>,
-    /// Height of the start above the pad, metres.
+    /// Height of the path's first waypoint above the pad, metres.
     pub climb_m: f32,
-    /// Height of the goal above the ground there, metres.
+    /// Height of the path's last waypoint above the ground below it, metres.
     pub descent_m: f32,
-    /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad
-    /// instead of in the air.
+    /// Scheduled take-off, seconds after the mission's start: the vehicle waits on its pad until
+    /// then, so that it need not hover at a gate. Separation does not depend on it.
     pub depart_s: f32,
-    /// Places to wait at, and for which vehicle.
+    /// The vehicle's gates: arc lengths at which it waits, and for which vehicle.
     pub gates: Vec<Gate, G>,
-    /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every
-    /// gate.
+    /// CRC-32 over the plan of the whole swarm. Vehicles with the same one agree on the order at
+    /// every gate.
     pub plan_crc: u32,
 }
 
 impl<const W: usize, const G: usize> VehiclePlan<W, G> {
-    /// The plan of a vehicle that stays on its pad. All zeros, so a static costs .bss alone.
+    /// The plan of a vehicle that stays on its pad. All zeros, so a static of it takes .bss only.
     pub const fn new() -> Self {
         Self {
             task: Task::Stay,

@@ -4,8 +4,9 @@
 //! The mission frame is ENU metres on the plane tangent to the WGS84 ellipsoid at the mission
 //! origin. An autopilot's local frame is NED metres about its own EKF origin, but *not* a tangent
 //! plane: PX4 projects azimuthally on a sphere, ArduPilot scales degrees. Two kilometres from the
-//! origin they differ from WGS84 by metres, so every conversion goes through latitude and longitude
-//! with the projection of the current autopilot. f64 throughout: degrees at 1e-9.
+//! origin their results differ from WGS84 by metres, so every conversion goes through latitude and
+//! longitude with the projection of the connected autopilot. All is f64: f32 cannot hold degrees to
+//! 1e-9.
 
 use libm::{asin, atan2, cos, fabs, sin, sqrt};
 use nalgebra::Vector3;
@@ -15,9 +16,9 @@ use crate::Point;
 const WGS84_A: f64 = 6_378_137.0;
 const WGS84_F: f64 = 1.0 / 298.257_223_563;
 const WGS84_E2: f64 = WGS84_F * (2.0 - WGS84_F);
-/// Radius of the sphere PX4 projects on (`CONSTANTS_RADIUS_OF_EARTH`), metres.
+/// Radius of the sphere on which PX4 projects (`CONSTANTS_RADIUS_OF_EARTH`), metres.
 pub const PX4_EARTH_RADIUS_M: f64 = 6_371_000.0;
-/// ArduPilot's `LOCATION_SCALING_FACTOR`: metres of latitude for each 1e-7 degree.
+/// ArduPilot's `LOCATION_SCALING_FACTOR`: metres along a meridian per 1e-7 degree of latitude.
 pub const ARDUPILOT_M_PER_1E7_DEG: f64 = 0.011_131_884_502_145_034;
 
 /// A geodetic position on WGS84.
@@ -27,13 +28,14 @@ pub struct Geodetic {
     pub lat_deg: f64,
     /// Longitude, degrees, east positive.
     pub lon_deg: f64,
-    /// Altitude, metres above mean sea level (the geoid is taken as the ellipsoid, as autopilots do
-    /// for differences).
+    /// Altitude, metres above mean sea level. The geoid is taken as the ellipsoid: only differences
+    /// of altitudes are used, as in autopilots.
     pub alt_m: f64,
 }
 
 impl Geodetic {
-    /// Whether every field is finite and inside its range.
+    /// Whether the altitude is finite, |latitude| ≤ 90° and |longitude| ≤ 180°; false if any is
+    /// NaN.
     pub fn is_valid(&self) -> bool {
         fabs(self.lat_deg) <= 90.0 && fabs(self.lon_deg) <= 180.0 && self.alt_m.is_finite()
     }
@@ -48,7 +50,8 @@ impl Geodetic {
     }
 }
 
-/// Sines and cosines of a latitude and a longitude, taken once: they cost more than all else here.
+/// Sines and cosines of one latitude and longitude, computed once: they cost more than all other
+/// arithmetic of a conversion.
 struct LatLonSinCos {
     sin_lat: f64,
     cos_lat: f64,
@@ -67,7 +70,7 @@ impl LatLonSinCos {
     }
 }
 
-/// ENU metres of `position` on the plane tangent at `origin`.
+/// `position` in ENU metres on the plane tangent to WGS84 at `origin`.
 pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
     let turn = origin.sin_cos();
     let d = position.ecef() - turn.ecef(origin.alt_m);
@@ -78,8 +81,8 @@ pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
     Point::new(east as f32, north as f32, up as f32)
 }
 
-/// The geodetic position of ENU metres about `origin`. Inverse of [`geodetic_to_enu`] to the
-/// rounding of f32: half a millimetre within 8 km, 4 mm at 100 km.
+/// The geodetic position of the point `enu` (ENU metres about `origin`). Inverse of
+/// [`geodetic_to_enu`] up to the rounding of f32: half a millimetre within 8 km, 4 mm at 100 km.
 pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     let (e, n, u) = (f64::from(enu.x), f64::from(enu.y), f64::from(enu.z));
     let turn = origin.sin_cos();
@@ -91,8 +94,8 @@ pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     ecef_to_geodetic(x, y, z)
 }
 
-/// Five fixed-point rounds of the latitude equation: converged below 1e-12 rad for altitudes within
-/// ±100 km.
+/// Geodetic position of an ECEF point in metres. Five fixed-point iterations of the latitude
+/// equation: converged below 1e-12 rad for altitudes within ±100 km.
 fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
     let p = sqrt(x * x + y * y);
     let mut lat = atan2(z, p * (1.0 - WGS84_E2));
@@ -109,9 +112,9 @@ fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
     Geodetic { lat_deg: lat.to_degrees(), lon_deg: atan2(y, x).to_degrees(), alt_m: alt }
 }
 
-/// Great-circle distance in metres by the haversine formula (CPP eq. 9), on a sphere of 6 371 000
-/// m; altitudes are ignored. Against WGS84 it is up to 0.56 % too long (along a meridian at the
-/// equator) and up to 0.45 % too short (near the poles).
+/// Great-circle distance between two positions in metres by the haversine formula (CPP eq. 9), on a
+/// sphere of 6 371 000 m; altitudes are ignored. Compared with WGS84 it is up to 0.56 % too long
+/// (along a meridian at the equator) and up to 0.45 % too short (near the poles).
 pub fn haversine_m(a: &Geodetic, b: &Geodetic) -> f64 {
     let (lat_a, lat_b) = (a.lat_deg.to_radians(), b.lat_deg.to_radians());
     let half_dlat = sin((lat_b - lat_a) / 2.0);
@@ -120,16 +123,17 @@ pub fn haversine_m(a: &Geodetic, b: &Geodetic) -> f64 {
     2.0 * PX4_EARTH_RADIUS_M * asin(sqrt(h.clamp(0.0, 1.0)))
 }
 
-/// How an autopilot flattens the earth about its EKF origin.
+/// The map projection by which an autopilot converts latitude and longitude to its local NED frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// PX4 `MapProjection`: azimuthal equidistant on a sphere of 6 371 000 m.
     Px4,
-    /// ArduPilot `Location::get_distance_NE`: scaled degrees and the cosine of the middle latitude.
+    /// ArduPilot `Location::get_distance_NE`: degrees times a constant, longitude also times the
+    /// cosine of the mean latitude.
     ArduPilot,
 }
 
-/// NED metres of `position` about an autopilot's EKF `origin`, as that autopilot computes them.
+/// `position` in NED metres about the EKF origin `origin`, computed as that autopilot computes it.
 pub fn geodetic_to_ned(
     projection: Projection,
     origin: &Geodetic,
@@ -155,8 +159,8 @@ pub fn geodetic_to_ned(
     }
 }
 
-/// The geodetic position an autopilot means by NED metres about its EKF `origin`. Inverse of
-/// [`geodetic_to_ned`].
+/// The geodetic position that an autopilot assigns to `ned`, NED metres about its EKF `origin`.
+/// Inverse of [`geodetic_to_ned`].
 pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<f64>) -> Geodetic {
     let alt_m = origin.alt_m - ned.z;
     match projection {
@@ -182,13 +186,13 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
     }
 }
 
-/// A longitude or a difference of two, brought into [-180, 180]: the antimeridian runs through
-/// nobody's building, but a difference of 359.9999 degrees would send a vehicle around the world.
+/// A longitude, or a difference of two, wrapped into [-180, 180] degrees. Unwrapped, a difference
+/// of 359.9999 degrees across the antimeridian would become 40 000 km instead of 11 m.
 fn wrap_deg(degrees: f64) -> f64 {
     if fabs(degrees) <= 180.0 { degrees } else { libm::remainder(degrees, 360.0) }
 }
 
-/// ENU from NED and NED from ENU: the same exchange of axes.
+/// Converts an ENU vector to NED, or a NED vector to ENU: both swap x with y and negate z.
 pub fn swap_enu_ned<T: nalgebra::RealField + Copy>(v: &Vector3<T>) -> Vector3<T> {
     Vector3::new(v.y, v.x, -v.z)
 }

@@ -1,10 +1,10 @@
-//! Distances between lines, metres.
+//! Lengths of vectors, and squared distances between segments and points, metres.
 
 use nalgebra::{Vector2, Vector3};
 
 use crate::Point;
 
-/// Length of a vector by [`fpu::sqrtf`]: nalgebra's `norm` to the bit, at a third of its
+/// Length of a vector by [`fpu::sqrtf`]: the same bits as nalgebra's `norm`, in a third of its
 /// instructions on a board.
 pub trait Length {
     /// Euclidean length, in the vector's unit.
@@ -25,14 +25,14 @@ impl Length for Vector2<f32> {
     }
 }
 
-/// The value clamped to the bounds. `f32::clamp` panics where the bounds are none, and a board
-/// carries the code that would print them: 25 kB.
+/// `value` limited to `low..=high`. `f32::clamp` panics where the bounds are invalid, and its panic
+/// message takes 25 kB of a board's flash.
 pub(crate) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }
 }
 
-/// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+/// Squared distance between two segments, m² (Ericson, Real-Time Collision Detection, 5.1.9).
 pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
     let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);
     let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
@@ -40,14 +40,14 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
     let (b, c) = (d1.dot(&d2), d1.dot(&r));
     let s = share(b * f - c * e, a * e - b * b);
     let t = share(b * s + f, e);
-    // With t clamped, s follows from it again.
+    // With t clamped, s is computed from it again.
     let s = share(b * t - c, a);
     let t = share(b * s + f, e);
     (r + d1 * s - d2 * t).norm_squared()
 }
 
-/// Squared distance from a segment to a point: what [`segments_distance_sq`] gives for a second
-/// segment without length, bit by bit. One copy of it: a board has little room.
+/// Squared distance from segment `p` to point `q`, m²: the same bits as [`segments_distance_sq`]
+/// for a second segment of length 0. Not inlined: a board has little flash.
 #[inline(never)]
 pub(crate) fn point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
     let (d, r) = (p.1 - p.0, p.0 - q);

@@ -1,11 +1,11 @@
-//! Planning for a swarm of UAVs: maths over borrowed memory.
+//! Path, schedule and coverage planning for a swarm of UAVs, over memory that the caller lends.
 //!
 //! No allocation, no I/O, no clock, no protocol. Lengths are metres, times seconds, angles degrees
-//! where a name says `_deg` and radians otherwise. Points are ENU (east, north, up) in the mission
-//! frame.
+//! where a name ends in `_deg` and radians otherwise. Points are ENU (east, north, up) in the
+//! mission frame.
 //!
-//! The caller owns all memory. A map is a slice of words, and a function that needs scratch memory
-//! takes a workspace:
+//! The caller owns all memory. A map is a slice of 64-bit words, and a function that needs scratch
+//! memory takes a workspace by reference:
 //!
 //! ```
 //! use planner_core::Point;
@@ -26,8 +26,8 @@
 //! # Ok::<(), planner_core::voxel::GridError>(())
 //! ```
 //!
-//! `examples/ten_uavs.rs` continues from there: roadmap, assignment, paths, schedule and gates of
-//! ten UAVs.
+//! `examples/ten_uavs.rs` continues from this map: roadmap, assignment, paths, schedule and gates
+//! of ten UAVs.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -56,11 +56,11 @@ pub use geometry::Length;
 /// A point or vector in the mission frame: east, north, up, in metres.
 pub type Point = nalgebra::Vector3<f32>;
 
-/// A setting that is not what it may be: its name.
+/// A setting outside its allowed range; holds the setting's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConfigError(pub &'static str);
 
-/// Refuses the first of these settings that is not a positive, finite number.
+/// Returns an error with the name of the first setting that is not a positive, finite number.
 pub(crate) fn all_positive(settings: &[(&'static str, f32)]) -> Result<(), ConfigError> {
     match settings.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
         Some((name, _)) => Err(ConfigError(name)),

@@ -1,15 +1,16 @@
-//! The plan of a whole swarm: which vehicle flies to which goal, along which path, in which order.
+//! The plan of a whole swarm: which vehicle flies to which goal, on which path, and in which order
+//! at shared places.
 //!
-//! Every companion computes this for the whole swarm from the mission's starts and goals, never
-//! from live positions, so all agree; the CRC of the plan is what they compare. P3D §3.3: one
-//! roadmap, a shortest path per vehicle (labelled) or the assignment of least total length over all
-//! pairs (unlabelled); what the paper leaves out is the order at shared stretches, which
-//! [`crate::schedule`] settles.
+//! Every companion computes it for the whole swarm, from the mission's starts and goals and never
+//! from live positions, so all get the same plan; they compare its CRC. As in P3D §3.3 there is one
+//! roadmap, and either a shortest path per vehicle (labelled) or the assignment of least total
+//! length over all pairs (unlabelled). The paper leaves out the order at shared stretches, which
+//! [`crate::schedule`] decides.
 //!
-//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three
-//! A*, up to a dozen searches of the schedule (one for each departure looked at) and one pass over
-//! all scheduled pieces per vehicle; twice that for more than `MAX_VEHICLES_WITHOUT_HANDOVER`
-//! vehicles that cannot be planned with a handover.
+//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds. In a round
+//! each vehicle takes one to three A*, up to a dozen searches of the schedule (one per departure
+//! tried) and one pass over all scheduled timed segments. Twice that for more than
+//! `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be planned with a handover.
 
 mod departures;
 mod order;
@@ -29,8 +30,8 @@ use crate::schedule::{
 };
 use crate::search;
 
-/// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`].
-/// Vehicles and goals that cannot be served are left out, the rest is served as well as can be.
+/// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`]. A
+/// vehicle that gets no goal, since none is left or none can be reached, stays on its pad.
 pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -46,9 +47,9 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize
 /// The goal of each vehicle of a request, `None` for one that stays on its pad.
 pub type Goals<const V: usize> = Vec<Option<u16>, V>;
 
-/// First step: the length of the shortest path from every start to every goal, into the workspace;
-/// labelled, only to the vehicle's own goal. One search a vehicle, or one cost matrix where all are
-/// of one size.
+/// First step: writes the length of the shortest path from every start to every goal into the
+/// workspace; with labelled goals only to the vehicle's own goal. One search per vehicle, or one
+/// cost matrix if all need the same clearance.
 pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -94,8 +95,8 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     Ok(())
 }
 
-/// Second step: which vehicle flies to which goal, from the costs left in the workspace by
-/// [`compute_costs`].
+/// Second step: assigns goals to vehicles by the costs that [`compute_costs`] left in the
+/// workspace. A vehicle without one gets `None`.
 pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
@@ -125,7 +126,8 @@ pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     Ok(())
 }
 
-/// Third step: the paths to the `assigned` goals and their order at shared stretches.
+/// Third step: finds the paths to the `assigned` goals, and schedules the order at shared
+/// stretches.
 pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -161,14 +163,14 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
             depart_s: 0.0,
             segment_m: MAX_TIMED_SEGMENT_M,
         };
-        // Cannot overflow: as many as goals.
+        // Cannot overflow: there are as many flights as entries in `assigned`.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     let handover_s =
         if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
     let mut planned = schedule_in_order(view, request, handover_s, ws, out);
     if handover_s > 0.0 && planned.is_err() {
-        // Better late than not at all.
+        // A plan that makes vehicles late is better than none.
         planned = schedule_in_order(view, request, 0.0, ws, out);
     }
     planned?;
@@ -176,18 +178,19 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
     Ok(())
 }
 
-/// A place is planned to be free only so long after its vehicle has left it, seconds: until another
-/// one that waits for it flies in at full speed. A vehicle is up to a second behind the reference
-/// that stops it at gates, its report goes out five times a second, and one that has to stop brakes
-/// before. Without it each vehicle is later than the one before, and those that leave their pads in
-/// time wait in the air. Gates know nothing of it.
+/// Time from when a vehicle has left a place until the schedule lets another one be there, seconds:
+/// what a vehicle that waits for it takes until it flies in at full speed. The waiting vehicle is
+/// up to a second behind the reference that stops it at gates, progress is reported five times a
+/// second, and a vehicle that has to stop brakes before. Without this time each vehicle is later
+/// than the one before it, and vehicles that leave their pads on time wait in the air. Gates do not
+/// depend on it.
 const HANDOVER_S: f32 = 2.0;
-/// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: no vehicle of theirs
-/// waits for many that wait themselves, and all land earlier.
+/// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: in them no vehicle waits
+/// for many that wait themselves, and without it all land earlier.
 const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 
-/// The paths, their order, and whether each vehicle has room for its gates. A place is free
-/// `handover_s` after its vehicle has left it.
+/// Plans paths and their order, then checks that the gates of each vehicle fit. The schedule lets a
+/// vehicle be at a place `handover_s` after another one has left it.
 #[inline(never)]
 fn schedule_in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
@@ -211,7 +214,8 @@ fn schedule_in_order<const N: usize, const V: usize, const W: usize, const P: us
     Ok(())
 }
 
-/// The part of the swarm's plan that the companion of flight `index` needs.
+/// Writes the part of the swarm's plan that the companion of flight `index` needs to `out`, gates
+/// included.
 pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     plan: &SwarmPlan<V, W>,
     index: usize,
@@ -230,13 +234,13 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
 }
 
 impl<const V: usize, const W: usize> SwarmPlan<V, W> {
-    /// Notes the CRC of what it holds.
+    /// Computes the plan's CRC and stores it.
     pub(crate) fn set_crc(&mut self, cfg: &ScheduleConfig) {
         self.crc = crc(cfg, self);
     }
 }
 
-/// CRC-32 over all that gates follow from.
+/// CRC-32 over everything that determines the gates.
 fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V, W>) -> u32 {
     let mut digest = CRC32.digest();
     let mut numbers =

@@ -1,19 +1,18 @@
-//! The probabilistic roadmap of P3D §3.2, Algorithm 1: terminals and random free nodes, joined
-//! where a straight flight is clear.
+//! The probabilistic roadmap of P3D §3.2, Algorithm 1: terminals (starts and goals) and random free
+//! nodes, joined where a straight flight between two keeps the clearance.
 //!
-//! Starts and goals are nodes, then `nodes` random points of free space (the paper's counter leaves
-//! the terminals out). Two nodes are joined iff `edge_min_m ≤ length ≤ edge_max_m` and the segment
-//! between them is clear with the margin ([`segment_is_clear`]). The edges are the same set as an
-//! all-pairs loop finds ([`connect_all_pairs`]); what differs is the way:
+//! Starts and goals are nodes; `nodes` random points of free space follow (the paper's count
+//! excludes the terminals as well). Two nodes are joined iff `edge_min_m ≤ length ≤ edge_max_m` and
+//! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The set of edges is the one
+//! of a loop over all pairs ([`connect_all_pairs`]); only the work is less:
 //!
-//! 1. nodes are sorted into cubes ([`Workspace`]), so that only near pairs are measured;
+//! nodes are sorted into cubes ([`Workspace`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
 //!    a neighbour inside it is clear, and a ray that leaves it mostly does so into a wall. Both
-//!    answers are taken only where f32 cannot be wrong;
-//! 3. of what is left the part outside the box goes to the exact check.
+//! the segments that are left go to the exact check, without their part inside the box.
 //!
-//! Cost: O(nodes · neighbours); 2300 nodes make some 80 000 pairs in range. Memory: 14 bytes a
-//! node, 2 a cube. Metres, mission frame, f32.
+//! Cost: O(nodes · neighbours); 2300 nodes have some 80 000 pairs within the length range. Memory:
+//! 14 bytes per node, 2 per cube. Metres, mission frame, f32.
 
 mod config;
 mod free_box;
@@ -36,12 +35,13 @@ use crate::Point;
 use crate::segment::{point_clearance, segment_clearance, segment_is_clear};
 use crate::voxel::VoxelGrid;
 
-/// Writes the terminals and then `config.nodes` random free points into `nodes`; returns how many
-/// in all.
+/// Writes the terminals and then `config.nodes` random free points into `nodes`; returns the number
+/// of nodes written, terminals included.
 ///
-/// A random node lies in a cell that is not an obstacle, nor set in `never_sample` (unknown space
-/// that rays may pass), and farther than `clearance_m` from every obstacle: one nearer could have
-/// no edge. A terminal only has to be outside obstacles: whether it can be joined, the edges say.
+/// A random node lies in a cell that is neither an obstacle nor set in `never_sample` (unknown
+/// space that edges may cross), and farther than `clearance_m` from every obstacle: a nearer node
+/// could have no edge. A terminal only has to be outside obstacles; one without clearance gets no
+/// edges.
 pub fn sample_nodes(
     grid: &VoxelGrid<'_>,
     never_sample: Option<&VoxelGrid<'_>>,
@@ -85,8 +85,8 @@ pub fn sample_nodes(
     Ok(total)
 }
 
-/// Whether a point keeps the clearance that edges keep; where they keep none, whether it is outside
-/// obstacles.
+/// Whether a point is farther than the edges' clearance from every obstacle; with clearance 0,
+/// whether its cell is free.
 fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
     match config.clearance_m > 0.0 {
         true => segment_is_clear(grid, p, p, config.clearance_m),
@@ -94,10 +94,9 @@ fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
     }
 }
 
-/// The bridge test: whether the points on either side of a clear one, at the same random offset,
-/// are both not clear. `draw` is of the unit cube. The offset is at most twice the clearance on
-/// each axis: a passage that is as wide leaves half of its width to fly in; where no clearance is
-/// asked for, an eighth of the longest edge.
+/// The bridge test: whether `p` plus and `p` minus a random offset are both inside the grid and
+/// without clearance. `draw`, a point of the unit cube, gives the offset: on each axis at most
+/// twice the clearance, or an eighth of the longest edge where that is more.
 fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> bool {
     let reach_m = (2.0 * config.clearance_m).max(config.edge_max_m / 8.0);
     let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
@@ -106,7 +105,7 @@ fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Po
         .all(|end| grid.shape().cell_of(end).is_some() && !keeps_clear(grid, config, end))
 }
 
-/// Sequence of random points of the unit cube, [0, 1) on each axis.
+/// Sequence of pseudo-random or Halton points of the unit cube, [0, 1) on each axis.
 struct SampleSequence {
     rng: Pcg32,
     sampling: Sampling,
@@ -118,7 +117,8 @@ impl SampleSequence {
     fn new(config: &Config) -> Self {
         let mut rng = Pcg32::seed_from_u64(config.seed);
         let shift = uniform(&mut rng);
-        // The uniform draws begin at the seed's beginning.
+        // The generator is seeded again, so that uniform points do not depend on the draw of
+        // `shift`.
         Self { rng: Pcg32::seed_from_u64(config.seed), sampling: config.sampling, index: 0, shift }
     }
 
@@ -138,14 +138,16 @@ impl SampleSequence {
     }
 }
 
-/// 24 bits an axis: every value is exact in f32 and below 1.
+/// A uniform point of the unit cube, 24 random bits per axis, so every value is exact in f32 and
+/// below 1.
 fn uniform(rng: &mut Pcg32) -> Point {
     let mut draw = || (rng.next_u32() >> 8) as f32 / (1 << 24) as f32;
     let (x, y) = (draw(), draw());
     Point::new(x, y, draw())
 }
 
-/// The digits of `index` in `base`, mirrored at the point.
+/// The digits of `index` in `base`, mirrored at the radix point: the van der Corput sequence, in
+/// [0, 1).
 fn radical_inverse(mut index: u32, base: u32) -> f32 {
     let (mut value, mut place) = (0.0, 1.0);
     while index > 0 {
@@ -156,8 +158,8 @@ fn radical_inverse(mut index: u32, base: u32) -> f32 {
     value.min(1.0 - f32::EPSILON)
 }
 
-/// Joins all nodes; returns the number of edges written. Their order is fixed by the nodes, but not
-/// ascending.
+/// Writes all edges between `nodes` into `edges` and returns their number. Their order depends on
+/// the nodes only, but is not ascending.
 pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
@@ -175,9 +177,10 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     Ok(count)
 }
 
-/// Finds the edges that begin at the places `range` of an indexed workspace and gives each to
-/// `found`; an error from there ends the work. The ranges 0..n and n..m give the edges of 0..m in
-/// the same order, so that cores can share the work without changing the result.
+/// Finds the edges from the nodes at places `range` of the sorted order to nodes at later places,
+/// and passes each to `found`; an error of `found` ends the search. The ranges 0..n and n..m give
+/// the edges of 0..m in the same order, so that cores can share the work without changing the
+/// result.
 pub fn connect_range<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &Workspace<NODES, CUBES>,
@@ -188,10 +191,10 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
     connect_range_with(grid, workspace, config, range, |_| None, |edge, _| found(edge))
 }
 
-/// As [`connect_range`], where `hint` may know already whether the segment between two nodes is
-/// clear. It must answer as [`segment_is_clear`] does, or not at all; it is asked only where the
-/// answer is not at hand, and just before `found`. With an edge `found` is given a distance in
-/// metres that it keeps to obstacles, to 2⁻¹¹ cell, or 0 where none is at hand.
+/// As [`connect_range`], but `hint` may answer whether the segment between two nodes is clear. It
+/// must answer as [`segment_is_clear`] does, or `None`. It is called only where the free box does
+/// not decide, and just before `found`. The second argument of `found` is a lower bound on the
+/// distance of the edge to obstacles, metres, right to 2⁻¹¹ cell; 0 where the free box gives none.
 pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &Workspace<NODES, CUBES>,
@@ -218,8 +221,8 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     Ok(())
 }
 
-/// The edges of Algorithm 1 as printed, every pair in turn: the reference for [`connect`].
-/// O(nodes²).
+/// The edges of Algorithm 1 as the paper prints it, every pair in turn: the reference for tests of
+/// [`connect`]. O(nodes²).
 pub fn connect_all_pairs(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
@@ -243,8 +246,8 @@ pub fn connect_all_pairs(
     Ok(())
 }
 
-/// Distance from an edge to the nearest obstacle, metres, at most `max_m`: what the roadmap file
-/// keeps with it. `None` where the edge names no node.
+/// Distance from an edge to the nearest obstacle, metres, at most `max_m`, as the roadmap file
+/// stores it. `None` if an end of the edge is not an index of `nodes`.
 pub fn edge_clearance(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],

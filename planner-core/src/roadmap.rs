@@ -1,24 +1,25 @@
-//! The roadmap file: a graph of free nodes and clear edges, read in place from flash.
+//! The roadmap file: a graph of free nodes and clear edges, read in place from flash, not copied.
 //!
-//! Little-endian, versioned, closed by a CRC-32; byte by byte in `planner-core/README.md`. Nodes
-//! are mission-frame points, edges are stored from both ends (half-edges) in compressed sparse
-//! rows, neighbours in ascending order. A half-edge takes four bytes: its length follows from the
-//! nodes, its clearance is kept in whole millimetres rounded down, so that 4096 nodes and 65536
-//! half-edges take 320 kB, 32 kB more with landmarks. One roadmap built at a small margin serves
-//! vehicles of any size, because each edge carries the clearance it really has (P3D Table 1 from a
-//! single build).
+//! Little-endian, versioned, ends with a CRC-32; its bytes are listed in `planner-core/README.md`.
+//! Nodes are points of the mission frame. Each edge is stored once from each end (two half-edges)
+//! in compressed sparse rows, targets in ascending order. A half-edge takes four bytes: its length
+//! is computed from the nodes, its clearance is stored in whole millimetres, rounded down. So 4096
+//! nodes and 65536 half-edges take 320 kB, 32 kB more with landmarks. Because each edge carries its
+//! own clearance, one roadmap built for a small required clearance serves vehicles of any size (P3D
+//! Table 1 from a single build).
 //!
-//! A roadmap may carry the lengths of the ways from each node to two landmarks, eight bytes a node.
-//! By the triangle inequality their differences bound the way between any two nodes from below, in
-//! a building better than the straight line does (ALT: Goldberg and Harrelson 2005, "Computing the
-//! Shortest Path: A* Search Meets Graph Theory").
+//! A roadmap may store the length of the shortest path from each node to two landmarks (nodes),
+//! eight bytes per node. By the triangle inequality, the difference of two nodes' distances to a
+//! landmark is a lower bound on the path between them, in a building a better one than the straight
+//! line (ALT: Goldberg and Harrelson 2005, "Computing the Shortest Path: A* Search Meets Graph
+//! Theory").
 //!
-//! It may carry each node's height over the ground too, four bytes a node, so that a board without
-//! a map knows where something that falls comes to rest ([`RoadmapView::ground_range_near`]).
+//! It may also store each node's height above the ground, four bytes per node, so that a board
+//! without a map knows the ground height below a vehicle ([`RoadmapView::ground_range_near`]).
 //!
-//! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards
-//! no accessor can meet an offset or a target out of range, and A* finds shortest ways, whatever
-//! the bytes were. Whether an edge is as clear as it says only the map can tell.
+//! [`RoadmapView::parse`] checks the file once, in O(nodes + half-edges · log degree). After that
+//! no accessor can meet an offset or a target out of range, and A* finds shortest paths, whatever
+//! the bytes were. It cannot check clearances: that takes the map.
 
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -31,28 +32,28 @@ mod write;
 pub use ground::GROUND_REACH_M;
 pub use write::{Edge, encoded_len, write, write_with_landmarks};
 
-/// First eight bytes of the file.
+/// First eight bytes of a roadmap file.
 pub const MAGIC: [u8; 8] = *b"FLKROAD\n";
-/// Version of a roadmap file that says how high each node is over the ground.
+/// File version with a height above the ground for each node.
 pub const VERSION: u16 = 2;
-/// Version of a roadmap file without heights; this version is written and read as well.
+/// File version without heights; it is written where there are none, and both versions are read.
 const VERSION_WITHOUT_HEIGHTS: u16 = 1;
-/// Bytes before the first node.
+/// Length of the header, the bytes before the first node.
 pub const HEADER_LEN: usize = 72;
-/// Most nodes an index of 16 bits can name; index 65535 stays free to mean "none".
+/// Most nodes that 16-bit indices can name; index 65535 is reserved for "no node".
 pub const MAX_NODES: usize = u16::MAX as usize;
-/// Largest coordinate magnitude, metres: up to there f32 distinguishes places a millimetre apart.
+/// Largest magnitude of a coordinate, metres: up to here f32 resolves a millimetre.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
-/// Longest edge a roadmap may have, metres. The schedule checks each metre of an edge, so this
-/// bounds its work.
+/// Longest edge that a roadmap may have, metres. The scheduler checks every metre of an edge, so
+/// this bounds its work.
 pub const MAX_EDGE_M: f32 = 100.0;
-/// Longest path from a node to a landmark, metres: up to this length a sum of edges is right to 4
-/// mm an edge.
+/// Longest path from a node to a landmark that the file may store, metres: up to this length the
+/// f32 sum of edge lengths errs by at most 4 mm per edge.
 pub const MAX_LANDMARK_DISTANCE_M: f32 = 4.0 * MAX_COORDINATE_M;
-/// Largest clearance a half-edge can carry, metres.
+/// Largest clearance that a half-edge can store, metres.
 pub const MAX_CLEARANCE_M: f32 = 65.535;
 
-/// Number of landmarks of a roadmap that has landmarks.
+/// Number of landmarks of a roadmap, unless it has none.
 pub const LANDMARKS: usize = 2;
 
 const NODE_LEN: usize = 12;
@@ -60,49 +61,51 @@ const LANDMARKS_LEN: usize = 4 * LANDMARKS;
 const HEIGHT_LEN: usize = 4;
 const WORD_LEN: usize = 4;
 
-/// Reason why a roadmap was refused, on reading or writing.
+/// Reason why a roadmap was refused, when it was read or written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RoadmapError {
-    /// The bytes are no whole file.
+    /// The bytes are not a complete roadmap file.
     File(FileError),
-    /// The node of this index is NaN, infinite or beyond [`MAX_COORDINATE_M`].
+    /// A coordinate of the node with this index is NaN, infinite or beyond [`MAX_COORDINATE_M`].
     Node(u16),
-    /// The row of this node is out of order or beyond the half-edges.
+    /// The row offset of this node is below the one before, or beyond the half-edges.
     Offset(u16),
-    /// A half-edge of this node leads to itself or to no node, or its row is not in ascending
-    /// order.
+    /// A half-edge of this node leads to the node itself or to no node, or the targets of its row
+    /// are not strictly ascending.
     Target(u16),
-    /// A half-edge of this node has no opposite with the same clearance.
+    /// A half-edge of this node has no opposite half-edge with the same clearance.
     OneWay(u16),
     /// An edge of this node has no length: its two nodes coincide.
     ZeroLength(u16),
-    /// An edge of this node is shorter or longer than the header says.
+    /// An edge of this node is shorter or longer than the limits in the header.
     EdgeLength(u16),
-    /// An edge of this node has less clearance than the header says that it was tested at, or more
-    /// than can be stored.
+    /// The clearance of an edge of this node is below the header's tested clearance, or above the
+    /// largest that can be stored.
     EdgeClearance(u16),
-    /// A way from this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the one
-    /// that a search over all edges finds.
+    /// The distance of this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the
+    /// length of the shortest path over all edges.
     Landmark(u16),
-    /// The height of this node over the ground is NaN, negative or beyond
-    /// [`MAX_LANDMARK_DISTANCE_M`], or this node has none and others do.
+    /// The height of this node above the ground is NaN, negative or beyond
+    /// [`MAX_LANDMARK_DISTANCE_M`]; or the number of heights is not the number of nodes, and this
+    /// is the first node without one.
     Height(u16),
-    /// The roadmap has more nodes than the workspace the landmarks are searched in.
+    /// The workspace in which the distances to landmarks are computed holds fewer nodes than the
+    /// roadmap has.
     WorkspaceTooSmall,
     /// The roadmap has more than [`MAX_NODES`] nodes.
     TooManyNodes,
-    /// The output buffer is smaller than the roadmap; `needed` bytes would do.
+    /// The output buffer is smaller than the roadmap, which takes `needed` bytes.
     RoadmapFull {
-        /// Bytes the roadmap takes.
+        /// Length of the roadmap file in bytes.
         needed: usize,
     },
-    /// The edge at this index names a node that does not exist.
+    /// The edge with this index names a node that does not exist.
     EdgeNode(usize),
-    /// The edge at this index joins a node to itself.
+    /// The edge with this index joins a node to itself.
     SelfLoop(usize),
-    /// The edge at this index has a clearance that is NaN, infinite or negative.
+    /// The edge with this index has a clearance that is NaN, infinite or negative.
     Clearance(usize),
-    /// These two nodes are joined twice.
+    /// Two edges join these two nodes.
     Duplicate(u16, u16),
 }
 
@@ -112,24 +115,24 @@ impl From<FileError> for RoadmapError {
     }
 }
 
-/// Header of a roadmap.
+/// Header of a roadmap file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoadmapHeader {
-    /// The mission origin: zero of the nodes' frame.
+    /// The mission origin: the WGS84 position of the point (0, 0, 0) of the nodes' ENU frame.
     pub origin: Geodetic,
-    /// Shortest edge the builder allowed (P3D `Dmin`), metres.
+    /// Shortest edge that the builder was allowed to make (P3D `Dmin`), metres.
     pub edge_min_m: f32,
-    /// Longest edge the builder allowed (P3D `Dmax`), metres.
+    /// Longest edge that the builder was allowed to make (P3D `Dmax`), metres.
     pub edge_max_m: f32,
-    /// Clearance every edge was tested to exceed, metres: no vehicle that needs more than this may
-    /// skip [`HalfEdge::clearance_m`].
+    /// Clearance that every edge was tested to exceed, metres. A vehicle that needs more must check
+    /// [`HalfEdge::clearance_m`] of each edge.
     pub tested_clearance_m: f32,
-    /// Value at which stored clearances saturate, metres: an edge with this value has at least that
-    /// much.
+    /// Largest clearance stored, metres: an edge that stores this value has at least this
+    /// clearance.
     pub max_clearance_m: f32,
-    /// Number of start nodes; these are the nodes `0..starts`.
+    /// Number of start nodes, which are the nodes `0..starts`.
     pub starts: u16,
-    /// Number of goal nodes; these are the nodes `starts..starts + goals`.
+    /// Number of goal nodes, which are the nodes `starts..starts + goals`.
     pub goals: u16,
 }
 
@@ -157,14 +160,15 @@ impl RoadmapHeader {
         Ok(())
     }
 
-    /// Whether an edge from `a` to `b` has a valid length, by exactly the rule of the builder.
+    /// Whether the length of an edge from `a` to `b` is within the header's limits, computed
+    /// exactly as the builder computes it.
     fn is_edge_length_valid(&self, a: &Point, b: &Point) -> bool {
         let square = squared_length((*a).into(), (*b).into());
         square >= self.edge_min_m * self.edge_min_m && square <= self.edge_max_m * self.edge_max_m
     }
 
-    /// Least and greatest clearance of an edge, metres, as a half-edge carries it. A millimetre
-    /// less than tested is rounding: the test is exact, the distance is not.
+    /// Least and greatest clearance that a half-edge of this roadmap may store, metres. The least
+    /// is a millimetre below the tested clearance: the test is exact, the distance is rounded.
     fn clearances(&self) -> (f32, f32) {
         let metres = |millimetres: u16| f32::from(millimetres) / 1000.0;
         let most = millimetres_down(self.max_clearance_m);
@@ -175,19 +179,19 @@ impl RoadmapHeader {
     }
 }
 
-/// Computed in f64, where the product is exact, so that rounding can only go down. The cast
-/// saturates.
+/// Metres as whole millimetres, rounded down. In f64 the product is exact, so only the cast rounds;
+/// it saturates at 65535.
 fn millimetres_down(metres: f32) -> u16 {
     (f64::from(metres) * 1000.0) as u16
 }
 
-/// One direction of an edge.
+/// One of the two directions of an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfEdge {
-    /// The node it leads to.
+    /// Index of the node to which it leads.
     pub target: u16,
-    /// Distance from the segment to the nearest obstacle, metres, rounded down to a millimetre; at
-    /// least this much if it equals [`RoadmapHeader::max_clearance_m`].
+    /// Distance from the edge to the nearest obstacle, metres, rounded down to a millimetre. If it
+    /// equals [`RoadmapHeader::max_clearance_m`], the distance may be larger.
     pub clearance_m: f32,
 }
 
@@ -199,12 +203,12 @@ impl HalfEdge {
     }
 }
 
-/// False for NaN too.
+/// Whether all coordinates are at most [`MAX_COORDINATE_M`] in magnitude; false for NaN.
 fn in_range(node: &Point) -> bool {
     node.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
 }
 
-/// The target of a half-edge as it lies in the file.
+/// Index of the target node, decoded from a half-edge's bytes in the file.
 #[inline]
 pub(crate) fn target_of(bytes: &[u8; WORD_LEN]) -> u16 {
     u16::from_le_bytes([bytes[0], bytes[1]])
@@ -216,7 +220,7 @@ fn node_of(b: &[u8; NODE_LEN]) -> Point {
     Point::new(at(0), at(4), at(8))
 }
 
-/// A checked roadmap over borrowed bytes. Copying it copies five slices, not the roadmap.
+/// A checked roadmap over borrowed bytes. Copying it copies five slices, not the nodes and edges.
 #[derive(Clone, Copy, Debug)]
 pub struct RoadmapView<'a> {
     header: RoadmapHeader,
@@ -224,15 +228,16 @@ pub struct RoadmapView<'a> {
     nodes: &'a [[u8; NODE_LEN]],
     offsets: &'a [[u8; WORD_LEN]],
     half_edges: &'a [[u8; WORD_LEN]],
-    /// An entry for each node, or none at all.
+    /// The distances to the landmarks, an entry for each node; empty if the roadmap has no
+    /// landmarks.
     landmarks: &'a [[u8; LANDMARKS_LEN]],
-    /// An entry for each node, or none at all.
+    /// The heights above the ground, an entry for each node; empty if the roadmap has none.
     heights: &'a [[u8; HEIGHT_LEN]],
 }
 
 impl<'a> RoadmapView<'a> {
-    /// Checks a roadmap at the start of `bytes`; what follows its length is ignored, so a whole
-    /// flash slot can be given.
+    /// Checks the roadmap at the start of `bytes` and returns a view of it. Bytes after the length
+    /// that the header states are ignored, so a whole flash slot may be passed.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RoadmapError> {
         let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(FileError::Truncated)?;
         let total = declared_len(head)?;
@@ -264,8 +269,8 @@ impl<'a> RoadmapView<'a> {
         Ok(view)
     }
 
-    /// The parts of a body that is as long as its counts say, of nodes, half-edges and landmarks;
-    /// what is left is heights. Nothing is checked.
+    /// A view of `body`, whose length must fit `counts`: the numbers of nodes, half-edges and
+    /// landmarks. The bytes after the landmarks are heights. Nothing is checked.
     fn from_body(header: RoadmapHeader, crc: u32, body: &'a [u8], counts: [usize; 3]) -> Self {
         let [node_count, half_edge_count, landmarks] = counts;
         let (nodes, rest) = body.split_at(node_count * NODE_LEN);
@@ -283,17 +288,17 @@ impl<'a> RoadmapView<'a> {
         }
     }
 
-    /// Number of nodes; node indices are below it.
+    /// Number of nodes; valid indices are below it.
     pub fn node_count(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Number of half-edges: twice the number of edges.
+    /// Number of half-edges, which is twice the number of edges.
     pub fn half_edge_count(&self) -> usize {
         self.half_edges.len()
     }
 
-    /// Bytes the roadmap takes, CRC included.
+    /// Length of the roadmap in bytes, CRC included.
     pub fn byte_len(&self) -> usize {
         let words = self.offsets.len() + self.half_edges.len() + self.heights.len() + 1;
         HEADER_LEN
@@ -302,13 +307,13 @@ impl<'a> RoadmapView<'a> {
             + self.landmarks.len() * LANDMARKS_LEN
     }
 
-    /// Whether it carries the ways to landmarks.
+    /// Whether the roadmap stores distances to landmarks.
     pub fn has_landmarks(&self) -> bool {
         !self.landmarks.is_empty()
     }
 
-    /// Lengths in metres of the shortest ways from a node to the landmarks, over all edges; 0 where
-    /// there is none. All 0 if the roadmap has no landmarks.
+    /// Lengths in metres of the shortest paths over all edges from a node to the two landmarks; 0
+    /// for a landmark that the node has no path to. Both are 0 if the roadmap has no landmarks.
     #[inline]
     pub(crate) fn landmark_distances_m(&self, node: u16) -> [f32; LANDMARKS] {
         match self.landmarks.get(usize::from(node)) {
@@ -320,60 +325,62 @@ impl<'a> RoadmapView<'a> {
         }
     }
 
-    /// The header.
+    /// The file's header.
     pub fn header(&self) -> &RoadmapHeader {
         &self.header
     }
 
-    /// The mission origin.
+    /// The mission origin, WGS84.
     pub fn origin(&self) -> &Geodetic {
         &self.header.origin
     }
 
-    /// The CRC-32 at the end of the file: its identity on the radio.
+    /// The CRC-32 at the end of the file, by which vehicles compare roadmaps over the radio.
     pub fn crc(&self) -> u32 {
         self.crc
     }
 
-    /// Position of a node, metres; NaN where `node` is not below [`Self::node_count`].
+    /// Position of a node in the mission frame, metres; NaN if `node` is not below
+    /// [`Self::node_count`].
     #[inline]
     pub fn node(&self, node: u16) -> Point {
         self.nodes.get(usize::from(node)).map_or(Point::from_element(f32::NAN), node_of)
     }
 
-    /// The edges out of a node, targets ascending; none for a node that does not exist.
+    /// The half-edges that lead out of a node, targets ascending; none for a node that does not
+    /// exist.
     #[inline]
     pub fn half_edges(&self, node: u16) -> impl ExactSizeIterator<Item = HalfEdge> + use<'a> {
         self.half_edges_of(node).1.iter().map(HalfEdge::from_bytes)
     }
 
-    /// A half-edge by its index.
+    /// The half-edge with index `k` in the file.
     #[inline]
     pub(crate) fn half_edge(&self, k: usize) -> HalfEdge {
         HalfEdge::from_bytes(&self.half_edges[k])
     }
 
-    /// The edge from `a` to `b`, if there is one. O(log degree).
+    /// The half-edge from `a` to `b`; `None` if the nodes are not joined. O(log degree).
     pub fn edge_between(&self, a: u16, b: u16) -> Option<HalfEdge> {
         let (_, row) = self.half_edges_of(a);
         row.binary_search_by_key(&b, target_of).ok().map(|i| HalfEdge::from_bytes(&row[i]))
     }
 
-    /// Straight distance between two nodes, metres; NaN if either does not exist.
+    /// Straight-line distance between two nodes, metres; NaN if either does not exist.
     #[inline]
     pub fn distance_m(&self, a: u16, b: u16) -> f32 {
         fpu::sqrtf((self.node(b) - self.node(a)).norm_squared())
     }
 
-    /// Whether a vehicle that needs `required_m` (radius + margin) may fly `edge`. An edge with
-    /// exactly the required clearance is blocked, as touching is; up to the tested clearance every
-    /// edge of the roadmap is clear.
+    /// Whether a vehicle that needs `required_m` (radius + safety margin) may fly `edge`. Its
+    /// clearance must be greater than that; equal is blocked. A requirement up to the header's
+    /// tested clearance is met by every edge.
     #[inline]
     pub fn has_clearance(&self, edge: &HalfEdge, required_m: f32) -> bool {
         edge.clearance_m > required_m || required_m <= self.header.tested_clearance_m
     }
 
-    /// Index of a node's first half-edge, and its half-edges.
+    /// Index of a node's first half-edge, and the bytes of all its half-edges.
     #[inline]
     pub(crate) fn half_edges_of(&self, node: u16) -> (usize, &'a [[u8; WORD_LEN]]) {
         let at = usize::from(node);
@@ -388,10 +395,11 @@ impl<'a> RoadmapView<'a> {
     }
 }
 
-/// The file length that a header states. The file's version has to be one that this code reads.
+/// The file length that a header states. Refuses a version that this code does not read.
 ///
 /// # Errors
-/// It is no roadmap, of another version, or its counts are not those of such a length.
+/// The bytes are not a roadmap's header, the version is unknown, or counts and length contradict
+/// one another.
 pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
     if head[..8] != MAGIC {
         return Err(FileError::Magic.into());

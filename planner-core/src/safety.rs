@@ -1,20 +1,21 @@
-//! The safety filter's geometry: where can a vehicle be until it has stopped, and do two such sets
-//! meet?
+//! Geometry of the safety filter: the set of places where a vehicle can be until it has stopped,
+//! and whether two such sets come too near each other.
 //!
-//! The set of this vehicle ([`ReachableSet::along`], [`ReachableSet::vertical`]) is what it can no
-//! longer take back: [`REACTION_S`] at its present speed, then a stop at its limits along its
-//! reference. The set of a neighbour ([`NeighbourMotion::reachable_set`]) follows from what was
-//! last heard and from nothing else: no gate, no progress, no advice.
+//! The own vehicle's set ([`ReachableSet::along`], [`ReachableSet::vertical`]) is the motion that
+//! it can no longer avoid: [`REACTION_S`] at its present speed, then a stop at its limits along its
+//! reference. A neighbour's set ([`NeighbourMotion::reachable_set`]) depends only on its last
+//! reports: on no gate, no progress, no advice.
 //!
 //! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A
-//! motion that does not reduce a distance that is already too small never does. A vehicle that
-//! stops as soon as its set conflicts stays inside the set of the step before, which did not: that
+//! motion that does not reduce a distance that is already too small never conflicts. A vehicle that
+//! stops as soon as its set conflicts stays inside its set of the step before, which did not: that
 //! is the safety argument (`docs/safety.md`).
 //!
-//! ENU metres. Sets are not compared by time, so an order in which two vehicles pass is no reason
-//! to come near. Cost: the segments of one set times those of the other;
-//! [`NeighbourMotion::reach_m`] is a cheap bound for the many that are far. The own set is prepared
-//! once ([`OwnSet`]), so that most segments of the others are seen to be apart without a distance.
+//! ENU metres. Sets have no times, so two vehicles that pass a place one after the other still
+//! conflict there. Cost: the segments of one set times those of the other;
+//! [`NeighbourMotion::reach_m`] is a cheap bound that rules out the many far neighbours. The own
+//! set is prepared once ([`OwnSet`]), so that most segments of the others are ruled out without
+//! computing a distance.
 
 mod own;
 
@@ -24,31 +25,32 @@ use heapless::Vec;
 pub use self::own::{Legs, OwnSet};
 use crate::{ConfigError, Point, all_positive};
 
-/// Time from a decision to the first motion that follows it, seconds: two setpoints.
+/// Time from a decision of the filter to the first motion that follows it, seconds: two setpoints.
 pub const REACTION_S: f32 = 0.1;
-/// Greatest lag of a vehicle behind its reference, as seconds of flight: the vehicle flies on that
-/// far.
+/// Greatest lag of a vehicle behind its reference, seconds: in a stop the vehicle flies on for this
+/// time.
 pub const MAX_LAG_S: f32 = 0.25;
-/// A neighbour heard within this time counts as heard, seconds.
+/// Age up to which the last report of a neighbour is fresh, seconds; after that the neighbour is
+/// stale.
 pub const FRESH_S: f32 = 1.0;
-/// A vehicle further than this from the path points that it reports does not fly along them,
-/// metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
+/// Distance of a vehicle from the path points that it reports beyond which it does not count as
+/// flying along them, metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
 pub const OFF_REPORTED_PATH_M: f32 = 0.9;
-/// Most points of the set that a vehicle may occupy: its place and the eight path points that it
+/// Most points of a reachable set: the vehicle's position and the eight path points that it
 /// reports.
 const MAX_SET_POINTS: usize = 9;
 
-/// How a vehicle stops.
+/// Limits by which a vehicle stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Braking {
-    /// Braking that is counted on, m/s².
+    /// Deceleration that is counted on, m/s².
     pub accel_mps2: f32,
     /// Jerk with which braking begins, m/s³.
     pub jerk_mps3: f32,
 }
 
 impl Braking {
-    /// Distance that a vehicle flies on that begins to brake at this speed, metres.
+    /// Distance from the beginning of braking at this speed to rest, metres.
     #[inline]
     pub fn stop_m(&self, speed_mps: f32) -> f32 {
         let ramp_s = self.accel_mps2 / self.jerk_mps3;
@@ -56,35 +58,35 @@ impl Braking {
     }
 }
 
-/// Places where a vehicle can be: a polyline, perhaps a vertical column below its first point, and
-/// how much wider than a line both are.
+/// Places where a vehicle can be: all within `widened_by_m` of a polyline and of a vertical column
+/// that may stand below its first point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReachableSet {
     points: Vec<Point, MAX_SET_POINTS>,
-    /// Lower end of the column.
+    /// Lower end of the column; `None` if there is no column.
     foot: Option<Point>,
-    /// Distance beside the line up to which the vehicle can be, metres.
+    /// Distance from polyline and column up to which the vehicle can be, metres.
     pub widened_by_m: f32,
 }
 
 impl ReachableSet {
-    /// A set of one place.
+    /// A set of one point.
     #[inline]
     pub fn at(place: Point) -> Self {
         let mut points = Vec::new();
-        // The first of nine.
+        // Cannot overflow: it is the first of nine.
         let _ = points.push(place);
         Self { points, foot: None, widened_by_m: 0.0 }
     }
 
-    /// Appends a straight leg to a point. Returns false if the set is full.
+    /// Appends a straight leg to a point. Returns false, and appends nothing, if the set is full.
     fn push(&mut self, to: Point) -> bool {
         self.points.push(to).is_ok()
     }
 
-    /// The set from `place` along the points `ahead`, for `length_m` from the first of them. The
-    /// set ends where the points end.
-    // A board takes long to copy what it returns.
+    /// The set from `place` to the first point of `ahead`, then along these points for `length_m`,
+    /// or to the last of them.
+    // Inlined: returning the set by value takes a board long to copy.
     #[inline(always)]
     pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
         let mut set = Self::at(place);
@@ -103,8 +105,8 @@ impl ReachableSet {
             let leg_m = sqrtf(leg.norm_squared());
             let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
             if !self.push(end) {
-                // The set has no memory for more corners: assume any place within the remaining
-                // length.
+                // There is no room for more corners: the vehicle may be anywhere within the
+                // remaining length.
                 self.widened_by_m = left_m.max(0.0);
                 return;
             }
@@ -115,85 +117,93 @@ impl ReachableSet {
         }
     }
 
-    /// The set from `place` straight up or down to the height `to_m`.
+    /// The set from `place` vertically up or down to the height `to_m`, metres up in the mission
+    /// frame.
     pub fn vertical(place: Point, to_m: f32) -> Self {
         let mut set = Self::at(place);
         set.push(Point::new(place.x, place.y, to_m));
         set
     }
 
-    /// Adds the column below the first point, down to a height.
+    /// Adds the column below the first point down to the height `to_m`; none for `None`, or if that
+    /// is above the point.
     fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];
         self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
     }
 
-    /// Legs of the set, at least one, and the column.
+    /// The legs of the polyline, at least one (of length 0 for a single point), and the column.
     fn segments(&self) -> impl Iterator<Item = (&Point, &Point)> {
         let next = if self.points.len() > 1 { &self.points[1..] } else { &self.points[..] };
         self.points.iter().zip(next).chain(self.foot.as_ref().map(|foot| (&self.points[0], foot)))
     }
 }
 
-/// Inputs of a neighbour's set.
+/// Last reports of a neighbour, and what follows from them, from which its reachable set is
+/// computed.
 #[derive(Clone, Copy, Debug)]
 pub struct NeighbourMotion<'a> {
-    /// Place, ENU metres.
+    /// Position of the neighbour when it was last heard, ENU metres in the mission frame.
     pub position: Point,
-    /// ENU m/s.
+    /// Velocity of the neighbour when it was last heard, ENU m/s.
     pub velocity: Point,
-    /// Speed, m/s: the length of the velocity.
+    /// Speed of the neighbour, m/s: the length of `velocity`.
     pub speed_mps: f32,
-    /// Seconds since both were heard.
+    /// Seconds since position and velocity were heard.
     pub age_s: f32,
-    /// How late messages are when they are heard, seconds.
+    /// Delay of the neighbour's messages on the radio link, seconds.
     pub delay_s: f32,
-    /// Points that it flies along next; empty while a pilot or a failsafe flies it.
+    /// Points that the neighbour reports to fly along next; empty while a pilot or a failsafe flies
+    /// it.
     pub points: &'a [Point],
-    /// Place of the neighbour on its points.
+    /// Where the neighbour is on its reported points.
     pub place_on_points: PlaceOnPoints,
-    /// Greatest distance to which the points lead from the first of them, metres.
+    /// Greatest distance of one of the points from the first of them, metres.
     pub extent_m: f32,
-    /// Distance along its points up to which the neighbour may have stopped since, unheard for
-    /// long, metres; 0 for one that is heard.
+    /// Distance along its points within which a neighbour that has been silent for long may have
+    /// stopped, metres; 0 for one that is heard.
     pub rests_within_m: f32,
-    /// Whether it stands on the ground.
+    /// Whether the neighbour stands on the ground.
     pub grounded: bool,
-    /// Height down to which its column counts, metres; none while it stays on its points.
+    /// Height down to which the column below the neighbour belongs to its set, metres up in the
+    /// mission frame; `None` while it flies along its points.
     pub column_to_m: Option<f32>,
 }
 
-/// Place of a vehicle on the points that it reports: the same as long as neither is heard again.
+/// Where a vehicle is on the points that it reports. Valid until position or points are heard
+/// again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PlaceOnPoints {
-    /// The place was not sought yet.
+    /// Not computed yet.
     #[default]
     Unknown,
-    /// The vehicle is further than [`OFF_REPORTED_PATH_M`] beside its points.
+    /// The vehicle is further than [`OFF_REPORTED_PATH_M`] from its points.
     Beside,
-    /// On them.
+    /// The vehicle is on its points.
     On {
-        /// Number of the point at which the leg ends on which it is at first.
+        /// Index of the point that ends the first leg on which the vehicle may be.
         leg: u8,
-        /// Points that turn back lead past it again: as far along them it may be already,
-        /// decimetres, rounded up. Two bytes, since there is one for each contact.
+        /// Further distance along the points that it may have flown already, where they turn back
+        /// and lead past it again: from that first place to the last one, decimetres, rounded up.
+        /// Two bytes, since one is stored for each neighbour.
         more_dm: u16,
     },
 }
 
-/// A path that comes nearer again by less than this does not come back, metres.
+/// Points that come nearer to the vehicle again by less than this do not count as leading past it
+/// again, metres.
 const RETURN_TOLERANCE_M: f32 = 0.05;
 
 impl PlaceOnPoints {
-    /// Looks for the places on the points at which it may be: the first one, and how far from there
-    /// the last one is.
+    /// Finds the first place on the points at which the vehicle may be, and how far along the
+    /// points after it the last such place is.
     #[inline(never)]
     pub fn find(position: &Point, points: &[Point]) -> Self {
         let (mut found, mut more_m): (Option<u8>, f32) = (None, 0.0);
         let Some(mut from) = points.first() else { return Self::Beside };
         let away_m = |place: &Point| sqrtf((position - place).norm_squared());
-        // Distance of the first place and, from there along the points, of the leg; whether the
-        // points have led away since.
+        // Distance of the vehicle from the first place; arc length from there to the current leg;
+        // whether the points have led away from the vehicle since.
         let (mut least_m, mut along_m, mut left) = (OFF_REPORTED_PATH_M, 0.0, false);
         let mut start_m = away_m(from);
         for (i, to) in points.iter().enumerate() {
@@ -212,32 +222,35 @@ impl PlaceOnPoints {
             left |= found.is_some() && start_m > least_m + RETURN_TOLERANCE_M;
             from = to;
         }
-        // The cast saturates.
+        // The cast to `u16` saturates.
         found.map_or(Self::Beside, |leg| Self::On {
             leg,
             more_dm: libm::ceilf(10.0 * more_m) as u16,
         })
     }
 
-    /// The place on the points, and the points after it; none where the vehicle is beside them.
+    /// The first place on the points, and the points after it; `None` where the vehicle is beside
+    /// its points.
     fn ahead<'a>(&self, position: &Point, points: &'a [Point]) -> Option<(Point, &'a [Point])> {
         let Self::On { leg, .. } = *self else { return None };
         let leg = usize::from(leg);
         let to = points.get(leg)?;
-        // No leg ends at the first point: it is the place itself, and would take the room of
-        // another one.
+        // No leg ends at the first point: it is the place itself, and would take up the room of
+        // another point.
         let ahead = &points[leg.max(1).min(points.len())..];
         Some((nearest(position, &points[leg.saturating_sub(1)], to), ahead))
     }
 
-    /// Distance along the points from that place that the vehicle may have flown already, metres.
+    /// Distance along the points beyond the first place that the vehicle may have flown already,
+    /// metres.
     #[inline]
     pub fn flown_beyond_m(&self) -> f32 {
         if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
     }
 }
 
-/// The place on a leg that is nearest to another place. One copy of it: a board has little room.
+/// The point of the leg from `from` to `to` that is nearest to `position`. Not inlined: a board has
+/// little flash.
 #[inline(never)]
 fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
     let leg = to - from;
@@ -246,19 +259,19 @@ fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
     from + leg * share.clamp(0.0, 1.0)
 }
 
-/// Bounds of a neighbour's motion.
+/// Bounds of a neighbour's motion, from which its reachable set is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionBounds {
-    /// How it stops.
+    /// Limits by which it stops.
     pub braking: Braking,
-    /// Fastest flight, m/s.
+    /// Greatest speed that a neighbour is assumed to fly at, m/s.
     pub speed_max_mps: f32,
     /// Time after which a vehicle that no other vehicle hears has stopped, seconds.
     pub silent_s: f32,
 }
 
 impl MotionBounds {
-    /// Whether all are positive and finite; the error names the first that is not.
+    /// Checks that all numbers are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         all_positive(&[
             ("accel_mps2", self.braking.accel_mps2),
@@ -270,8 +283,8 @@ impl MotionBounds {
 }
 
 impl NeighbourMotion<'_> {
-    /// Distance from its place that the neighbour can reach in any direction, `ahead_s` of flight
-    /// included, metres.
+    /// Upper bound of the distance from `position` to any place of the neighbour's set, with
+    /// `ahead_s` more seconds of flight, metres. The column is not counted.
     #[inline]
     pub fn reach_m(&self, bounds: &MotionBounds, ahead_s: f32) -> f32 {
         if self.grounded {
@@ -285,22 +298,22 @@ impl NeighbourMotion<'_> {
             return along_m + self.lateral_reach_m(bounds);
         };
         let away = (first - self.position).abs();
-        // No less than the distance, and no square root.
+        // At least the distance, without a square root.
         let first_m = away.x + away.y + away.z;
-        // Where the place on the points was not sought yet only their extent is known.
+        // While the place on the points is unknown, only the points' extent bounds it.
         let more_m = if self.place_on_points == PlaceOnPoints::Unknown {
             2.0 * self.extent_m
         } else {
             self.place_on_points.flown_beyond_m()
         };
         if first_m < OFF_REPORTED_PATH_M {
-            // On its points, and no further than those lead.
+            // The neighbour is on its points, so it gets no further than these lead.
             return (along_m + more_m + OFF_REPORTED_PATH_M).min(first_m + self.extent_m);
         }
         along_m + more_m + self.lateral_reach_m(bounds) + OFF_REPORTED_PATH_M
     }
 
-    /// Age of the neighbour's last report, seconds.
+    /// Age of the neighbour's position and velocity, the radio's delay included, seconds.
     #[inline]
     fn data_age_s(&self) -> f32 {
         self.age_s + self.delay_s
@@ -308,17 +321,18 @@ impl NeighbourMotion<'_> {
 
     #[inline]
     fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
-        // The neighbour learns that no vehicle hears it by messages that are as late as its own.
+        // The neighbour notices that no vehicle hears it by messages that are as late as its own.
         bounds.speed_max_mps * self.data_age_s().min(bounds.silent_s + 2.0 * self.delay_s)
     }
 
-    /// Distance that the neighbour flies until it has stopped.
+    /// Distance that the neighbour may fly until it has stopped, with `ahead_s` more seconds of
+    /// flight, metres.
     #[inline]
     fn distance_until_stop_m(&self, bounds: &MotionBounds, ahead_s: f32) -> f32 {
         if self.rests_within_m > 0.0 {
             return self.rests_within_m;
         }
-        // The neighbour may have begun to speed up since it was heard.
+        // The neighbour may have begun to accelerate since it was heard.
         let gained_mps = bounds.braking.accel_mps2 * (self.data_age_s() + REACTION_S);
         let most_mps = self.speed_mps.max(bounds.speed_max_mps);
         let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
@@ -333,12 +347,12 @@ impl NeighbourMotion<'_> {
         0.5 * bounds.braking.accel_mps2 * self.data_age_s() * self.data_age_s()
     }
 
-    /// Set of places where the neighbour can be; with `ahead_s` also where its points lead it in so
-    /// much time.
+    /// Set of places where the neighbour can be until it has stopped; along its points also where
+    /// it can be within `ahead_s` more seconds.
     pub fn reachable_set(&self, bounds: &MotionBounds, ahead_s: f32) -> ReachableSet {
         let mut set = ReachableSet::at(self.position);
         if self.grounded {
-            // Its height on the ground may be unknown.
+            // A column too, since the height of the ground may be unknown.
             set.add_column(self.column_to_m);
             return set;
         }

@@ -1,22 +1,22 @@
-//! Conflict-free schedules: which vehicle passes first where two paths come close.
+//! Conflict-free schedules: which vehicle flies first where two paths come close.
 //!
-//! A flight is cut into timed segments of at most [`MAX_TIMED_SEGMENT_M`] metres, from the pad over
-//! the path to the ground below the goal. Vehicles are scheduled one after the other (prioritised
-//! planning, Erdmann and Lozano-Pérez 1987); each waits on its pad for the smallest delay that
-//! keeps its segments out of reach of those already scheduled at that time. Waiting on the pad
-//! always suffices when each path avoids the pads and landing places of the others (a "well-formed"
-//! problem, Čáp et al. 2015).
+//! A flight is cut into timed segments of at most [`MAX_TIMED_SEGMENT_M`] metres, from the pad
+//! along the path to the ground below the goal. Vehicles are scheduled one after the other
+//! (prioritised planning, Erdmann and Lozano-Pérez 1987). Each waits on its pad for the shortest
+//! time after which its segments are never too near to those that vehicles scheduled before it hold
+//! at the same time. Waiting on the pad always suffices if each path keeps away from the pads and
+//! landing places of the others (a "well-formed" problem, Čáp et al. 2015).
 //!
 //! In flight only the *order* of the schedule counts. For each pair of conflicting segments the
-//! later vehicle gets a
-//! [`Gate`]: it enters its segment once the earlier one has left its own. Why this keeps vehicles apart and lets all of them
-//! arrive is in `docs/schedule.md`, claim by claim.
+//! later vehicle gets a [`Gate`]: it enters its segment only when the earlier one has left its own.
+//! Claim by claim, `docs/schedule.md` proves that this keeps vehicles apart and lets all of them
+//! arrive.
 //!
-//! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or
-//! step aside on its way.
+//! Where no wait on the pad helps, as for two vehicles head-on in a corridor, [`sipp`] lets the
+//! vehicle wait or step aside on its way.
 //!
-//! Cost: segments of one path × segments of all others, each a distance between two lines behind a
-//! cheap bound.
+//! Cost: segments of one path × segments of all others. Most pairs are ruled out by a cheap bound,
+//! the others take a distance between two lines.
 
 mod blocks;
 mod config;
@@ -38,34 +38,34 @@ use self::pieces::{TimedSegment, cut_into_segments, is_conflict};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use crate::sort;
 
-/// Most forbidden intervals kept apart while a delay is sought; more of them are merged, which only
-/// forbids more.
+/// Most forbidden intervals that are kept apart during the search for a take-off time. More are
+/// merged with the nearest, which only forbids more.
 const MAX_INTERVALS: usize = 128;
-/// Least height above its pad at which a vehicle has left the pad, metres.
+/// Height above its pad from which a vehicle counts as having left the pad, metres.
 const OFF_PAD_M: f32 = 0.02;
 
-/// Scratch of [`earliest_departure`] and [`gates`].
+/// Memory of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
 pub struct ScheduleWorkspace {
     own: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     other: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
-    /// Blocks of `own`.
+    /// The segments of `own`, in blocks.
     blocks: Blocks,
     forbidden: Forbidden,
 }
 
 impl ScheduleWorkspace {
-    /// Creates it empty.
+    /// Creates an empty workspace.
     pub const fn new() -> Self {
         Self { own: Vec::new(), other: Vec::new(), blocks: Blocks::new(), forbidden: Vec::new() }
     }
 }
 
-/// Intervals of time that do not overlap.
+/// Forbidden intervals of take-off times, seconds, which do not overlap.
 type Forbidden = Vec<(f32, f32), MAX_INTERVALS>;
 
 fn add_forbidden_interval(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
-    // Swallow what overlaps; when full, swallow the nearest as well.
+    // Merged with all that overlap; if there is no room, with the nearest as well.
     while let Some(i) = forbidden.iter().position(|&(l, h)| l <= high && low <= h) {
         let (l, h) = forbidden.swap_remove(i);
         (low, high) = (fminf(low, l), fmaxf(high, h));
@@ -81,8 +81,9 @@ fn add_forbidden_interval(forbidden: &mut Forbidden, mut low: f32, mut high: f32
     }
 }
 
-/// The smallest take-off time ≥ `not_before_s` at which `flight`, labelled, keeps clear of every
-/// flight in `scheduled`, seconds. A place is free as soon as its vehicle has left it.
+/// The earliest take-off time ≥ `not_before_s`, seconds, at which `flight`, whose waypoints have
+/// their times, has no conflict with any flight in `scheduled`. A place counts as free as soon as
+/// its vehicle has left it.
 pub fn earliest_departure<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -93,7 +94,8 @@ pub fn earliest_departure<'a, const W: usize>(
     departure_with_handover(cfg, flight, (not_before_s, 0.0), scheduled, ws)
 }
 
-/// As [`earliest_departure`], but a place is free only `handover_s` after its vehicle has left it.
+/// As [`earliest_departure`], but a place counts as free only `handover_s` after its vehicle has
+/// left it. `times` are `(not_before_s, handover_s)`.
 pub(crate) fn departure_with_handover<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -104,9 +106,9 @@ pub(crate) fn departure_with_handover<'a, const W: usize>(
     departure_and_conflicts(cfg, flight, times, &mut scheduled, ws, &mut |_, _| {})
 }
 
-/// As [`departure_with_handover`]. `met` is called for each of `scheduled`, by its place among
-/// them, with the numbers of timed segments of `flight` and of that one that are in conflict with
-/// the other's: neither has more gates for the other.
+/// As [`departure_with_handover`]. Calls `met` for each flight of `scheduled`, with its index and
+/// two counts: the timed segments of `flight` in conflict with it, and its timed segments in
+/// conflict with `flight`. Neither vehicle has more gates for the other than its count.
 #[inline(never)]
 pub(crate) fn departure_and_conflicts<const W: usize>(
     cfg: &ScheduleConfig,
@@ -133,7 +135,8 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
                     let mut meets = false;
                     let near = near_own.iter().map(|&i| (usize::from(i), &own[usize::from(i)]));
                     for (i, p) in near.filter(|(_, p)| is_conflict(cfg, p, q)) {
-                        // Held together iff p.from + d < q.to and q.from < p.to + d.
+                        // Both segments are held at once iff p.from + d < q.to and q.from < p.to +
+                        // d, for a take-off at d.
                         let from_s = other.depart_s + q.from_s - handover_s - p.to_s;
                         let to_s = other.depart_s + q.to_s + handover_s - p.from_s;
                         add_forbidden_interval(forbidden, from_s, to_s);
@@ -149,7 +152,7 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
                     compare(&block);
                     block.clear();
                 }
-                // Cannot overflow: it was emptied.
+                // Cannot overflow: a full block was emptied.
                 let _ = block.push(segment);
             });
             compare(&block);
@@ -159,9 +162,9 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
     first_allowed(forbidden, not_before_s).ok_or(ScheduleError::Blocked)
 }
 
-/// The differences of take-off times, of `a` after `b`, between which the two flights may meet: one
-/// interval, seconds; the first end is the greater one where they never meet. A place is free
-/// `handover_s` after its vehicle has left it.
+/// The interval of differences in take-off time, `a` minus `b`, outside which the two flights have
+/// no conflict, seconds. Its first end is the greater one if they never have. A place counts as
+/// free `handover_s` after its vehicle has left it.
 pub(crate) fn forbidden_differences<const W: usize>(
     cfg: &ScheduleConfig,
     a: &Flight<W>,
@@ -174,7 +177,7 @@ pub(crate) fn forbidden_differences<const W: usize>(
     let (mut from_s, mut to_s) = (f32::INFINITY, f32::NEG_INFINITY);
     for q in &ws.other {
         for p in &ws.own {
-            // A segment that widens no interval need not be compared.
+            // A pair of segments that would not widen the interval need not be compared.
             let (low, high) = (q.from_s - handover_s - p.to_s, q.to_s + handover_s - p.from_s);
             if (low < from_s || high > to_s) && is_conflict(cfg, p, q) {
                 (from_s, to_s) = (fminf(from_s, low), fmaxf(to_s, high));
@@ -184,10 +187,10 @@ pub(crate) fn forbidden_differences<const W: usize>(
     Ok((from_s, to_s))
 }
 
-/// The smallest time ≥ `from_s` outside all of the intervals; `None` if there is none.
+/// The earliest time ≥ `from_s` outside all forbidden intervals; `None` if there is none.
 fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
     let mut time_s = from_s;
-    // Intervals are disjoint, so each can move the time once.
+    // Intervals do not overlap, so each moves the time at most once.
     for _ in 0..=forbidden.len() {
         match forbidden.iter().find(|&&(low, high)| low < time_s && time_s < high) {
             Some(&(_, f32::INFINITY)) => return None,
@@ -198,7 +201,7 @@ fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
     None
 }
 
-/// The largest time ≤ `until_s` outside all of the intervals.
+/// The latest time ≤ `until_s` outside all forbidden intervals.
 fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
     let mut time_s = until_s;
     for _ in 0..=forbidden.len() {
@@ -210,12 +213,13 @@ fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
     time_s
 }
 
-/// The progress at which a vehicle counts as out of a timed segment, metres.
+/// The reported progress from which a vehicle counts as having left timed segment `q`, metres.
 ///
-/// It may have to wait where the segment ends, for a vehicle that it would block if that still
-/// counted as inside. The next segment begins there and is either in conflict too, and then counts
-/// by itself, or clear, and then so is the place between them. A vehicle has left its pad when it
-/// is off it, however low its climb ends, and its descent when it stands on the ground.
+/// Where the segment ends the vehicle may have to wait at a gate, for a vehicle that waits until
+/// this segment is left. So what a standing vehicle may report too little is subtracted. The next
+/// segment begins at that place: it is in conflict too and counts by itself, or it is clear, and
+/// then so is the place. A vehicle has left its pad when it is above it by [`OFF_PAD_M`], however
+/// low its climb ends, and its descent when it stands on the ground.
 fn cleared_at_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     if q.to_m < flight.path.length_m() + flight.descent_m {
         fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_M - flight.climb_m)
@@ -224,12 +228,13 @@ fn cleared_at_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     }
 }
 
-/// Where flight `index` waits for the others, in the order along its path. A gate that an earlier
-/// one for the same vehicle implies is left out.
+/// The gates of flight `index` for all other flights, in order along its path. A gate that an
+/// earlier one for the same vehicle implies is left out.
 ///
-/// More than `G` are made fewer: a gate then stands for those that follow within 4, 8 or 16 m of it
-/// (`GATE_MERGE_M`), or for all behind it. Only gates are merged that the schedule has open by the
-/// time of the first, so the order of labels stays as it is.
+/// If there are more than `G`, gates for one vehicle are merged: one gate then stands for those
+/// that follow within 4, 8 or 16 m of it (`GATE_MERGE_M`), or for all that follow. Only gates are
+/// merged that are open in the schedule by the time the vehicle passes the first, so the order of
+/// times is kept.
 pub fn gates<const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -245,8 +250,8 @@ pub fn gates<const W: usize, const G: usize>(
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
-/// Distance within which gates of flight `index` have to be merged so that at most `most` remain,
-/// metres.
+/// The distance along its path within which the gates of flight `index` have to be merged so that
+/// at most `most` remain, metres: the first of `GATE_MERGE_M` that suffices.
 pub(crate) fn gate_merge_distance_m<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -266,12 +271,12 @@ pub(crate) fn gate_merge_distance_m<const W: usize>(
     Err(ScheduleError::GatesFull)
 }
 
-/// Distances along the path within which gates for one vehicle are merged, metres: the first
-/// distance that leaves few enough gates is taken.
+/// Distances along the path within which gates for one vehicle are merged, metres: the first that
+/// leaves few enough gates is used.
 const GATE_MERGE_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
 
-/// For each block of `ws.own` the blocks of `ws.other` that may come too near; `None` where none
-/// does.
+/// For each block of `ws.own` the blocks of `ws.other` that may be in conflict with it, a bit each;
+/// `None` if there are none.
 #[inline(never)]
 fn conflicting_blocks(ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
     let mut near = [0; MAX_BLOCKS];
@@ -285,7 +290,8 @@ fn conflicting_blocks(ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
     some.then_some(near)
 }
 
-/// The gates of the flight in `ws.own`, one other vehicle after the other.
+/// Passes the gates of flight `index`, whose segments are in `ws.own`, to `found`, one other
+/// vehicle after the other.
 fn for_each_gate<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -294,8 +300,8 @@ fn for_each_gate<const W: usize>(
     ws: &mut ScheduleWorkspace,
     mut found: impl FnMut(Gate),
 ) -> Result<(), ScheduleError> {
-    // The vehicle hovers where the segment before ends and the one after begins, so those conflict
-    // wherever a hover does.
+    // Hovers are left out: the segment that ends at a hover and the one that begins there conflict
+    // wherever the hover does.
     let moves = |piece: &&TimedSegment| piece.parked || piece.to_m > piece.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
@@ -304,7 +310,7 @@ fn for_each_gate<const W: usize>(
         }
         cut_into_segments(cfg, other, &mut ws.other)?;
         let Some(near) = conflicting_blocks(ws) else { continue };
-        // The gate found last, and when it is passed.
+        // The gate found last, and when this vehicle passes it in the schedule.
         let mut last: Option<(Gate, f32)> = None;
         let mut highest = f32::NEG_INFINITY;
         let own = ws.own.iter().enumerate().map(|(i, p)| (near[i / SEGMENTS_PER_BLOCK], p));

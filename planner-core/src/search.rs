@@ -1,17 +1,18 @@
-//! Shortest paths on a roadmap: A* for one pair, one Dijkstra row for a vehicle's costs to many
-//! goals.
+//! Shortest paths on a roadmap: A* from one node to another, and the path lengths from one node to
+//! many goals (a row of the cost matrix).
 //!
-//! Source: P3D §3.3 (A* per pair, cost matrix for the allocation); the heuristic is the greater of
-//! the straight distance and what the roadmap's landmarks tell, both admissible and consistent: an
-//! edge is as long as the straight line between its nodes, and no way to a landmark differs between
-//! its ends by more. Blocked edges only lengthen ways. Metres, f32. Cost O(half-edges + nodes · log
-//! nodes), each node settled once; memory is the caller's [`SearchWorkspace`].
+//! Source: P3D §3.3 (A* per pair, cost matrix for the assignment). The heuristic is the greater of
+//! the straight-line distance and the bound from the roadmap's landmarks. Both are admissible and
+//! consistent: an edge is as long as the straight line between its nodes, and the distances of its
+//! two nodes to a landmark differ by no more than its length. Blocked edges only make paths longer.
+//! Metres, f32. Cost O(half-edges + nodes · log nodes), each node settled once; memory is the
+//! caller's [`SearchWorkspace`].
 //!
-//! Edge lengths are not stored but follow from the nodes. Most half-edges never need theirs: the
-//! target is settled or already reached too cheaply for any edge of that squared length, so a
-//! square root is taken only when it may change a distance. A host that searches often keeps the
-//! lengths at hand ([`RoadmapWithLengths`]). Ties go to the lower node index, so the same roadmap
-//! gives the same path everywhere.
+//! Edge lengths are not stored but computed from the nodes. Most half-edges need no length: the
+//! target is settled, or its distance is already too small for the squared length of this edge to
+//! improve it. So a square root is taken only where it may change a distance. A host that searches
+//! often keeps the lengths in memory ([`RoadmapWithLengths`]). Ties go to the lower node index, so
+//! the same roadmap gives the same path on every machine.
 
 use heapless::Vec;
 
@@ -21,31 +22,33 @@ use crate::roadmap::{HalfEdge, RoadmapView, target_of};
 pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
-/// Half-edges compared together; a node rarely has more.
+/// Half-edges that are compared in one call of [`Graph::find_improvements`]; a node rarely has
+/// more.
 const HALF_EDGE_CHUNK: usize = 64;
-/// Places in a chunk; as long as a `u8` can count, so that no index needs a check.
+/// Indices into a chunk of half-edges. 256 entries, so that a `u8` index needs no bounds check.
 type Improvements = [u8; 256];
 
-/// Most targets for which the search is guided (A*) to each target in turn: a board's 32 vehicles.
+/// Most targets for which [`search`] runs A* to each target in turn, not Dijkstra: a board's 32
+/// vehicles.
 const MAX_GUIDED_TARGETS: usize = 32;
 
 /// Reason why a search has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchError {
-    /// No passable way joins the two nodes.
+    /// No path over passable edges joins the two nodes.
     NoPath,
     /// The path has more nodes than the output holds.
     PathTooLong,
-    /// A node index is not in the roadmap.
+    /// The roadmap has no node with this index.
     BadNode(u16),
-    /// The roadmap has more nodes than the workspace.
+    /// The workspace holds fewer nodes, or half-edge lengths, than the roadmap has.
     WorkspaceTooSmall,
-    /// The output slice is not as long as the targets.
+    /// The output slice is not as long as the number of results.
     OutputLength,
 }
 
-/// Scratch memory for roadmaps of up to `N` nodes: 16 bytes a node. All-zero when new, so a static
-/// costs .bss only.
+/// Memory of a search on roadmaps of up to `N` nodes: 16 bytes per node. All-zero when new, so a
+/// static of it takes .bss only.
 pub struct SearchWorkspace<const N: usize> {
     distance: [f32; N],
     parent: [u16; N],
@@ -53,14 +56,14 @@ pub struct SearchWorkspace<const N: usize> {
 }
 
 impl<const N: usize> SearchWorkspace<N> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         assert!(N <= u16::MAX as usize, "node indices are 16 bits");
         Self { distance: [0.0; N], parent: [0; N], heap: Heap::new() }
     }
 
-    /// Length in metres of the shortest way from the last search's source to `node`; infinite if it
-    /// was not settled.
+    /// Length in metres of the shortest path from the last search's source to `node`; infinite if
+    /// the search did not settle `node`.
     pub fn distance_m(&self, node: u16) -> f32 {
         match self.distance.get(usize::from(node)) {
             Some(&distance) if self.heap.entry_index(node) == SETTLED => distance,
@@ -68,8 +71,9 @@ impl<const N: usize> SearchWorkspace<N> {
         }
     }
 
-    /// Writes the nodes from the last search's source to `node`, both included. Only the parents
-    /// are read, so a path may be taken out for every target of a [`dijkstra_row`].
+    /// Writes the nodes of the shortest path from the last search's source to `node`, both
+    /// included. Only reads the search's parents, so it may be called for every target of a
+    /// [`dijkstra_row`].
     pub fn path_to<const P: usize>(
         &self,
         node: u16,
@@ -99,21 +103,22 @@ impl<const N: usize> Default for SearchWorkspace<N> {
     }
 }
 
-/// A roadmap to search: as it lies in flash ([`RoadmapView`]), or with its edge lengths at hand
-/// ([`RoadmapWithLengths`]). Both give the same paths and lengths, bit for bit.
+/// A roadmap that can be searched: as it lies in flash ([`RoadmapView`]), or with its edge lengths
+/// in memory ([`RoadmapWithLengths`]). Both give the same paths and lengths, bit for bit.
 pub trait Graph {
-    /// The roadmap.
+    /// The roadmap itself.
     fn view(&self) -> &RoadmapView<'_>;
 
-    /// Length in metres of half-edge `k`, which leads from `here` to `target`.
+    /// Length in metres of half-edge `k`, which leads from a node at `here` to node `target`.
     fn length(&self, k: usize, here: &Point, target: u16) -> f32;
 
-    /// Which of these half-edges may shorten the way to their targets, `reached` being the way to
-    /// `here`: their places in `half_edges` go to `out`, their number is returned. `first` is the
-    /// index of the first. None that does is left out.
+    /// Finds the half-edges that may shorten the path to their targets, where `reached` is the
+    /// length of the path to `here`. Writes their indices within `half_edges` to `out` and returns
+    /// their number. `first` is the index of `half_edges[0]` in the file. May include some that do
+    /// not shorten a path, never leaves out one that does.
     ///
-    /// Most do not: the target is settled, or reached more cheaply. They are distinguished by
-    /// selects, since which they are cannot be predicted.
+    /// Most do not: the target is settled, or has a shorter path. Written without branches, which
+    /// could not be predicted.
     fn find_improvements<const N: usize>(
         &self,
         first: usize,
@@ -145,9 +150,9 @@ impl Graph for RoadmapView<'_> {
         distance: &[f32; N],
         out: &mut Improvements,
     ) -> usize {
-        // A little more room than there is, so that rounding never hides a gain: the exact
-        // comparison comes later. 1e-6 is eight times the rounding of the three products.
-        /// Factor by which rounding may raise a lower bound of the distance to the target.
+        // The bound is raised a little, so that rounding hides no improvement; the exact comparison
+        // follows in [`relax_edges`]. 1e-6 is eight times the rounding of the three products.
+        /// Factor on the squared length up to which an edge counts as an improvement.
         const BOUND_ROUNDING: f32 = 1.0 + 1e-6;
         let mut count = 0_u8;
         for (place, half_edge) in half_edges.iter().enumerate() {
@@ -161,8 +166,8 @@ impl Graph for RoadmapView<'_> {
     }
 }
 
-/// A roadmap with the lengths of its half-edges in memory, 4 bytes each: for hosts, where many
-/// searches follow.
+/// A roadmap with the lengths of its half-edges in memory, 4 bytes each: for hosts that run many
+/// searches on it.
 #[derive(Clone, Copy, Debug)]
 pub struct RoadmapWithLengths<'a> {
     view: RoadmapView<'a>,
@@ -170,7 +175,7 @@ pub struct RoadmapWithLengths<'a> {
 }
 
 impl<'a> RoadmapWithLengths<'a> {
-    /// Fills `lengths`, which holds one number for each half-edge or more.
+    /// Computes all lengths into `lengths`, which must have at least one entry per half-edge.
     pub fn new(view: RoadmapView<'a>, lengths: &'a mut [f32]) -> Result<Self, SearchError> {
         let lengths =
             lengths.get_mut(..view.half_edge_count()).ok_or(SearchError::WorkspaceTooSmall)?;
@@ -215,11 +220,11 @@ impl Graph for RoadmapWithLengths<'_> {
     }
 }
 
-/// The shortest passable path from `from` to `to`. Returns its length in metres and leaves its
-/// nodes, ends included, in `out_nodes`.
+/// The shortest path from `from` to `to` over passable edges. Returns its length in metres and
+/// writes its nodes, both ends included, to `out_nodes`.
 ///
-/// `passable(node, edge)` says whether `edge` may be flown out of `node`: size by clearance,
-/// blocked nodes and edges.
+/// `passable(node, edge)` returns whether the vehicle may fly `edge` from `node`: enough clearance,
+/// and neither node nor edge blocked.
 pub fn astar<const N: usize, const P: usize>(
     graph: &impl Graph,
     from: u16,
@@ -234,8 +239,8 @@ pub fn astar<const N: usize, const P: usize>(
     Ok(ws.distance_m(to))
 }
 
-/// The shortest passable paths from `from` to every node that can be reached:
-/// [`SearchWorkspace::distance_m`] and [`SearchWorkspace::path_to`] tell them.
+/// Shortest paths over passable edges from `from` to every node that can be reached. Their results
+/// are read with [`SearchWorkspace::distance_m`] and [`SearchWorkspace::path_to`].
 pub fn dijkstra_all<const N: usize>(
     graph: &impl Graph,
     from: u16,
@@ -250,12 +255,13 @@ pub fn dijkstra_all<const N: usize>(
     Ok(())
 }
 
-/// Lengths in metres of the shortest passable paths from `from` to each of `targets`, into `out`;
-/// infinite where there is none. One row of the cost matrix; stops when all targets are settled.
+/// Writes the lengths in metres of the shortest passable paths from `from` to each of `targets` to
+/// `out`; infinite where there is none. One row of the cost matrix; stops when all targets are
+/// settled.
 ///
-/// For few targets the search is drawn to them one after another: what A* settled for one target
-/// stays settled, its distance is final, and only the waiting nodes are ordered again for the next.
-/// For many it is Dijkstra's.
+/// For up to 32 targets it is an A* to each target in turn: nodes settled for one target stay
+/// settled, since their distances are final, and only the heap is reordered by the heuristic of the
+/// next. For more it is Dijkstra's algorithm.
 pub fn dijkstra_row<const N: usize>(
     graph: &impl Graph,
     from: u16,
@@ -274,7 +280,7 @@ pub fn dijkstra_row<const N: usize>(
     Ok(())
 }
 
-/// Settles every node that can be reached from `from` over any edge.
+/// Dijkstra over all edges: settles every node that can be reached from `from`.
 pub(crate) fn shortest_path_tree<const N: usize>(
     view: &RoadmapView<'_>,
     from: u16,
@@ -288,12 +294,12 @@ pub(crate) fn shortest_path_tree<const N: usize>(
     Ok(())
 }
 
-/// The cost matrix of an allocation: lengths in metres of the shortest passable paths from each of
+/// The cost matrix of an assignment: lengths in metres of the shortest passable paths from each of
 /// `starts` to each of `goals`, row-major into `out`; infinite where there is none.
 ///
-/// Searched from the starts or, against the direction of flight, from the goals, whichever is
-/// likely less work: a search drawn to targets that lie close together settles few nodes beside
-/// those on the way. `passable` is always asked about the direction of flight.
+/// Searches from the starts or, backwards, from the goals, whichever is likely less work: an A* to
+/// targets that lie close together settles few nodes off the paths. `passable` is always called
+/// with the direction of flight.
 pub fn cost_matrix<const N: usize>(
     graph: &impl Graph,
     starts: &[u16],
@@ -334,7 +340,7 @@ pub fn cost_matrix<const N: usize>(
     Ok(())
 }
 
-/// Centre and diagonal of the box around some nodes.
+/// Centre and diagonal of the bounding box of some nodes, metres.
 fn bounding_box(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
     let corners = nodes.iter().map(|&node| view.node(node));
@@ -342,8 +348,8 @@ fn bounding_box(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     ((low + high) / 2.0, fpu::sqrtf((high - low).norm_squared()))
 }
 
-/// Index of the values of a half-edge's target. No target of a checked roadmap is beyond `N`; where
-/// `N` is a power of two the compiler sees it too and leaves out the check.
+/// Index of a half-edge's target in the search's arrays. No target of a checked roadmap is `N` or
+/// more; where `N` is a power of two the mask lets the compiler leave out the bounds check.
 #[inline(always)]
 fn target_index<const N: usize>(half_edge: &[u8; 4]) -> usize {
     let target = u32::from_le_bytes(*half_edge) as usize & 0xffff;
@@ -354,7 +360,8 @@ fn check_node(view: &RoadmapView<'_>, node: u16) -> Result<(), SearchError> {
     if usize::from(node) < view.node_count() { Ok(()) } else { Err(SearchError::BadNode(node)) }
 }
 
-/// Settles nodes until all of `targets` are settled or none is left to settle.
+/// Settles nodes until all of `targets` are settled or the heap is empty. A* to each target in
+/// turn, or Dijkstra for more than [`MAX_GUIDED_TARGETS`].
 fn search<const N: usize>(
     graph: &impl Graph,
     from: u16,
@@ -392,7 +399,7 @@ fn search<const N: usize>(
     Ok(())
 }
 
-/// Empties the workspace but for `from`.
+/// Resets the workspace to a search of which only `from` is reached, at distance 0.
 fn start_search<const N: usize>(
     view: &RoadmapView<'_>,
     from: u16,
@@ -411,7 +418,8 @@ fn start_search<const N: usize>(
     Ok(())
 }
 
-/// Offers the settled `node`'s edges to its neighbours.
+/// Relaxes the edges of the settled `node`: a neighbour that is reached by a shorter path gets
+/// `node` as its parent and goes into the heap.
 #[inline]
 fn relax_edges<const N: usize>(
     graph: &impl Graph,

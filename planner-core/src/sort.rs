@@ -1,21 +1,21 @@
 //! Sorting in place, in little code: the standard library's sort takes some 9 kB of a board's flash
 //! for each type and order.
 //!
-//! Heapsort (Williams 1964). Not stable: where two elements may compare equal and still differ, the
-//! order says which is first, or it does not matter. n log n comparisons, and as many again to
-//! build the heap.
+//! Heapsort (Williams 1964). Not stable: where two different elements may compare equal, the
+//! caller's order has to break the tie, unless either order will do. At most 2 n log n comparisons,
+//! and as many as 2 n more to build the heap.
 
 use core::cmp::Ordering;
 
-/// Sorts by an order, the least first.
-// Apart: callers are large, and what is inlined into them is there as often as they are.
+/// Sorts in place by `order`, the least element first.
+// Not inlined: callers are large, and every caller would hold a copy.
 #[inline(never)]
 pub(crate) fn sort_by<T>(items: &mut [T], mut order: impl FnMut(&T, &T) -> Ordering) {
     let mut len = items.len();
     let mut root = len / 2;
     while len > 1 {
         if root > 0 {
-            // The heap grows from its end to the front.
+            // The heap is built from its last parent to its root.
             root -= 1;
         } else {
             len -= 1;

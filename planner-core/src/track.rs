@@ -1,13 +1,12 @@
-//! The reference point that moves along a path.
+//! The reference: a point that moves along the path ahead of the vehicle.
 //!
-//! The reference is what the autopilot is sent: it runs along the path no faster than corners,
-//! walls and other vehicles allow, and waits for a vehicle that lags. A corner of angle θ taken at
-//! speed v asks the vehicle for a sudden change of velocity Δv = 2·v·sin(θ/2). A velocity loop that
-//! answers within the time τ sweeps Δv·τ beside the path until it has made up for it, so v = e /
+//! Setpoints for the autopilot are made from the reference. It moves along the path no faster than
+//! corners, walls and other vehicles allow, and waits for a vehicle that lags. A corner of angle θ
+//! at speed v asks the vehicle for a sudden change of velocity Δv = 2·v·sin(θ/2). A velocity loop
+//! with response time τ lets it stray Δv·τ from the path until it has caught up. So v = e /
 //! (τ·2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs
-//! leaves. Between corners the acceleration goes along as feed-forward, so that braking is followed
-//! without a lag. (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre
-//! away.)
+//! allows. Between corners the acceleration is sent as feed-forward, so that the vehicle brakes
+//! without lag. (P2D §4 reports collisions where a waypoint counted as reached from a metre away.)
 
 use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
@@ -16,39 +15,40 @@ use crate::deconflict::Advice;
 use crate::flight::{Path, Waypoint};
 use crate::{ConfigError, Point, all_positive};
 
-/// Tunables of [`advance`].
+/// Limits of speed, acceleration and deviation for [`advance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackConfig {
-    /// Nominal speed, m/s.
+    /// Nominal speed along the path, m/s.
     pub cruise_mps: f32,
-    /// Greatest speed upwards on a slanted leg, m/s.
+    /// Greatest vertical speed upwards on a sloping leg, m/s.
     pub climb_mps: f32,
-    /// Nominal speed downwards, m/s.
+    /// Greatest vertical speed downwards on a sloping leg, m/s.
     pub descend_mps: f32,
-    /// Acceleration and braking across, m/s².
+    /// Horizontal acceleration and braking, m/s².
     pub accel_mps2: f32,
-    /// Acceleration upwards and downwards, m/s².
+    /// Vertical acceleration and braking, m/s².
     pub accel_z_mps2: f32,
-    /// Time in which the autopilot answers to a change of velocity in a corner, seconds. PX4's
-    /// velocity loop takes 0.55 s (`MPC_XY_VEL_P_ACC` = 1.8 1/s) for a sudden one; sent smoothly,
-    /// with its acceleration, it leaves less to make up for.
+    /// Response time of the autopilot to a change of velocity in a corner, seconds. PX4's velocity
+    /// loop takes 0.55 s (`MPC_XY_VEL_P_ACC` = 1.8 1/s) for a sudden change; for smooth setpoints
+    /// with their acceleration it is less.
     pub response_s: f32,
-    /// Body radius, metres: what of an edge's clearance is already taken.
+    /// Vehicle radius, metres: it is subtracted from an edge's clearance.
     pub radius_m: f32,
-    /// Smallest deviation to allow for where the clearance leaves less, metres: what the autopilot
-    /// achieves at a crawl.
+    /// Least deviation from the path that is assumed in a corner, metres, where the clearance
+    /// allows less: what the autopilot achieves at a crawl.
     pub deviation_min_m: f32,
-    /// Largest deviation to allow for in the open, metres.
+    /// Largest deviation from the path that a corner may cause, metres, where the clearance allows
+    /// more.
     pub deviation_max_m: f32,
-    /// The reference is to slow from half this distance ahead of the vehicle and stop at it,
-    /// metres; between walls it is four times the deviation allowed there, so that a vehicle that
-    /// lags does not cut the corner. In the open it grows with the speed.
+    /// Largest distance of the reference ahead of the vehicle, metres: the reference slows from
+    /// half of it and stops at it. Between walls it is four times the deviation allowed there, so
+    /// that a vehicle that lags does not cut the corner. In the open it grows with the speed.
     pub lead_max_m: f32,
 }
 
 impl TrackConfig {
-    /// Whether all are positive and finite, and the bounds of the deviation in their order; the
-    /// error names the first that is not.
+    /// Checks that all numbers are positive and finite, and `deviation_min_m` is at most
+    /// `deviation_max_m`; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         all_positive(&[
             ("cruise_mps", self.cruise_mps),
@@ -70,7 +70,7 @@ impl TrackConfig {
 }
 
 impl Default for TrackConfig {
-    /// A 2 m/s indoor vehicle of 0.3 m radius.
+    /// An indoor vehicle of 2 m/s and 0.3 m radius.
     fn default() -> Self {
         Self {
             cruise_mps: 2.0,
@@ -87,50 +87,51 @@ impl Default for TrackConfig {
     }
 }
 
-/// Place of the reference. All zero before the first waypoint.
+/// State of the reference on its path. All zero at the first waypoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracker {
-    /// Arc length of the reference, metres.
+    /// Arc length of the reference on its path, metres.
     pub along_m: f32,
-    /// Speed of the reference along the path, m/s; below zero it flies back.
+    /// Speed of the reference along the path, m/s; negative where it flies back.
     pub speed_mps: f32,
 }
 
-/// The moving reference: what the autopilot is asked to be at.
+/// The reference after a step: the point that the vehicle is to follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// Place, ENU metres.
+    /// Position of the reference, ENU metres in the mission frame.
     pub position: Point,
-    /// Arc length, metres.
+    /// Arc length of the position, metres.
     pub along_m: f32,
-    /// The vehicle may be this far behind, metres.
+    /// Greatest distance of the vehicle behind the reference that is allowed here, metres.
     pub lead_m: f32,
-    /// Whether the end of the path is reached.
+    /// Whether the reference has reached the end of the path.
     pub finished: bool,
 }
 
-/// Least lead of the reference ahead of the vehicle, metres: the distance by which an autopilot
-/// lags at walking speed.
+/// Least value of [`Reference::lead_m`], metres: an autopilot's lag at walking speed.
 const MIN_LEAD_M: f32 = 0.4;
-/// Further lead in the open for speed above [`WALKING_SPEED_MPS`], as seconds of flight: the time
-/// by which setpoint, response and report are late, and twice that before the reference slows.
+/// Additional lead in the open per m/s above [`WALKING_SPEED_MPS`], seconds: twice the delay of
+/// setpoint, response and report together, since the reference slows from half the lead.
 const LEAD_S: f32 = 0.8;
 /// Walking speed, m/s: at this speed [`MIN_LEAD_M`] covers an autopilot's lag.
 const WALKING_SPEED_MPS: f32 = 2.0;
-/// A path is flown once the reference is this near its end, metres.
+/// Distance from the end of the path at which the path counts as flown, metres.
 const PATH_END_M: f32 = 0.01;
 
-/// Half of the clearance a leg leaves beyond the body, within the configured bounds.
+/// Deviation from the path that a leg of this clearance allows: half of what the clearance leaves
+/// beyond the vehicle's radius, within the configured bounds, metres.
 fn allowed_deviation_m(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
 }
 
-/// Unit vector from one waypoint to the next.
+/// Unit vector along the path from one waypoint to the next.
 fn unit_direction(from: &Waypoint, to: &Waypoint) -> Point {
     (to.position - from.position) / (to.along_m - from.along_m)
 }
 
-/// Greatest speed and acceleration along a direction: neither axis exceeds its own.
+/// Greatest speed and acceleration along a direction, with which horizontal and vertical parts stay
+/// within their own limits.
 fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
     let up = direction.z;
     if fabsf(up) < 1e-3 {
@@ -143,37 +144,39 @@ fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
     (speed, fminf(accel, fmaxf(cfg.accel_mps2, cfg.accel_z_mps2)))
 }
 
-/// Square of the greatest speed through waypoint `i`, at which `before` and `after` meet. Squares:
-/// a board takes its square roots by software.
+/// Square of the greatest speed at a corner from unit direction `before` to `after`, m²/s². A
+/// square, so that no square root is needed: on a board it is slow.
 fn corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &Point) -> f32 {
     let change_sq = (after - before).norm_squared();
     let sweep = allowed_deviation_m(cfg, clearance_m) / cfg.response_s;
     fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
 }
 
-/// Greatest speed that can be braked to rest within `room / (2 · accel)` metres if braking begins
-/// after `later_s`.
+/// Greatest speed from which a vehicle can stop within `room / (2 · accel)` metres if it begins to
+/// brake after `later_s`, m/s.
 fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
     let lost = accel * later_s;
     sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
 }
 
-/// The path ahead of the reference.
+/// The part of the path ahead of the reference.
 struct PathAhead<'a> {
     points: &'a [Waypoint],
-    /// Index of the next waypoint.
+    /// Index of the next waypoint ahead.
     next: usize,
     along_m: f32,
-    /// Distance within which to stop, metres.
+    /// Distance from the reference within which it has to stop, metres.
     stop_m: f32,
-    /// Direction of the current leg.
+    /// Unit direction of the current leg.
     direction: Point,
-    /// Acceleration of the current leg, m/s².
+    /// Acceleration limit of the current leg, m/s².
     accel: f32,
 }
 
 impl PathAhead<'_> {
-    /// Squares of what can be braked from, summed up leg by leg: each has its acceleration.
+    /// Square of the greatest speed now from which the reference can brake for every corner ahead,
+    /// for the end of the path and for the stop that is required, m²/s². Summed leg by leg, since
+    /// each leg has its own acceleration limit.
     fn braking_sq(&self, cfg: &TrackConfig) -> f32 {
         let mut before = self.direction;
         let mut braking_sq = f32::INFINITY;
@@ -187,7 +190,7 @@ impl PathAhead<'_> {
             }
             room += 2.0 * leg_accel * (waypoint.along_m - from_m);
             if room >= enough {
-                // Beyond this there is room to stop before any corner.
+                // With this much room the vehicle can stop before any corner beyond.
                 break;
             }
             let corner_sq = match self.points.get(i + 1) {
@@ -208,11 +211,12 @@ impl PathAhead<'_> {
     }
 }
 
-/// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an
-/// empty path.
+/// Moves the reference by one step of `dt_s` (usually 0.01 to 0.2 s) and returns it; `None` if the
+/// path is empty.
 ///
-/// `advice` is what the neighbours leave. The speed changes by no more than the acceleration of the
-/// leg: a stop that is advised too late is overrun. Work: one pass over the waypoints.
+/// `advice` limits speed and distance because of neighbours. The speed changes by no more than the
+/// leg's acceleration limit allows: a stop that is advised too late is overrun. Work: one pass over
+/// the waypoints.
 pub fn advance<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
@@ -232,7 +236,7 @@ pub fn advance<const W: usize>(
     };
     let before = along_leg(leg);
     let (top_mps, accel) = limits_along(cfg, &before);
-    // NaN stops.
+    // A NaN scale stops the reference.
     let top_mps =
         if advice.speed_scale > 0.0 { top_mps * fminf(advice.speed_scale, 1.0) } else { 0.0 };
     let stop_m = if advice.stop_within_m > 0.0 { advice.stop_within_m } else { 0.0 };
@@ -240,13 +244,14 @@ pub fn advance<const W: usize>(
         PathAhead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
     let braking_sq = ahead.braking_sq(cfg);
     let speed_before = tracker.speed_mps;
-    // No faster than the leg's acceleration can brake from, beginning with the next step.
+    // No faster than the leg's acceleration can brake from, if braking begins with the next step.
     let most = fminf(top_mps, braking_speed(accel, braking_sq, dt_s));
     let change = accel * dt_s;
     tracker.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);
     let crawls = most < ABOUT_TO_STOP_MPS && tracker.speed_mps >= 0.0;
     tracker.along_m = fminf(fmaxf(tracker.along_m + tracker.speed_mps * dt_s, 0.0), length_m);
-    // The last centimetres of braking take many steps; within one the end counts as reached.
+    // The last centimetres of braking take many steps; within one centimetre the end counts as
+    // reached.
     if crawls && length_m - tracker.along_m < PATH_END_M && stop_m >= length_m - tracker.along_m {
         tracker.along_m = length_m;
         tracker.speed_mps = 0.0;
@@ -260,12 +265,12 @@ pub fn advance<const W: usize>(
     })
 }
 
-/// Greatest lead of the reference over the vehicle on a leg of this clearance at this speed of the
-/// reference, metres.
+/// Greatest distance of the vehicle behind the reference on a leg of this clearance, at this speed
+/// of the reference, metres.
 fn max_lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
     let deviation_m = allowed_deviation_m(cfg, clearance_m);
     let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, MIN_LEAD_M));
-    // Between walls a vehicle that lags may cut a corner, however fast it is.
+    // Between walls the lead does not grow with the speed: a vehicle that lags could cut a corner.
     let open = deviation_m >= cfg.deviation_max_m;
     if open { lead_m + LEAD_S * fmaxf(fabsf(speed_mps) - WALKING_SPEED_MPS, 0.0) } else { lead_m }
 }

@@ -1,62 +1,67 @@
-//! Bit-packed voxel map: one bit a cell, stored as bricks of 4 × 4 × 4 cells in one 64-bit word.
+//! Bit-packed voxel map: one bit per cell, stored as bricks of 4 × 4 × 4 cells, one 64-bit word
+//! each.
 //!
-//! A brick answers "is anything here?" with one load, so a query over empty space steps four cells
-//! at a time. The building at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell `(i, j, k)` covers the
-//! closed cube from `min + (i, j, k) · resolution` to `min + (i + 1, j + 1, k + 1) · resolution`.
+//! One load shows whether a brick holds any obstacle, so a query over empty space advances four
+//! cells at a time. The building at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell `(i, j, k)`
+//! covers the closed cube from `min + (i, j, k) · resolution` to
+//! `min + (i + 1, j + 1, k + 1) · resolution`.
 
 use crate::Point;
 
 /// Cells along one edge of a brick.
 pub const BRICK_CELLS: u32 = 4;
 
-/// Reason why a grid was refused.
+/// Reason why [`VoxelGrid::new`] refused a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridError {
-    /// A dimension is zero or beyond [`MAX_DIM`], or all together are more words than 32 bits can
+    /// A dimension is zero or above [`MAX_DIM`], or the grid needs more words than 32 bits can
     /// index.
     Dimensions,
-    /// The word slice is not [`GridShape::brick_count`] long.
+    /// The length of the word slice is not [`GridShape::brick_count`].
     WordCount,
-    /// The corner or the resolution is not finite, or the resolution is not positive.
+    /// The minimum corner or the resolution is not finite, or the resolution is not positive.
     NotFinite,
-    /// A bit beyond the last cell of an axis is set.
+    /// A bit is set for a cell beyond the last one of an axis: a padding bit of a brick at an upper
+    /// face.
     Padding,
 }
 
-/// The longest side of a grid, in cells.
+/// Most cells that a grid may have along one axis.
 pub const MAX_DIM: u32 = 1 << 15;
 
-/// Shape and place of a grid.
+/// Dimensions, position and resolution of a voxel grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridShape {
-    /// Cells along east, north, up.
+    /// Number of cells along east, north and up.
     pub dims: [u32; 3],
-    /// Minimum corner of cell (0, 0, 0), metres.
+    /// Minimum corner of cell (0, 0, 0) in the mission frame, metres.
     pub min: Point,
-    /// Edge of a cell, metres.
+    /// Edge length of a cell, metres.
     pub resolution_m: f32,
 }
 
 impl GridShape {
-    /// Bricks along each axis.
+    /// Number of bricks along each axis, the last one of which may be partly used.
     #[inline]
     pub fn bricks(&self) -> [u32; 3] {
         self.dims.map(|d| d.div_ceil(BRICK_CELLS))
     }
 
-    /// Number of bricks, and so of 64-bit words, that the grid needs; `usize::MAX` on overflow.
+    /// Number of bricks in the grid, which is the number of 64-bit words that it needs;
+    /// `usize::MAX` on overflow.
     pub fn brick_count(&self) -> usize {
         self.bricks().iter().fold(1, |count: usize, &b| count.saturating_mul(b as usize))
     }
 
-    /// Maximum corner, metres.
+    /// Maximum corner of the grid in the mission frame, metres.
     pub fn max(&self) -> Point {
         self.min
             + Point::new(self.dims[0] as f32, self.dims[1] as f32, self.dims[2] as f32)
                 * self.resolution_m
     }
 
-    /// The cell that holds `p` (its lower faces included), or `None` outside the grid or for NaN.
+    /// The cell that contains `p` (a cell includes its lower faces only), or `None` if `p` is
+    /// outside the grid or NaN.
     pub fn cell_of(&self, p: &Point) -> Option<[u32; 3]> {
         let mut cell = [0; 3];
         for axis in 0..3 {
@@ -69,14 +74,14 @@ impl GridShape {
         Some(cell)
     }
 
-    /// Centre of a cell, metres.
+    /// Centre of a cell in the mission frame, metres.
     pub fn center(&self, cell: [u32; 3]) -> Point {
         let half = |c: u32| (c as f32 + 0.5) * self.resolution_m;
         self.min + Point::new(half(cell[0]), half(cell[1]), half(cell[2]))
     }
 
-    /// Word index and bit mask of a cell inside the grid; of one outside the word is another one's
-    /// or none.
+    /// Word index and bit mask of a cell. For a cell outside the grid the word is that of another
+    /// cell, or an index beyond the words.
     #[inline]
     pub fn address(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
         let [bx, by, _] = self.bricks();
@@ -85,9 +90,11 @@ impl GridShape {
         (word, 1 << ((k % 4) * 16 + (j % 4) * 4 + i % 4))
     }
 
-    /// Whether no bit beyond the cells is set: it would be an obstacle that no cell has.
+    /// Whether all padding bits (bits of cells beyond the last of an axis) are clear. A set one
+    /// would be an obstacle in a cell that does not exist.
     fn padding_is_clear(&self, words: &[u64]) -> bool {
-        /// Masks of a brick's first cell layer, first two and first three, along each axis.
+        /// Masks, for each axis, of a brick's first layer of cells, its first two and its first
+        /// three.
         const BRICK_LAYER_MASKS: [[u64; 3]; 3] = [
             [0x1111_1111_1111_1111, 0x3333_3333_3333_3333, 0x7777_7777_7777_7777],
             [0x000f_000f_000f_000f, 0x00ff_00ff_00ff_00ff, 0x0fff_0fff_0fff_0fff],
@@ -109,7 +116,7 @@ impl GridShape {
     }
 
     fn check(&self) -> Result<(), GridError> {
-        // Words are indexed in 32 bits, on a board as on the desk.
+        // Words are indexed by 32 bits, on boards and on desktops.
         let countable = self.brick_count() < u32::MAX as usize;
         if self.dims.iter().any(|&d| d == 0 || d > MAX_DIM) || !countable {
             return Err(GridError::Dimensions);
@@ -119,16 +126,16 @@ impl GridShape {
     }
 }
 
-/// Content of the space beyond the grid's faces.
+/// Whether the space beyond the grid's faces counts as obstacle or as free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outside {
-    /// Space beyond the grid is an obstacle: the faces count for clearance.
+    /// Space beyond the grid is an obstacle: clearance is measured to the grid's faces too.
     Blocked,
-    /// Space beyond the grid is passable.
+    /// Space beyond the grid is free, and may be flown through.
     Free,
 }
 
-/// A voxel map over borrowed words; set bits are obstacles.
+/// A voxel map that borrows its words; a set bit is a cell with an obstacle.
 #[derive(Clone, Copy, Debug)]
 pub struct VoxelGrid<'a> {
     shape: GridShape,
@@ -137,7 +144,7 @@ pub struct VoxelGrid<'a> {
 }
 
 impl<'a> VoxelGrid<'a> {
-    /// Checks the shape against the words. Work: the bricks at the upper faces.
+    /// Checks shape, number of words and padding bits. Reads the bricks at the upper faces only.
     pub fn new(shape: GridShape, outside: Outside, words: &'a [u64]) -> Result<Self, GridError> {
         shape.check()?;
         if words.len() != shape.brick_count() {
@@ -149,25 +156,25 @@ impl<'a> VoxelGrid<'a> {
         Ok(Self { shape, outside, words })
     }
 
-    /// Shape and place.
+    /// Dimensions, position and resolution.
     #[inline]
     pub fn shape(&self) -> &GridShape {
         &self.shape
     }
 
-    /// Content of the space beyond the faces.
+    /// Whether the space beyond the faces is obstacle or free.
     #[inline]
     pub fn outside(&self) -> Outside {
         self.outside
     }
 
-    /// The bricks, x fastest, then y, then z.
+    /// The words, one per brick: x fastest, then y, then z.
     #[inline]
     pub fn words(&self) -> &'a [u64] {
         self.words
     }
 
-    /// Whether a cell is an obstacle; outside the grid as [`Outside`] says.
+    /// Whether a cell is an obstacle. A cell outside the grid is one with [`Outside::Blocked`].
     #[inline]
     pub fn is_occupied(&self, cell: [u32; 3]) -> bool {
         if (0..3).any(|axis| cell[axis] >= self.shape.dims[axis]) {
@@ -177,7 +184,8 @@ impl<'a> VoxelGrid<'a> {
         self.words[word] & mask != 0
     }
 
-    /// Whether the cell holding `p` is an obstacle; outside the grid as [`Outside`] says.
+    /// Whether the cell that contains `p` is an obstacle. A point outside the grid is in one with
+    /// [`Outside::Blocked`].
     pub fn is_blocked_at(&self, p: &Point) -> bool {
         match self.shape.cell_of(p) {
             Some(cell) => self.is_occupied(cell),

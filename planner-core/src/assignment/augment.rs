@@ -1,14 +1,15 @@
-//! Shortest augmenting paths: Dijkstra over the columns of a dense matrix, vectorised over all of
-//! them.
+//! Shortest augmenting paths: Dijkstra over the columns of a dense matrix, vectorised over all
+//! columns.
 //!
-//! A settled column is taken out of the running by moving its price to minus infinity and its
-//! distance to infinity, so the inner loop has no test for it: its reduced costs come out infinite.
-//! Both are kept aside and put back at the end.
+//! A settled column is excluded by setting its price to minus infinity and its distance to
+//! infinity. Its reduced costs are then infinite, so the inner loop needs no test for it. Price and
+//! distance are saved, and restored at the end of the search.
 
 use super::costs::CostMatrix;
 use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 
-/// Augments the matching from free row `k`. Returns false if no path leads to a free column.
+/// Augments the matching by the shortest path from free row `k`. Returns false if no path leads to
+/// a free column.
 pub(super) fn augment_from_row(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -35,15 +36,16 @@ pub(super) fn augment_from_free_rows(
     augment_shortest_path(costs, state, paths, least)
 }
 
-/// Settles columns from the distances of the sources, updates the prices and flips the path.
+/// Settles columns in the order of their distances until a free one is nearest; then updates the
+/// prices and flips the path to it. Returns false if no free column can be reached.
 fn augment_shortest_path(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
     mut least: f64,
 ) -> bool {
-    // Columns at one distance are settled together and wait in `settled[done..queued]`: integer
-    // costs have many.
+    // Columns at the same distance are settled together and wait in `settled[done..queued]`: with
+    // integer costs there are many.
     let (mut done, mut queued) = (0, 0);
     let mut next = least;
     let end = loop {
@@ -78,7 +80,8 @@ fn augment_shortest_path(
     end.map(|col| flip_augmenting_path(state, paths.previous, col)).is_some()
 }
 
-/// `distance = min(distance, cost - price - offset)` over all columns; returns the least distance.
+/// Sets `distance = min(distance, cost - price - offset)` for all columns, with `row` as
+/// predecessor where that is less; returns the least distance.
 fn relax_columns(
     line: &[f32],
     price: &[f64],
@@ -94,8 +97,8 @@ fn relax_columns(
     for (((line, price), distance), previous) in
         lines.iter().zip(prices).zip(distances).zip(previous)
     {
-        // Whole chunks in, whole chunks out, and selects within: so the compiler makes vectors of
-        // the lanes, and nothing is mispredicted.
+        // Whole chunks are loaded and stored, with selects in between: so the compiler vectorises
+        // the lanes, and no branch is mispredicted.
         let (mut nearest, mut through) = (*distance, [0.0; SIMD_LANES]);
         for lane in 0..SIMD_LANES {
             through[lane] = f64::from(line[lane]) - price[lane] - offset;
@@ -128,13 +131,14 @@ fn relax_columns(
 }
 
 enum NearestColumns {
-    /// A free column: the end of a path.
+    /// A free column at the least distance: the end of an augmenting path.
     Free(u16),
-    /// Number of taken columns that were queued.
+    /// No free column: the number of matched columns that were queued.
     Taken(usize),
 }
 
-/// The columns at distance `least`: a free one if there is any, else all of them into `queue`.
+/// The columns at distance `least`: one that is free if there is any, else all of them are written
+/// to `queue`.
 fn nearest_columns(
     distance: &[f64],
     row_of: &[u16],
@@ -167,7 +171,8 @@ fn nearest_columns(
     }
 }
 
-/// Assigns each column on the path to the row from which the search reached it.
+/// Matches each column on the path that ends at column `end` to the row from which the search
+/// reached it.
 fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u16) {
     let mut col = end;
     while col != UNASSIGNED {
@@ -178,15 +183,15 @@ fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u1
     }
 }
 
-/// Adds one pair by the path from any free row whose largest cost is least; returns that cost.
-/// `None` if no path is left.
+/// Adds one pair to the matching, by the path from any free row whose largest cost is least;
+/// returns that cost. `None` if there is no such path.
 pub(super) fn augment_bottleneck(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
 ) -> Option<f32> {
-    // The path to a settled column is final: its distance moves to infinity so that it is not
-    // chosen again, and `settled_price` keeps it from being reached again.
+    // The path to a settled column is final: its distance is set to infinity so that it is not
+    // chosen again, and its entry in `settled_price` to 1 so that it is not reached again.
     let done = &mut *paths.settled_price;
     done.fill(0.0);
     paths.distance.fill(f64::INFINITY);

@@ -1,24 +1,24 @@
-//! The cost matrix, checked.
+//! The checked cost matrix of an assignment.
 
 /// Reason why an assignment was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignmentError {
     /// The matrix has no rows or no columns.
     Empty,
-    /// The costs are not `rows · cols` long.
+    /// The number of costs is not `rows · cols`.
     Shape,
-    /// The output is not `rows` long.
+    /// The length of the output is not `rows`.
     OutputLength,
-    /// Rows or columns exceed the workspace.
+    /// There are more rows or columns than the workspace holds.
     WorkspaceTooSmall,
-    /// The cost at this place is NaN.
+    /// The cost at this row and column is NaN.
     NotANumber {
         /// Row of the cost.
         row: u16,
         /// Column of the cost.
         col: u16,
     },
-    /// The cost at this place is minus infinity.
+    /// The cost at this row and column is minus infinity.
     MinusInfinity {
         /// Row of the cost.
         row: u16,
@@ -27,7 +27,8 @@ pub enum AssignmentError {
     },
 }
 
-/// A checked cost matrix, seen so that `rows <= cols`. Costs above `limit` count as infinite.
+/// A checked cost matrix, transposed where necessary so that `rows <= cols`. Costs above `limit`
+/// count as infinite.
 pub(super) struct CostMatrix<'a> {
     pub(super) data: &'a [f32],
     pub(super) rows: usize,
@@ -44,7 +45,7 @@ impl<'a> CostMatrix<'a> {
         if rows.checked_mul(cols) != Some(data.len()) {
             return Err(AssignmentError::Shape);
         }
-        // One pass that vectorises; the place of the bad cost is only sought when there is one.
+        // One pass that vectorises; only if it finds an invalid cost is that cost searched for.
         let sound = data
             .chunks(64)
             .all(|chunk| chunk.iter().fold(true, |ok, &c| ok & (c > f32::NEG_INFINITY)));
@@ -69,8 +70,8 @@ impl<'a> CostMatrix<'a> {
         if cost <= self.limit { cost } else { f32::INFINITY }
     }
 
-    /// The costs of one row: a slice of the matrix if it is stored by rows, else a copy in
-    /// `buffer`.
+    /// The costs of one row: a slice of the matrix where rows are contiguous and no limit is set,
+    /// else a copy in `buffer`.
     #[inline]
     pub(super) fn row_costs<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
         let row = usize::from(row);

@@ -1,4 +1,5 @@
-//! The cheap first phases of Jonker–Volgenant: most rows find their column here.
+//! Column reduction and augmenting row reduction of Jonker–Volgenant: cheap phases that match most
+//! rows.
 
 use super::costs::CostMatrix;
 use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
@@ -6,10 +7,10 @@ use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 /// Columns of a large matrix that are reduced together: four cache lines of each row.
 const BLOCK_COLUMNS: usize = 64;
 
-/// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left
-/// over), then two rounds of augmenting row reduction. Returns how many rows are left in
-/// `state.free`, or `None` if some row or, in a square matrix, some column has no finite cost, so
-/// that not every row can be served.
+/// Column reduction, then two rounds of augmenting row reduction. Column reduction is for square
+/// matrices only: it changes the price of every column, and a column that stays free must keep
+/// price 0. Returns the number of rows left in `state.free`, or `None` if a row or, in a square
+/// matrix, a column has no finite cost, so that not every row can be matched.
 pub(super) fn reduce_to_free_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -31,15 +32,16 @@ pub(super) fn reduce_to_free_rows(
     Some(left)
 }
 
-/// Each column is priced at its least cost and given to that row, if the row has none; then a row
-/// that is the least of one column only moves its slack into that column's price.
+/// Sets each column's price to its least cost and matches it to the row with that cost, if the row
+/// is free. Then, for a row that is the cheapest of exactly one column, lowers that column's price
+/// by the row's slack (reduction transfer).
 fn reduce_columns(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
 ) -> Option<usize> {
-    // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a
-    // large matrix, the fewer cache misses. A small matrix has fewer columns than that.
+    // Many columns per pass, the last pass overlapping the one before: fewer passes over the rows
+    // of a large matrix mean fewer cache misses. A small matrix has fewer columns than that.
     match costs.cols {
         0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
         SIMD_LANES..BLOCK_COLUMNS => {
@@ -50,7 +52,7 @@ fn reduce_columns(
     if state.price.contains(&f64::INFINITY) {
         return None;
     }
-    // `settled` counts here for how many columns a row is the least.
+    // Here `settled` counts the columns of which a row is the cheapest.
     paths.settled.fill(0);
     for col in (0..costs.cols as u16).rev() {
         let row = paths.previous[usize::from(col)];
@@ -68,7 +70,8 @@ fn reduce_columns(
             }
             1 => {
                 let own = usize::from(state.col_of[usize::from(row)]);
-                // At minus infinity the own column cannot be the least of the others.
+                // With its price at minus infinity the row's own column cannot be the least of the
+                // others.
                 let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
                 let slack = least_reduced_cost(costs.row_costs(row, state.row), state.price);
                 state.price[own] = if slack < f64::INFINITY { price - slack } else { price };
@@ -89,7 +92,8 @@ fn cheapest_rows_by<const K: usize>(
     }
 }
 
-/// Least cost and first cheapest row of `K` columns of a square matrix, which is never transposed.
+/// Least cost of `K` columns, and the first row that has it, for a square matrix, which is never
+/// transposed.
 fn cheapest_rows<const K: usize>(
     costs: &CostMatrix<'_>,
     first: usize,
@@ -99,8 +103,8 @@ fn cheapest_rows<const K: usize>(
     let (mut least, mut rows) = ([f32::INFINITY; K], [0_u32; K]);
     for (row, line) in (0..).zip(costs.data.chunks_exact(costs.cols)) {
         let Some(line) = line[first..].first_chunk::<K>() else { return };
-        // Selects of one width, so that the lanes become vectors: which row is cheaper cannot be
-        // predicted.
+        // Written as selects of one width, so that the compiler vectorises the lanes: which row is
+        // cheaper cannot be predicted.
         for lane in 0..K {
             let cheaper = (line[lane] < least[lane]) & (line[lane] <= costs.limit);
             least[lane] = if cheaper { line[lane] } else { least[lane] };
@@ -127,16 +131,16 @@ fn least_reduced_cost(line: &[f32], price: &[f64]) -> f64 {
     rest.chain(least).fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
-/// Every free row takes its cheapest column, whose price falls until the second cheapest is as
-/// good; the row that held it is served next, or is left for an augmenting path where no price
-/// moved. Returns the rows left free.
+/// Matches every free row to its cheapest column and lowers that column's price until the second
+/// cheapest is as good. The row that had the column is matched next, or left for an augmenting path
+/// if no price fell. Returns the number of rows left free.
 fn reduce_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     rows_in: usize,
 ) -> Option<usize> {
     let (mut at, mut left) = (0, 0);
-    // Rows chase one another for as long as prices fall; this bounds the work.
+    // Rows take columns from one another as long as prices fall; the budget bounds the work.
     let mut budget = rows_in * costs.cols;
     while at < rows_in {
         let row = state.free[at];
@@ -146,15 +150,15 @@ fn reduce_rows(
             return None;
         }
         if two.second == f64::INFINITY {
-            // The row's only column: no second price bounds its fall, so an augmenting path
-            // decides.
+            // The row has one possible column: no second price bounds the fall, so the row is left
+            // for an augmenting path.
             state.free[left] = row;
             left += 1;
             continue;
         }
         let mut col = two.col;
         let price = state.price[usize::from(col)] - (two.second - two.least);
-        // Compared after rounding: a fall too small to show would repeat for ever.
+        // Compared after rounding: a fall that f32 or f64 cannot represent would repeat forever.
         let falls = price < state.price[usize::from(col)] && budget > 0;
         if falls {
             state.price[usize::from(col)] = price;
@@ -178,7 +182,7 @@ fn reduce_rows(
     Some(left)
 }
 
-/// The two cheapest columns of a row by reduced cost.
+/// The two columns of a row with the least reduced costs (cost minus price).
 struct TwoCheapestColumns {
     least: f64,
     second: f64,
@@ -194,8 +198,9 @@ impl TwoCheapestColumns {
             col: UNASSIGNED,
             second_col: UNASSIGNED,
         };
-        // The first few decide the second cheapest roughly; after them most chunks hold nothing
-        // below it, which eight subtractions and compares tell without a branch within.
+        // The first columns give a rough bound on the second cheapest. After them most chunks hold
+        // nothing below it, which eight subtractions and comparisons find out without a branch
+        // inside.
         let head = line.len().min(2 * SIMD_LANES);
         two.update_cheapest(0, &line[..head], &price[..head]);
         let (lines, line_rest) = line[head..].as_chunks::<SIMD_LANES>();

@@ -1,20 +1,20 @@
-//! The matching so far, and the memory of one search.
+//! The matching under construction, and the memory of one search for an augmenting path.
 
-/// Index that means "not assigned".
+/// Index that stands for "no row" or "no column".
 pub(super) const UNASSIGNED: u16 = u16::MAX;
-/// Columns handled together; enough for the widest vector registers, small enough to stay in
-/// registers.
+/// Columns that a loop handles together: enough for the widest vector registers, few enough to stay
+/// in registers.
 pub(super) const SIMD_LANES: usize = 8;
 
-/// Dual prices and the matching so far. The matrix is transposed where it has more rows than
-/// columns.
+/// Dual prices and the matching so far. Rows and columns are those of [`super::costs::CostMatrix`],
+/// never more rows than columns.
 pub(super) struct MatchingState<'w> {
     pub(super) price: &'w mut [f64],
     pub(super) row_of: &'w mut [u16],
     pub(super) col_of: &'w mut [u16],
-    /// Room for one row of a transposed matrix.
+    /// Buffer for a copy of one row of costs.
     pub(super) row: &'w mut [f32],
-    /// Rows without a column, in the order they are to be served.
+    /// Rows without a column, in the order in which they are matched.
     pub(super) free: &'w mut [u16],
 }
 
@@ -31,11 +31,11 @@ impl MatchingState<'_> {
     }
 }
 
-/// Scratch of one search, a slot for each column.
+/// Memory of one search for an augmenting path, one entry per column.
 pub(super) struct AugmentingPaths<'w> {
     pub(super) distance: &'w mut [f64],
     pub(super) previous: &'w mut [u16],
-    /// Columns settled, in order, with their price and distance.
+    /// Settled columns in the order in which they were settled, with their price and distance.
     pub(super) settled: &'w mut [u16],
     pub(super) settled_price: &'w mut [f64],
     pub(super) settled_distance: &'w mut [f64],

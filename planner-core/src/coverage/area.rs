@@ -1,71 +1,70 @@
-//! The area: polygons to photograph, holes in them, and zones that no vehicle may enter; checked
-//! before anything is computed.
+//! The area: checked polygons to photograph, with holes and no-fly zones.
 //!
-//! Vertices of all rings lie in one slice, ring after ring, the first vertex of a ring not
-//! repeated. Which way a ring turns does not matter: a place is in the area if it is inside an odd
-//! number of outer rings and holes. Cost: O(n²) in the edges for the check, O(n) for a question.
+//! The vertices of all rings are in one slice, ring after ring; the first vertex of a ring is not
+//! repeated at its end. Rings may turn either way: a point is in the area if it is inside an odd
+//! number of outer rings and holes. Cost: O(n²) in the edges for the check, O(n) for a query.
 
 use crate::Length;
 use libm::{fabs, sqrt};
 
 use super::Flat;
 
-/// Furthest coordinate, metres: at 100 km f32 steps by 8 mm.
+/// Largest magnitude of a coordinate, metres: at 100 km f32 resolves 8 mm.
 pub const MAX_VERTEX_M: f32 = 150_000.0;
-/// Two vertices nearer than this are one vertex, metres.
+/// Vertices nearer than this count as one, metres.
 pub const SAME_VERTEX_M: f32 = 1e-3;
-/// Two edges cross if each reaches at least this far beyond the other, metres: neighbouring fields
-/// share borders, and coordinates are rounded.
+/// Two edges count as crossing only if each reaches at least this far beyond the other, metres:
+/// neighbouring fields share borders, and coordinates are rounded.
 const MIN_EDGE_OVERSHOOT_M: f64 = 0.01;
 
 /// Kind of the region that a ring encloses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RingKind {
-    /// Area to photograph.
+    /// Region to photograph.
     Outer,
-    /// A region that is not photographed, and may be flown over.
+    /// Region inside an outer ring that is not photographed, but may be flown over.
     Hole,
-    /// Neither photographed nor flown over, transit included.
+    /// Region that is not photographed, and that no vehicle may fly over, not even in transit.
     NoFly,
 }
 
-/// One ring: its vertices end before `end`, and begin where the ring before it ends.
+/// One ring. Its vertices are those from the `end` of the ring before it up to its own `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ring {
-    /// Index of the last vertex plus one.
+    /// Index of its last vertex plus one.
     pub end: u16,
     /// Kind of the region that the ring encloses.
     pub kind: RingKind,
 }
 
-/// Reason why rings do not form an area. Numbers are indices of rings and of vertices, from 0.
+/// Reason why rings do not form an area. Numbers are indices of rings or vertices, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AreaError {
-    /// The area has no outer ring.
+    /// There is no outer ring.
     NoOuter,
-    /// The rings do not end in rising order with the vertices.
+    /// The `end`s of the rings do not ascend, or the last one is not the number of vertices.
     Shape,
     /// A ring has fewer than three vertices.
     TooFewVertices {
         /// The ring.
         ring: u16,
     },
-    /// A vertex is NaN or infinite.
+    /// A coordinate is NaN or infinite.
     NotFinite {
         /// The vertex.
         vertex: u16,
     },
-    /// A vertex is further than [`MAX_VERTEX_M`] from the origin.
+    /// A coordinate of a vertex is more than [`MAX_VERTEX_M`].
     TooFar {
         /// The vertex.
         vertex: u16,
     },
-    /// A vertex is the same place as the one before it.
+    /// A vertex is at the same place as the one before it.
     Duplicate {
         /// The vertex.
         vertex: u16,
     },
-    /// A ring encloses nothing: its vertices lie on one line.
+    /// A ring encloses nothing, or hardly anything: its vertices lie on one line.
     NoArea {
         /// The ring.
         ring: u16,
@@ -75,28 +74,28 @@ pub enum AreaError {
         /// The vertex at which one of them begins.
         vertex: u16,
     },
-    /// Edges of two outer rings or holes cross.
+    /// Edges of two rings cross, both of them outer rings or holes.
     RingsCross {
-        /// The ring that is touched.
+        /// The first of the two rings.
         ring: u16,
-        /// The other one.
+        /// The second of the two rings.
         other: u16,
     },
-    /// A hole lies outside every outer ring.
+    /// A hole lies outside all outer rings.
     HoleOutside {
         /// The hole.
         ring: u16,
     },
-    /// An outer ring lies inside another one.
+    /// An outer ring lies inside another outer ring.
     OuterInside {
-        /// The inner one.
+        /// The inner ring.
         ring: u16,
     },
     /// The area has more vertices than the memory holds.
     AreaFull,
 }
 
-/// Polygons that were checked.
+/// Checked rings over borrowed vertices.
 #[derive(Clone, Copy, Debug)]
 pub struct Area<'a> {
     vertices: &'a [Flat],
@@ -104,13 +103,13 @@ pub struct Area<'a> {
 }
 
 impl<'a> Area<'a> {
-    /// An area without rings.
+    /// An area without rings: it contains no point.
     pub(super) const NOWHERE: Self = Self { vertices: &[], rings: &[] };
 
-    /// Checks the rings.
+    /// Checks the rings and returns the area.
     ///
     /// # Errors
-    /// What is wrong with them, and where.
+    /// The first error found, with the ring or vertex where it is.
     pub fn new(vertices: &'a [Flat], rings: &'a [Ring]) -> Result<Self, AreaError> {
         let area = Self { vertices, rings };
         area.check_shape()?;
@@ -121,7 +120,7 @@ impl<'a> Area<'a> {
         Ok(area)
     }
 
-    /// All vertices, ring after ring.
+    /// The vertices of all rings, ring after ring.
     pub fn vertices(&self) -> &'a [Flat] {
         self.vertices
     }
@@ -131,19 +130,19 @@ impl<'a> Area<'a> {
         self.rings
     }
 
-    /// Whether there is a no-fly zone.
+    /// Whether there is at least one no-fly zone.
     pub fn has_no_fly(&self) -> bool {
         self.rings.iter().any(|ring| ring.kind == RingKind::NoFly)
     }
 
-    /// Vertices of one ring; empty for an index beyond the last ring.
+    /// Vertices of the ring with this index; empty beyond the last ring.
     pub fn ring(&self, index: usize) -> &'a [Flat] {
         let Some(ring) = self.rings.get(index) else { return &[] };
         let start = index.checked_sub(1).map_or(0, |before| usize::from(self.rings[before].end));
         &self.vertices[start..usize::from(ring.end)]
     }
 
-    /// Each ring's kind and vertices.
+    /// Kind and vertices of each ring.
     pub(super) fn rings_with_kind(
         &self,
     ) -> impl Iterator<Item = (RingKind, &'a [Flat])> + Clone + use<'a> {
@@ -151,14 +150,14 @@ impl<'a> Area<'a> {
         area.rings.iter().enumerate().map(move |(i, ring)| (ring.kind, area.ring(i)))
     }
 
-    /// Edges of the outer rings and of the holes, as their two ends.
+    /// Edges of all outer rings and holes, each as its two ends.
     pub(super) fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
         self.rings_with_kind()
             .filter(|(kind, _)| *kind != RingKind::NoFly)
             .flat_map(|(_, ring)| edges_of(ring))
     }
 
-    /// The same rings of other vertices: of the same places in another frame.
+    /// The same rings with these vertices: the area in another coordinate frame.
     pub(super) fn with_vertices<'b>(&self, vertices: &'b [Flat]) -> Area<'b>
     where
         'a: 'b,
@@ -166,14 +165,14 @@ impl<'a> Area<'a> {
         Area { vertices, rings: self.rings }
     }
 
-    /// Whether a place is to be photographed: inside outer rings and holes an odd number of times.
-    /// No-fly zones are not looked at.
+    /// Whether a point is to be photographed: inside an odd number of outer rings and holes. No-fly
+    /// zones are ignored.
     pub fn contains(&self, place: &Flat) -> bool {
         let rings = self.rings_with_kind().filter(|(kind, _)| *kind != RingKind::NoFly);
         rings.filter(|(_, ring)| is_inside(ring, place)).count() % 2 == 1
     }
 
-    /// Whether a place is inside a no-fly zone.
+    /// Whether a point is inside a no-fly zone.
     pub fn is_in_no_fly_zone(&self, place: &Flat) -> bool {
         self.rings_with_kind().any(|(kind, ring)| kind == RingKind::NoFly && is_inside(ring, place))
     }
@@ -219,7 +218,7 @@ impl<'a> Area<'a> {
     }
 
     fn check_sizes(&self) -> Result<(), AreaError> {
-        // A strip as long as half its border and a millimetre wide.
+        // As much as a strip half as long as the perimeter and a millimetre wide.
         let is_flat = |(_, ring): (_, &[Flat])| {
             fabs(doubled_signed_area(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
         };
@@ -253,7 +252,8 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
-    /// Rings that do not cross lie inside or outside each other as any of their inner places does.
+    /// Checks which rings are inside others. Rings do not cross, so one interior point shows it for
+    /// the whole ring.
     fn check_nesting(&self) -> Result<(), AreaError> {
         for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
             if kind == RingKind::NoFly {
@@ -274,14 +274,13 @@ impl<'a> Area<'a> {
     }
 }
 
-/// The edges of a ring, the one that closes it last.
+/// The edges of a ring, each as its two ends; the closing edge is the last.
 pub(super) fn edges_of(ring: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + Clone + '_ {
     let next = ring.iter().skip(1).chain(ring.first());
     ring.iter().copied().zip(next.copied())
 }
 
-/// Twice the usual: positive where the ring turns left. f64, since it is a difference of large
-/// numbers.
+/// Signed area of a ring, m²: positive if it turns left. In f64, since large terms cancel.
 pub(super) fn doubled_signed_area(ring: &[Flat]) -> f64 {
     let base = ring[0];
     let twice: f64 = edges_of(ring).map(|(a, b)| cross_product(&(a - base), &(b - base))).sum();
@@ -296,7 +295,7 @@ fn cross_product(a: &Flat, b: &Flat) -> f64 {
     f64::from(a.x) * f64::from(b.y) - f64::from(a.y) * f64::from(b.x)
 }
 
-/// Whether a place is inside a ring, by the edges that a ray to the east crosses.
+/// Whether a point is inside a ring, by the number of edges that a ray to the east crosses.
 pub(super) fn is_inside(ring: &[Flat], place: &Flat) -> bool {
     let crossed = |(a, b): &(Flat, Flat)| {
         (a.y <= place.y) != (b.y <= place.y)
@@ -305,14 +304,13 @@ pub(super) fn is_inside(ring: &[Flat], place: &Flat) -> bool {
     edges_of(ring).filter(crossed).count() % 2 == 1
 }
 
-/// A place inside a ring: the middle of the longest stretch of a line across it that misses every
-/// vertex.
+/// A point inside a ring: the midpoint of the longest inner part of a horizontal line that misses
+/// every vertex.
 fn interior_point(ring: &[Flat]) -> Flat {
     let (low, high) = ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
         (libm::fminf(low, v.y), libm::fmaxf(high, v.y))
     });
-    // The line lies in the middle of the widest step between two vertices' heights near the middle
-    // of the ring.
+    // Near the middle of the ring, the line is half way between two neighbouring `y` of vertices.
     let middle = (low + high) / 2.0;
     let below = ring.iter().map(|v| v.y).filter(|y| *y <= middle).fold(low, libm::fmaxf);
     let above = ring.iter().map(|v| v.y).filter(|y| *y > middle).fold(high, libm::fminf);

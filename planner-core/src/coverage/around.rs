@@ -1,15 +1,15 @@
-//! One vehicle's way home over a field, or aside: around no-fly zones and whatever left the plan,
-//! without a roadmap.
+//! One vehicle's detour over a height field, home or to a place aside: around no-fly zones and
+//! vehicles that left the plan, without a roadmap.
 //!
-//! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad,
-//! and down. What is to be kept off is walked around: a visibility graph over the zones' corners
-//! ([`Transit::corners`]) and eight corners around either end of each [`KeepOutZone`] that reaches
-//! the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer
-//! leaves no way, the same at the height at which the vehicle hovers. Aside: the nearest of places
-//! on rings around it, straight there.
+//! Home: vertically to the vehicle's own layer, there on the shortest path to above its pad, and
+//! down. Obstacles in the layer are flown around: a visibility graph over the zones' corners
+//! ([`Transit::corners`]) and eight corners around each end of every [`KeepOutZone`] that reaches
+//! the layer is searched by A*. Legs stay above terrain. If there is no path in the layer, the same
+//! is tried at the height at which the vehicle hovers. Aside: straight to the nearest free point on
+//! rings around the vehicle.
 //!
-//! No leg leaves the request's fence. ENU metres. Cost: n² / 2 looks at most for n places, each at
-//! all edges of zones and all [`KeepOutZone`]s.
+//! No leg leaves the request's fence. ENU metres. Cost for n nodes: at most n² / 2 visibility
+//! checks, each against all edges of zones and all [`KeepOutZone`]s.
 
 use heapless::Vec;
 use libm::{ceilf, cosf, fabsf, fminf, sinf};
@@ -22,27 +22,27 @@ use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::search::SearchError;
 use crate::{Length, Point};
 
-/// Most places of the visibility graph.
+/// Most nodes of the visibility graph.
 const MAX_PLACES: usize = 320;
-/// Corners of the polygon around an end of a keep-out zone's axis.
+/// Corners around each end of a keep-out zone's axis.
 const CORNERS_PER_END: usize = 8;
-/// Radius of those corners, as a share of the distance to keep: the line between two neighbouring
-/// corners still keeps that distance.
+/// Distance of the corners from the axis, as a multiple of the zone's radius: the line between two
+/// neighbouring corners still stays outside the radius.
 const CORNER_RADIUS_SHARE: f32 = 1.09;
-/// Rounding added to the radius of the corners, metres.
+/// Distance added to the corners' distance from the axis, against rounding, metres.
 const CORNER_ROUNDING_M: f32 = 0.05;
-/// Two corners nearer than this are one place, metres.
+/// Points nearer than this count as one, metres.
 const SAME_CORNER_M: f32 = 0.01;
 /// Most height samples of one leg: on a longer leg the samples are further apart.
 const MAX_LEG_SAMPLES: f32 = 65_536.0;
-/// Least height of a leg above the field, metres; a leg straight up or down is exempt.
+/// Least height of a leg above the field, metres; vertical legs are exempt.
 const MIN_HEIGHT_OVER_FIELD_M: f32 = 1.5;
-/// Rings around a vehicle on which a landing place aside is sought, a metre apart.
+/// Number of rings, a metre apart, around the vehicle on which a place aside is sought.
 const MAX_SIDESTEP_RINGS: usize = 20;
-/// Directions on each ring in which a landing place aside is sought.
+/// Number of directions on each ring in which a place aside is sought.
 const SIDESTEP_DIRECTIONS: usize = 16;
 
-/// No-fly zones, ground and obstacles that legs keep clear of.
+/// Fence, no-fly zones, terrain and keep-out zones that legs have to respect.
 struct FreeSpace<'a, 't, const N: usize> {
     transit: &'a Transit<'t, N>,
     field: Option<FieldView<'a>>,
@@ -55,8 +55,8 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
     fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
         let touches =
             |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
-        // A box holds what is between two places in it; where the vehicle is it may have deviated
-        // beyond.
+        // The fence is a box, so a leg between two points inside is inside. Only its end is
+        // checked: the vehicle, where the first leg begins, may have strayed outside.
         self.is_inside(b)
             && self.transit.is_line_clear(&a.xy(), &b.xy())
             && self.is_above_field(a, b)
@@ -68,7 +68,8 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
             .is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
-    /// Whether a leg stays above the height field, checked at samples half a node apart.
+    /// Whether a leg keeps [`MIN_HEIGHT_OVER_FIELD_M`] above the height field, at samples half a
+    /// node spacing apart.
     fn is_above_field(&self, a: &Point, b: &Point) -> bool {
         let (Some(field), step) = (&self.field, b - a) else { return true };
         let length_m = step.xy().length();
@@ -83,12 +84,12 @@ impl<const N: usize> FreeSpace<'_, '_, N> {
     }
 }
 
-/// The way to the goal ([`Goal::Home`]), or aside, that keeps clear of all `obstacles`, above the
-/// field and out of the zones that `transit` knows, written to `out`. Of an obstacle that is nearer
-/// already the distance is shortened.
+/// Writes a path to the goal ([`Goal::Home`]), or to a point aside, that keeps out of all
+/// `obstacles` and of the no-fly zones of `transit`, and stays above the field, to `out`. An
+/// obstacle that contains the vehicle already is shrunk.
 ///
 /// # Errors
-/// Reason why there is none.
+/// The reason why there is no such path.
 pub fn plan_detour<const N: usize, const W: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
@@ -130,11 +131,11 @@ pub fn plan_detour<const N: usize, const W: usize>(
     Err(DetourError::Search(SearchError::NoPath))
 }
 
-/// As [`plan_detour`], as the plan of one vehicle that leaves the others' plan: only the path of
-/// that plan counts; the plan has no gates.
+/// As [`plan_detour`], written as the plan of one vehicle that leaves the shared plan: only its
+/// path matters, and it has no gates.
 ///
 /// # Errors
-/// Reason why there is none.
+/// The reason why there is no such path.
 pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
@@ -150,7 +151,7 @@ pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
-/// The nearest free place that a straight leg reaches.
+/// The nearest point on the rings that is outside all zones and reached by a free straight leg.
 fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Option<Point> {
     let here = clear.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
@@ -168,7 +169,7 @@ fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Opti
         .find(|place| rests(place) && clear.is_leg_free(&here, place))
 }
 
-/// Nodes at one height, with the shortest distances found to them so far.
+/// Nodes at one height, with the lengths of the shortest paths to them so far.
 struct VisibilityGraph {
     places: Vec<Flat, MAX_PLACES>,
     distance_m: [f32; MAX_PLACES],
@@ -184,8 +185,8 @@ impl VisibilityGraph {
         settled: [false; MAX_PLACES],
     };
 
-    /// The shortest way between two places of one height: all its points but the first, none where
-    /// it stays. Whether there is one.
+    /// Searches the shortest path between two points of the same height, and writes its points to
+    /// `points`, both ends included. Returns false if there is none.
     fn find_shortest_path<const N: usize, const W: usize>(
         &mut self,
         clear: &FreeSpace<'_, '_, N>,
@@ -217,7 +218,8 @@ impl VisibilityGraph {
             let place = level(&self.places[next]);
             for i in 0..self.places.len() {
                 let far_m = self.distance_m[next] + (self.places[i] - place.xy()).length();
-                // A look costs more than the sum: only at what would be shorter.
+                // A visibility check costs more than the sum, so only links that would be shorter
+                // are checked.
                 if !self.settled[i]
                     && far_m < self.distance_m[i]
                     && clear.is_leg_free(&place, &level(&self.places[i]))
@@ -238,8 +240,8 @@ impl VisibilityGraph {
         Ok(true)
     }
 
-    /// Collects both ends, corners of zones, and corners around obstacles at this height, up to the
-    /// capacity.
+    /// Collects the nodes at the height of `from`: both ends, corners of no-fly zones, and corners
+    /// around keep-out zones that reach this height. More than the capacity are dropped.
     fn collect_nodes<const N: usize>(
         &mut self,
         clear: &FreeSpace<'_, '_, N>,

@@ -1,9 +1,10 @@
-//! A lower bound on max C_k of every contiguous division of a path.
+//! A lower bound on the largest route cost max C_k of every contiguous division of the path.
 //!
-//! Two arguments, the larger counts. (1) If m vehicles fly, their routes leave out at most the m −
-//! 1 longest steps between waypoints, each vehicle has at least the way to the nearest waypoint and
-//! back, and the layers are all different; the largest cost is no less than the mean. The least
-//! over m. (2) Somebody flies to the waypoint that is furthest from everybody. O(n · K).
+//! The larger of two bounds. (1) If m vehicles fly, their routes leave out at most the m − 1
+//! longest steps between waypoints, each vehicle flies at least to its nearest waypoint and back,
+//! and all use different layers. The largest cost is no less than the mean of these sums; the bound
+//! is the least over m. (2) Some vehicle flies to the waypoint that is furthest from all vehicles.
+//! O(n · K).
 
 use crate::Length;
 use libm::{fmaxf, fminf};
@@ -12,13 +13,13 @@ use super::CoverageError;
 use super::pack::Work;
 use crate::sort;
 
-/// Most vehicles that the bound distinguishes.
+/// Most vehicles for which the bound can be computed.
 const MAX_VEHICLES: usize = 32;
 
-/// The bound, seconds.
+/// The lower bound on max C_k, seconds.
 ///
 /// # Errors
-/// As [`Work::check`] for at most 32 vehicles.
+/// Those of [`Work::check`] for at most 32 vehicles.
 pub fn lower_bound_s<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
 ) -> Result<f32, CoverageError> {
@@ -39,7 +40,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(
             let place = lane.waypoint(k);
             let mut least_s = f32::INFINITY;
             for (near, vehicle) in nearest_m.iter_mut().zip(work.vehicles) {
-                // Straight: no way is shorter.
+                // The straight line: no path around zones is shorter.
                 let there_m = (place - vehicle.place).length() + (place - vehicle.home).length();
                 *near = fminf(*near, there_m);
                 least_s = fminf(least_s, there_m / vehicle.cruise_mps);
@@ -65,7 +66,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(
     Ok(fmaxf(least_s, furthest_s + vertical(1)))
 }
 
-/// The largest values inserted so far, in falling order.
+/// The largest values inserted so far, in descending order.
 struct LargestValues {
     values: [f32; MAX_VEHICLES],
 }

@@ -1,15 +1,15 @@
-//! A first order of lanes: cells, each flown back and forth, one after the other.
+//! An initial order of lanes: cell after cell, each flown back and forth.
 //!
-//! Lanes that follow each other, one a strip, are a cell: the boustrophedon decomposition (Choset 2000)
-//! of the lanes themselves. From each cell the way goes on to the nearest corner of another.
-//! O(cells · lanes + lanes²) sums, and few distances.
+//! A cell is a group of lanes in consecutive strips, one per strip: the boustrophedon decomposition
+//! (Choset 2000), made of lanes. From the end of each cell the path goes on to the nearest corner
+//! of a cell that is left. O(cells · lanes + lanes²) sums, and few distances around zones.
 
 use super::lanes::Lane;
 use super::transit::Transit;
 use crate::Length;
 
-/// Groups lanes, in the lanes' frame and in the order of their strips, into cells. `first` of a
-/// lane becomes the number of its cell.
+/// Groups lanes into cells. They must be in the lanes' frame and in the order of their strips. Sets
+/// `first` of each lane to the number of its cell.
 pub(super) fn group_into_cells(lanes: &mut [Lane]) {
     let touch = |a: &Lane, b: &Lane| a.from.x < b.to.x && b.from.x < a.to.x;
     let (mut cells, mut below, mut row) = (0, 0, 0);
@@ -18,8 +18,8 @@ pub(super) fn group_into_cells(lanes: &mut [Lane]) {
         if strip != lanes[row].strip {
             (below, row) = (row, k);
         }
-        // The only lane of the strip before that this one touches, if nothing else touches that
-        // one.
+        // Candidate: the only lane of the strip before that overlaps this one. It counts only if it
+        // overlaps no other lane of this strip.
         let mut under =
             (below..row).filter(|&i| lanes[i].strip + 1 == strip && touch(&lanes[i], &lanes[k]));
         let only = under.next().filter(|_| under.next().is_none());
@@ -32,13 +32,13 @@ pub(super) fn group_into_cells(lanes: &mut [Lane]) {
     }
 }
 
-/// Whether a cell ends before this lane.
+/// Whether a cell begins at lane `k`, or the lanes end there.
 pub(super) fn is_break(lanes: &[Lane], k: usize) -> bool {
     k == 0 || k == lanes.len() || lanes[k - 1].first != lanes[k].first
 }
 
-/// Sorts lanes that are grouped by cells: begins with the first cell and always goes to the nearest
-/// corner of another.
+/// Sorts lanes that are grouped into cells: the first cell comes first, then always the one whose
+/// corner is nearest to the end of the one before.
 pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
     for k in 1..lanes.len() {
         let place = lanes[..k].partition_point(|lane| lane.first <= lanes[k].first);
@@ -67,15 +67,15 @@ pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<
     }
 }
 
-/// How a cell is entered: from its last lane, and at the end of that lane.
+/// How a cell is flown: whether from its last lane to its first, and whether each lane is reversed.
 #[derive(Clone, Copy, Default)]
 struct Entry {
     backwards: bool,
     turned: bool,
 }
 
-/// The first lane of the cell, from lane `done` on, whose corner is nearest to the end of the lane
-/// before, and the corner.
+/// Index of the first lane of the cell, among those from lane `done` on, of which a corner is
+/// nearest to the end of the lane before `done`; and how the cell is then flown.
 fn nearest_cell<const N: usize>(
     lanes: &[Lane],
     done: usize,
@@ -88,7 +88,7 @@ fn nearest_cell<const N: usize>(
         let to = end_of_cell(lanes, from);
         for (lane, backwards) in [(&lanes[from], false), (&lanes[to - 1], true)] {
             for (corner, turned) in [(lane.from, false), (lane.to, true)] {
-                // No way is shorter than the straight one.
+                // No path around zones is shorter than the straight line.
                 if (corner - here).length() < best.0 {
                     let way = transit.distance_m(&here, &corner);
                     if way < best.0 {

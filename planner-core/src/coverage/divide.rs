@@ -1,21 +1,23 @@
-//! What is left of a path after a loss, as a path of its own: [`super::pack::binpat`] then divides
-//! it among the rest.
+//! The waypoints of a path that are left after a loss, as a path of its own, which
+//! [`super::pack::binpat`] then divides among the remaining vehicles.
 //!
-//! A pure function of the path and of what is done or promised, so that every vehicle computes the
-//! same bits. Waypoints that are left keep the order and the lane they have; parts of the path
-//! between them are transit.
+//! A pure function of the path and of the waypoints that are photographed or promised, so that
+//! every vehicle computes the same bits. Remaining waypoints keep their order and their lane; the
+//! removed parts of the path between them become transits.
 
 use super::CoverageError;
 use super::tracks::{Lane, Tracks};
 use super::transit::Transit;
 use crate::flight::WaypointRange;
 
-/// Sets `remaining_lanes` to the lanes without these waypoints. Ranges are in rising order and do
-/// not overlap. The number that a waypoint had before is [`original_waypoint_number`].
+/// Writes the lanes without the waypoints `done` to `left`. The ranges must be in ascending order
+/// and not overlap. A remaining waypoint gets a new number; [`original_waypoint_number`] returns
+/// its old one.
 ///
 /// # Errors
-/// [`CoverageError::Setting`] for ranges that are out of order, [`CoverageError::LanesFull`],
-/// [`CoverageError::NothingToCover`] where all is done, [`CoverageError::Unreachable`].
+/// [`CoverageError::Setting`] for ranges out of order or beyond the path,
+/// [`CoverageError::LanesFull`], [`CoverageError::NothingToCover`] if no waypoint is left,
+/// [`CoverageError::Unreachable`].
 pub fn remaining_lanes<const L: usize, const N: usize>(
     tracks: &Tracks<L>,
     done: &[WaypointRange],
@@ -44,7 +46,7 @@ pub fn remaining_lanes<const L: usize, const N: usize>(
     left.measure_lengths(transit)
 }
 
-/// Whether ranges are in rising order and do not overlap.
+/// Whether the ranges are in ascending order and do not overlap.
 pub(super) fn is_sorted_disjoint(done: &[WaypointRange]) -> bool {
     done.iter().all(|range| range.first <= range.end)
         && done.windows(2).all(|pair| pair[0].end <= pair[1].first)
@@ -70,8 +72,8 @@ fn push_lane_part<const L: usize>(
     left.lanes.push(part).map_err(|_| CoverageError::LanesFull)
 }
 
-/// The number that waypoint `number` of what is left had on the whole path: the greatest there is
-/// where it had none.
+/// The number on the whole path of the waypoint with `number` on the path without the ranges
+/// `done`. `u32::MAX` instead of an overflow.
 pub fn original_waypoint_number(done: &[WaypointRange], number: u32) -> u32 {
     let mut whole = number;
     for range in done.iter().filter(|range| range.first < range.end) {

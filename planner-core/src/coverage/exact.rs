@@ -1,11 +1,11 @@
-//! The least max C_k of all contiguous divisions, subsets of vehicles, layers and directions: what
-//! the other methods are measured by. For a desk: 10 vehicles take 2²⁰ states.
+//! The exact minimum of max C_k over all contiguous divisions, subsets of vehicles, layers and
+//! directions: the benchmark of the other methods. For desktops only: 10 vehicles have 2²⁰ states.
 //!
-//! Whether all can be done within T seconds is a dynamic program. `reach[vehicles][layers]` is the
-//! most waypoints, counted from the first, that these vehicles in these layers can photograph
-//! within T. A route's cost falls neither if it ends later nor if it begins earlier, by the
-//! triangle inequality; so each step takes as much as fits, which two pointers find for every
-//! beginning at once. T is halved down to [`TIME_RESOLUTION`].
+//! A dynamic program decides whether all can be photographed within a time T. Its state (vehicles,
+//! layers) holds the most waypoints, counted from the first, that this set of vehicles in this set
+//! of layers can photograph within T. A route's cost does not fall if it is extended at either end,
+//! by the triangle inequality; so each step takes as many waypoints as fit, which two pointers find
+//! for all first waypoints at once. T is found by bisection to [`TIME_RESOLUTION`].
 //!
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
@@ -14,22 +14,24 @@ use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_costs};
 
 /// Most vehicles of an exact division.
 pub const MAX_EXACT_VEHICLES: usize = 10;
-/// Relative resolution to which the mission time T is found.
+/// Relative resolution to which the least T is found.
 pub const TIME_RESOLUTION: f32 = 1e-5;
 
-/// Memory lent: lengths by [`Workspace::required_lengths`].
+/// Memory that the caller lends, with lengths from [`Workspace::required_lengths`].
 pub struct Workspace<'a> {
-    /// Ways from every vehicle's place to every waypoint, and from there home.
+    /// Transit lengths, metres: for each vehicle to every waypoint, and from every waypoint home.
     pub ways_m: &'a mut [f32],
-    /// Distance that each vehicle in each layer reaches from each waypoint.
+    /// For each vehicle, layer and first waypoint, the number after the last waypoint that the
+    /// vehicle can photograph within T.
     pub reaches: &'a mut [u32],
-    /// States of the dynamic program: most waypoints done, and the step that led there.
+    /// States of the dynamic program: most waypoints photographed, and the step (vehicle and layer)
+    /// that led there.
     pub states: &'a mut [(u32, u16)],
 }
 
 impl Workspace<'_> {
-    /// Lengths of the three for so many vehicles and waypoints: the greatest number there is where
-    /// no memory has so much.
+    /// Lengths of the three slices for these numbers of vehicles and waypoints; `usize::MAX`
+    /// instead of an overflow.
     pub fn required_lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
         let vehicles = vehicles.min(MAX_EXACT_VEHICLES);
         let reaches = (vehicles * vehicles).saturating_mul(waypoints.saturating_add(1));
@@ -37,10 +39,9 @@ impl Workspace<'_> {
     }
 }
 
-/// The best plan there is.
+/// Writes the plan with the least max C_k to `out`.
 ///
-/// # Errors
-/// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`];
+/// Those of [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`];
 /// [`CoverageError::WorkspaceTooSmall`].
 pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
@@ -57,7 +58,7 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     if ws.ways_m.len() < ways || ws.reaches.len() < reaches || ws.states.len() < states {
         return Err(CoverageError::WorkspaceTooSmall);
     }
-    // The division that BINPAT finds is possible; a division in no time is not.
+    // Upper bound of T: BINPAT's division is possible. Lower bound: 0 s.
     binpat(work, pack, out)?;
     let mut table = DivisionTable { work, ws, count, waypoints };
     table.fill_lengths();
@@ -101,7 +102,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
         }
     }
 
-    /// Whether a vehicle can photograph `from` up to before `end` over `most_m` of ground.
+    /// Whether vehicle `v` can photograph waypoints `from` to `end` − 1 with at most `most_m`
+    /// metres of flight over ground.
     fn is_within_length(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
         let to = &self.ws.ways_m[2 * v * self.waypoints..][..self.waypoints];
         let home = &self.ws.ways_m[(2 * v + 1) * self.waypoints..][..self.waypoints];
@@ -110,7 +112,7 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
         along(end - 1) - along(from) + transit <= most_m
     }
 
-    /// Fills the states for T = `time_s`; whether everything is done.
+    /// Computes all states for T = `time_s`. Returns whether some state has all waypoints.
     fn fill_states(&mut self, time_s: f32) -> bool {
         let (count, waypoints) = (self.count, self.waypoints);
         for v in 0..count {
@@ -150,13 +152,13 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
         self.complete_state().is_some()
     }
 
-    /// The state with the fewest vehicles in which everything is done.
+    /// The state with the fewest vehicles that has all waypoints.
     fn complete_state(&self) -> Option<usize> {
         let all = |state: &usize| self.ws.states[*state].0 as usize == self.waypoints;
         (0..1usize << (2 * self.count)).filter(all).min_by_key(|state| state.count_ones())
     }
 
-    /// The plan that the states hold.
+    /// Writes the plan that leads to that state.
     fn write_plan<const K: usize>(&self, out: &mut Plan<K>) {
         let Some(mut state) = self.complete_state() else { return };
         let (count, sets) = (self.count, 1usize << self.count);

@@ -1,10 +1,10 @@
-//! Routes as flights: each vehicle's path, and the order of the vehicles where two of them meet.
+//! Flights of a coverage mission: each vehicle's path along its route, and the order of take-offs.
 //!
-//! Source: CPP §3.2: up to the own layer, over to the first waypoint, down, along the lanes, up,
-//! home in the layer, down. The take-off ends and the landing begins close above the pad: all
-//! between is path, on which a vehicle can wait. A flight is one path like any other mission's, so
-//! [`crate::schedule`] keeps it apart from the others: the vehicle that flies longest leaves first,
-//! each other one as early as those before it allow, and gates hold that order in the air.
+//! Source: CPP §3.2: climb to the vehicle's own layer, transit, descent, lanes, climb, transit home
+//! in the layer, descent. Take-off ends and landing begins close above the pad: all between is
+//! path, on which the vehicle can wait. [`crate::schedule`] separates the flights as in any other
+//! mission: the vehicle that flies longest takes off first, each other one as early as those before
+//! it allow, and gates keep that order in the air.
 
 use heapless::Vec;
 
@@ -23,40 +23,40 @@ use crate::schedule::{
 use crate::sort;
 use crate::{Length, Point};
 
-/// Acceleration and braking that coverage flights are planned with, m/s².
+/// Acceleration and deceleration that durations of coverage flights are computed with, m/s².
 pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
-/// Longest path, metres: vehicles report their progress to each other in 16 bits, in decimetres.
+/// Longest path, metres: vehicles report progress to each other in decimetres, in 16 bits.
 pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 
-/// A vehicle's pad and vertical profile, beside the data that packing uses.
+/// A vehicle's pad, and the heights of its take-off and of its landing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pad {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// First point of its path, above the pad. Its place is the vehicle's in [`Work::vehicles`].
+    /// First point of its path, above the pad, over [`Vehicle::place`]; ENU metres.
     pub start: Point,
-    /// Height of that over where the vehicle stands, metres; 0 of one that is in the air.
+    /// Height of `start` above the pad, metres; 0 for a vehicle in the air.
     pub climb_m: f32,
-    /// Height of the last point of its path, above its home, metres up in the mission frame.
+    /// Height of its path's last point, above its home: z in the mission frame, metres.
     pub end_z_m: f32,
-    /// Height of that over the ground there, metres.
+    /// Height of that point above the ground below it, metres.
     pub descent_m: f32,
-    /// Whether it is in the air: without a route it flies home.
+    /// Whether the vehicle is in the air: without a route it flies home.
     pub airborne: bool,
 }
 
 /// Settings of the camera during a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CaptureSettings {
-    /// Greatest distance from one picture to the next, metres.
+    /// Greatest distance over ground between neighbouring pictures, metres.
     pub waypoint_m: f32,
-    /// Heading of the vehicles.
+    /// Heading of the vehicles while they photograph.
     pub heading_mode: HeadingMode,
-    /// Trigger of the pictures.
+    /// How the cameras are triggered.
     pub trigger: Trigger,
 }
 
-/// Inputs of flights beside the routes.
+/// Inputs of [`plan_flights`] besides the routes.
 #[derive(Clone, Copy, Debug)]
 pub struct FlightInputs<'a> {
     /// The vehicles, in the order of [`Work::vehicles`].
@@ -65,29 +65,29 @@ pub struct FlightInputs<'a> {
     pub capture: CaptureSettings,
     /// Clearance that every leg is taken to have, metres: there are no walls.
     pub clearance_m: f32,
-    /// Separation and nominal speeds; each vehicle's own are those of [`Work::vehicles`].
+    /// Separations and nominal speeds; legs are timed by the speeds in [`Work::vehicles`].
     pub schedule: ScheduleConfig,
-    /// Most gates of one vehicle.
+    /// Most gates that a vehicle may have.
     pub max_gates: usize,
-    /// Waypoints of the area that the lanes leave out, in rising order.
+    /// Photographed waypoints of the area, ascending: the lanes do not contain them.
     pub photographed: &'a [WaypointRange],
-    /// Layers that are not free, a bit each.
+    /// Transit layers that are occupied: bit `i` is layer `i`.
     pub held_layers: u64,
-    /// Surface that lanes, and paths between them, follow where the ground is not level: all below
-    /// the lowest layer.
+    /// Height band above terrain that lanes and paths between them follow, all below the lowest
+    /// layer. `None` over level ground.
     pub following: Option<TerrainFollowing<'a>>,
 }
 
-/// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a
-/// route stays there. Of a route with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`],
-/// a flight is the first stretch ([`PicturePlan::goes_on`]): as many lanes as leave room for the
-/// path home. What is left is for the next division ([`super::losses`]).
+/// Plans the flights of all vehicles, flight `i` for vehicle `i`, with their take-off times. A
+/// vehicle on its pad without a route stays there. If a route has more than `W` corners or is
+/// longer than [`MAX_PATH_LENGTH_M`], the flight covers its first lanes only
+/// ([`PicturePlan::goes_on`]): as many as leave room for the path home. The next division
+/// ([`super::losses`]) divides the others.
 ///
-/// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a
-/// vehicle that cannot be kept apart from the others, [`PlanError::Terminals`] where pads,
-/// vehicles, routes and lanes do not belong together, [`PlanError::Config`] for a setting,
-/// [`PlanError::BadTask`] for a vehicle's, [`PlanError::SameId`].
+/// vehicle that cannot be kept apart from the others, [`PlanError::Terminals`] if pads, vehicles,
+/// routes and lanes are inconsistent, [`PlanError::Config`] for a setting, [`PlanError::BadTask`]
+/// for a setting of a vehicle, [`PlanError::SameId`].
 pub fn plan_flights<
     const L: usize,
     const N: usize,
@@ -133,7 +133,7 @@ pub fn plan_flights<
     Ok(())
 }
 
-/// Checks that every number is valid and that the inputs are consistent.
+/// Checks that all numbers are in range and that the inputs are consistent.
 fn check_inputs<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     routes: &[Route],
@@ -184,14 +184,14 @@ fn check_inputs<const L: usize, const N: usize>(
     Ok(())
 }
 
-/// The layers that no vehicle holds, from the lowest on.
+/// The transit layers that are not in `held`, from the lowest one on.
 pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
     (1..64).filter(move |layer| held >> layer & 1 == 0)
 }
 
-/// The vehicle that flies longest leaves first, each other one as early as those before it allow.
-/// One that they leave no departure goes before all of them, and the search begins again. Returns a
-/// bound of each vehicle's gates.
+/// Schedules the vehicle that flies longest first, each other one to take off as early as those
+/// before it allow. One for which they leave no take-off time is moved to the front, and all are
+/// scheduled again. Returns an upper bound of each vehicle's number of gates.
 fn schedule_departures<const V: usize, const W: usize>(
     swarm: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
@@ -200,10 +200,10 @@ fn schedule_departures<const V: usize, const W: usize>(
     let cfg = &swarm.schedule;
     let mut order: Vec<(bool, f32, u16), V> = Vec::new();
     for (flight, i) in out.flights.iter().zip(0..) {
-        // Cannot overflow: one entry a flight.
+        // Cannot overflow: one entry per flight.
         let _ = order.push((flight.task.leaves_pad(), flight.duration_s(cfg), i));
     }
-    // Whoever stays on its pad is there before all others.
+    // Vehicles that stay on their pads are scheduled before all others.
     sort::sort_by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
     let stay = order.iter().filter(|(flies, ..)| !flies).count();
     let mut tries = order.len();
@@ -224,8 +224,8 @@ fn schedule_departures<const V: usize, const W: usize>(
     }
 }
 
-/// Lets vehicles leave in this order; a bound of each one's gates, or the place of the first that
-/// cannot.
+/// Sets take-off times in this order. Returns an upper bound of each vehicle's number of gates, or
+/// the place in `order` of the first vehicle that has no take-off time.
 fn schedule_in_order<const V: usize, const W: usize>(
     cfg: &ScheduleConfig,
     order: &[(bool, f32, u16)],
@@ -255,7 +255,7 @@ fn point_at_height(place: &Flat, height_m: f32) -> Point {
     Point::new(place.x, place.y, height_m)
 }
 
-/// The flight of a vehicle that stays on its pad.
+/// The flight of a vehicle that stays on its pad: one waypoint above it.
 fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
     path.push(pad.start, 0.0)?;
@@ -271,18 +271,18 @@ fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     })
 }
 
-/// A path under construction.
+/// A flight path that is extended leg by leg.
 struct FlightPathBuilder<'a, const N: usize, const W: usize> {
     path: Path<W>,
     transit: &'a Transit<'a, N>,
     clearance_m: f32,
     following: Option<TerrainFollowing<'a>>,
-    /// Place that the flight has reached.
+    /// Last point of the path so far.
     here: Point,
 }
 
 impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
-    /// Without a waypoint yet: the first is to be above the pad.
+    /// A path without waypoints; the caller adds the first one, above the pad.
     const fn new<const L: usize>(
         work: &Work<'a, L, N>,
         swarm: &FlightInputs<'a>,
@@ -292,23 +292,23 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start }
     }
 
-    /// Appends a straight leg to a place. Returns the index of its waypoint.
+    /// Appends a straight leg to `place`. Returns the index of its waypoint.
     fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
         self.path.push(place, self.clearance_m)?;
         self.here = place;
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// Puts out the corners of the way around no-fly zones.
+    /// Writes the corners of the path from here to `to` around no-fly zones to `corners`.
     #[inline(never)]
     fn find_corners_around_zones(&self, to: &Flat, corners: &mut Vec<Flat, N>) {
-        // The plan has a finite length, so there is a way between all that it joins.
+        // The routes have finite lengths, so there is a path between all their points.
         if self.transit.shortest_path(&self.here.xy(), to, corners).is_err() {
             corners.clear();
         }
     }
 
-    /// Appends legs around no-fly zones, all at one height.
+    /// Appends level legs at `height_m` to `to`, around no-fly zones.
     fn add_legs_around_zones(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
         let mut corners = Vec::new();
         self.find_corners_around_zones(to, &mut corners);
@@ -318,8 +318,8 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
     }
 
-    /// Appends the descent to the start of the first lane, which leads to `end`. Returns the index
-    /// of that waypoint.
+    /// Appends the descent to the first lane, which begins below and leads to `end`. Returns the
+    /// index of the waypoint where the lane begins.
     fn descend_to_lane(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
         let here = self.here.xy();
         let begin = self.following.map_or(point_at_height(&here, mission_m), |following| {
@@ -328,7 +328,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.add_straight_leg(begin)
     }
 
-    /// Appends a straight leg at the height of pictures. Returns the index of its waypoint.
+    /// Appends a leg at picture height, along terrain. Returns the index of its last waypoint.
     fn add_picture_leg(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
         let Some(following) = self.following else {
             return self.add_straight_leg(point_at_height(to, mission_m));
@@ -338,7 +338,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// As `add_picture_leg`, around no-fly zones.
+    /// As `add_picture_leg`, but around no-fly zones.
     fn add_picture_legs_around_zones(
         &mut self,
         to: &Flat,
@@ -353,8 +353,8 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     }
 }
 
-/// How long a leg takes that is flown no faster than `most_mps` and from rest to rest: at its
-/// corners a vehicle nearly stops. Seconds.
+/// Duration of a leg flown at up to `most_mps`, from rest to rest since a vehicle nearly stops at
+/// corners, seconds.
 fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     if length_m * PLANNED_ACCEL_MPS2 > most_mps * most_mps {
         length_m / most_mps + most_mps / PLANNED_ACCEL_MPS2
@@ -363,13 +363,13 @@ fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     }
 }
 
-/// The first and the last waypoint of a lane that are the route's.
+/// Numbers of the first and the last waypoint of a lane that belong to the route.
 fn lane_part_of_route(lane: &Lane, route: &Route) -> (u32, u32) {
     (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
 }
 
-/// Heading of a vehicle on this route. A lane of one waypoint has no direction of its own: with the
-/// heading along the path, such a route keeps the direction of the other lanes all the way.
+/// Heading of a vehicle on this route. A lane of one waypoint has no direction: a route with such a
+/// lane keeps the direction of the other lanes instead of that along the path.
 fn heading_mode<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -391,7 +391,7 @@ fn heading_mode<const L: usize, const N: usize>(
     }
 }
 
-/// The flight of one route, or of its first part if the whole route does not fit.
+/// The flight along a route, or along its first lanes if the whole route does not fit.
 fn route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -409,7 +409,7 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
             }
             Err(error) => error,
         };
-        // The way home takes room as well.
+        // The path home needs room as well, so at least one lane fewer is tried.
         most = laid.min(most - 1);
         if most == 0 || error == PathError::NotFinite {
             return Err(error);
@@ -417,8 +417,8 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
     }
 }
 
-/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the
-/// path home.
+/// The flight along the first `most` lanes of a route. `laid` becomes the number of lanes that had
+/// room, without the path home.
 fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
@@ -463,7 +463,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
 }
 
-/// The flight home of a vehicle in the air that has no route: it photographs nothing.
+/// The flight home of a vehicle in the air without a route; it takes no pictures.
 fn flight_home<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     layer: u8,
@@ -479,16 +479,16 @@ fn flight_home<const L: usize, const N: usize, const W: usize>(
     finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
 }
 
-/// A vehicle's path home.
+/// Inputs for the end of a flight, from the last lane to home.
 struct ReturnInputs<'a> {
-    /// Layer of the flight.
+    /// Height of the transit layer, metres up in the mission frame.
     layer_m: f32,
     vehicle: &'a Vehicle,
-    /// Pictures taken by then.
+    /// The pictures of the whole flight.
     photographs: PicturePlan,
 }
 
-/// Ends a flight: up, home in the layer, down, and labelled.
+/// Ends a flight: climb to the layer, transit home, descent; then sets the times of its waypoints.
 fn finish_with_return<const N: usize, const W: usize>(
     mut draft: FlightPathBuilder<'_, N, W>,
     way_home: &ReturnInputs<'_>,

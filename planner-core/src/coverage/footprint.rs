@@ -1,59 +1,59 @@
-//! What a camera that looks straight down sees, and the spacings that follow.
+//! The ground that a camera looking straight down shows, and the spacings that follow from it.
 //!
-//! Source: CPP eqs. 1, 2, as SPEC §7 has them. Heights and sides in metres.
+//! Source: CPP eqs. 1 and 2, as SPEC §7 reads them. Heights and sides in metres.
 
 use fpu::sqrtf;
 use libm::tanf;
 
 use super::CoverageError;
 
-/// A camera.
+/// A camera, by its field of view or by its sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Camera {
     /// A camera given by its diagonal field of view.
     Diagonal {
-        /// Across the picture's diagonal, degrees, below 180.
+        /// Field of view across the image's diagonal, degrees, below 180.
         fov_deg: f32,
-        /// Long side by short side.
+        /// Ratio of the image's long side to its short side.
         aspect: f32,
     },
     /// A camera given by its sensor and focal length.
     Sensor {
-        /// Sides of the sensor, millimetres.
+        /// Both sides of the sensor, millimetres.
         sides_mm: [f32; 2],
         /// Focal length, millimetres.
         focal_mm: f32,
-        /// Pixels along both sides.
+        /// Number of pixels along both sides.
         pixels: [u32; 2],
     },
 }
 
-/// The rectangle on the ground in one picture; the long side lies across the lanes, so that there
-/// are the fewest.
+/// The rectangle of ground that one image shows. Its long side is across the lanes, so that lanes
+/// are fewest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Along the lanes, metres.
+    /// Side along the lanes, metres.
     pub along_m: f32,
-    /// Across the lanes, metres.
+    /// Side across the lanes, metres.
     pub across_m: f32,
 }
 
-/// Spacing of lanes and waypoints.
+/// Spacing of lanes and of waypoints along them, and the footprint for which they are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spacing {
-    /// The rectangle that one picture shows.
+    /// The rectangle of ground that one image shows.
     pub footprint: Footprint,
-    /// Between two lanes, metres: at most.
+    /// Greatest distance between neighbouring lanes, metres.
     pub lane_m: f32,
-    /// Between two waypoints of a lane, metres: at most.
+    /// Greatest distance between neighbouring waypoints of a lane, metres.
     pub waypoint_m: f32,
 }
 
 impl Camera {
-    /// The camera, if every number is positive and finite and the field of view below 180°.
+    /// Checks that every number is positive and finite, and the field of view below 180°.
     ///
     /// # Errors
-    /// The setting that is wrong.
+    /// The name of the setting that is wrong.
     pub fn check(&self) -> Result<(), CoverageError> {
         let positive = |name, value: f32| match value > 0.0 && value.is_finite() {
             true => Ok(()),
@@ -74,7 +74,7 @@ impl Camera {
         }
     }
 
-    /// Both sides of the picture on the ground for each metre of height, the longer last.
+    /// Both sides of the ground rectangle per metre of height, the shorter first.
     fn ground_sides_per_m(&self) -> [f32; 2] {
         let [a, b] = match *self {
             Self::Diagonal { fov_deg, aspect } => {
@@ -86,10 +86,10 @@ impl Camera {
         if a <= b { [a, b] } else { [b, a] }
     }
 
-    /// The footprint from `height_m` above the ground.
+    /// The footprint of an image from `height_m` above the ground.
     ///
     /// # Errors
-    /// The setting that is wrong.
+    /// The name of the setting that is wrong.
     pub fn footprint(&self, height_m: f32) -> Result<Footprint, CoverageError> {
         self.check()?;
         if !(height_m > 0.0 && height_m.is_finite()) {
@@ -99,10 +99,11 @@ impl Camera {
         Ok(Footprint { along_m: along * height_m, across_m: across * height_m })
     }
 
-    /// The height from which one pixel shows `gsd_m` of ground (ground sampling distance).
+    /// The height above ground from which a pixel shows `gsd_m` of ground (ground sampling
+    /// distance).
     ///
     /// # Errors
-    /// The setting that is wrong; `pixels` where the camera is given by its field of view.
+    /// The name of the setting that is wrong; `pixels` for a camera given by its field of view.
     pub fn height_for_gsd(&self, gsd_m: f32) -> Result<f32, CoverageError> {
         self.check()?;
         let Self::Sensor { sides_mm, focal_mm, pixels } = *self else {
@@ -116,10 +117,10 @@ impl Camera {
 }
 
 impl Spacing {
-    /// Whether every side is positive and finite, and no gaps are left.
+    /// Checks that every number is positive and finite, and that neighbouring images leave no gaps.
     ///
     /// # Errors
-    /// The setting that is wrong, or [`CoverageError::Gaps`].
+    /// The name of the setting that is wrong, or [`CoverageError::Gaps`].
     pub fn check(&self) -> Result<(), CoverageError> {
         let sides = [
             ("footprint", self.footprint.along_m),
@@ -128,7 +129,7 @@ impl Spacing {
             ("waypoint_m", self.waypoint_m),
         ];
         crate::all_positive(&sides).map_err(|error| CoverageError::Setting(error.0))?;
-        // Spacings that were computed from the footprint may be a rounding above it.
+        // Spacings that were computed from the footprint may exceed it by a rounding.
         let beyond = |spacing: f32, side: f32| spacing > side * (1.0 + 1e-5);
         if beyond(self.lane_m, self.footprint.across_m)
             || beyond(self.waypoint_m, self.footprint.along_m)

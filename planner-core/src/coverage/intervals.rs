@@ -1,13 +1,13 @@
-//! Sets of numbers as sorted intervals that do not touch.
+//! Sets of real numbers, stored as sorted intervals that do not touch.
 
 use heapless::Vec;
 
 use super::CoverageError;
 
-/// Lower and upper end.
+/// Lower and upper end of an interval.
 pub(super) type Span = [f32; 2];
 
-/// A set of numbers: at most `N` intervals.
+/// A set of real numbers, of at most `N` intervals.
 #[derive(Default)]
 pub(super) struct Intervals<const N: usize> {
     spans: Vec<Span, N>,
@@ -28,7 +28,7 @@ impl<const N: usize> Intervals<N> {
 
     /// Adds an interval to the set.
     pub(super) fn add(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
-        // Spans that the new one touches become one span with it: they follow each other.
+        // Intervals that the new one touches are consecutive; they are merged with it.
         let first = self.spans.partition_point(|span| span[1] < from);
         let after = self.spans.partition_point(|span| span[0] <= to);
         if first < after {
@@ -43,12 +43,12 @@ impl<const N: usize> Intervals<N> {
         self.spans.insert(first, [from, to]).map_err(|_| CoverageError::LanesFull)
     }
 
-    /// Drops intervals that are shorter than this.
+    /// Drops intervals that are shorter than `least`.
     pub(super) fn drop_shorter(&mut self, least: f32) {
         self.spans.retain(|[from, to]| to - from >= least);
     }
 
-    /// Removes the interiors of another set's intervals.
+    /// Removes the interiors of the intervals of another set.
     pub(super) fn remove_all(&mut self, other: &Self) -> Result<(), CoverageError> {
         other.spans().iter().try_for_each(|span| self.remove(*span))
     }

@@ -1,4 +1,4 @@
-//! Lanes, and the way along all of them.
+//! Lanes, and the path along all of them.
 
 use crate::Length;
 use heapless::Vec;
@@ -8,39 +8,40 @@ use super::footprint::Spacing;
 use super::transit::Transit;
 use super::{CoverageError, Flat};
 
-/// Most waypoints of an area: an f32 counts them exactly.
+/// Most waypoints of an area: up to here f32 counts exactly.
 const MAX_WAYPOINTS: f32 = (1 << 24) as f32;
 
-/// Inputs of lanes, besides the area.
+/// Settings by which lanes are laid over an area: spacings, direction, margin, search effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LanePattern {
-    /// Footprint and spacings.
+    /// Footprint of an image, and spacings.
     pub spacing: Spacing,
-    /// Direction of the lanes, degrees from east to the left; the one of least width where absent.
+    /// Direction of the lanes, degrees counter-clockwise from east; `None` chooses that of least
+    /// width.
     pub angle_deg: Option<f32>,
-    /// Distance beyond the area's edge at which lanes begin and end, metres.
+    /// Distance by which lanes begin before and end beyond the area's border, metres.
     pub margin_m: f32,
-    /// Most changes of the lanes' order that are looked at; few of them cost distances around
-    /// zones.
+    /// Most changes of the lanes' order that the local search tries; only few of them compute a
+    /// distance around zones.
     pub search_steps: u32,
 }
 
-/// One lane. Waypoint `k` lies `k / (count − 1)` of the way from `from` to `to`.
+/// One lane. Its waypoint `k` lies at the share `k / (count − 1)` from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
-    /// Start of the lane.
+    /// First waypoint of the lane in the direction of flight, east and north.
     pub from: Flat,
-    /// End of the lane.
+    /// Last waypoint of the lane.
     pub to: Flat,
-    /// Number of its first waypoint, counted along the whole path; while lanes are ordered, that of
-    /// its cell.
+    /// Number of its first waypoint along the whole path. While lanes are being ordered: the number
+    /// of its cell.
     pub first: u32,
-    /// Waypoints on it, at least 1.
+    /// Number of waypoints on the lane, at least 1.
     pub count: u32,
-    /// Length of the whole path before its first waypoint, metres; while lanes are ordered, of the
-    /// way to the next one.
+    /// Length of the path from its beginning to this lane, metres. While lanes are being ordered:
+    /// length of the link to the next lane.
     pub start_m: f32,
-    /// The strip it lies in.
+    /// Index of the strip in which it lies.
     pub strip: u16,
 }
 
@@ -50,7 +51,7 @@ impl Lane {
         (self.to - self.from).length()
     }
 
-    /// Waypoint `k` of it, from 0: the last one for numbers beyond.
+    /// Waypoint `k` of the lane, counted from 0; the last one for a larger `k`.
     pub fn waypoint(&self, k: u32) -> Flat {
         if self.count < 2 {
             self.from
@@ -69,7 +70,7 @@ impl Lane {
     }
 }
 
-/// All lanes in the order in which one vehicle would fly them: at most `L`.
+/// All lanes of an area, at most `L`, in the order in which one vehicle would fly them.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks<const L: usize> {
     pub(super) lanes: Vec<Lane, L>,
@@ -77,50 +78,51 @@ pub struct Tracks<const L: usize> {
 }
 
 impl<const L: usize> Tracks<L> {
-    /// No lanes: all zeros.
+    /// Creates an empty path, without lanes: all zeros.
     pub const fn new() -> Self {
         Self { lanes: Vec::new(), along: Flat::new(0.0, 0.0) }
     }
 
-    /// The direction along the lanes, of length 1; 0 where there are none.
+    /// Unit vector along the lanes, east and north; 0 if there are no lanes.
     pub fn lane_direction(&self) -> Flat {
         self.along
     }
 
-    /// The lanes.
+    /// The lanes in the order of the path.
     pub fn lanes(&self) -> &[Lane] {
         &self.lanes
     }
 
-    /// Number of waypoints.
+    /// Number of waypoints of all lanes.
     pub fn waypoint_count(&self) -> u32 {
         self.lanes.last().map_or(0, |lane| lane.first + lane.count)
     }
 
-    /// Length of the whole path, metres.
+    /// Length of the path along all lanes, transits included, metres.
     pub fn length_m(&self) -> f32 {
         self.lanes.last().map_or(0.0, |lane| lane.start_m + lane.length_m())
     }
 
-    /// The lane of a waypoint, by number: the last lane for numbers beyond.
+    /// Index of the lane of a waypoint, given by its number; the last lane for a larger number.
     pub fn lane_of(&self, waypoint: u32) -> usize {
         self.lanes.partition_point(|lane| lane.first <= waypoint).saturating_sub(1)
     }
 
-    /// Place of a waypoint.
+    /// Position of a waypoint, east and north; `None` if there is no such number.
     pub fn waypoint(&self, number: u32) -> Option<Flat> {
         let lane = self.lanes.get(self.lane_of(number))?;
         let k = number.checked_sub(lane.first).filter(|k| *k < lane.count)?;
         Some(lane.waypoint(k))
     }
 
-    /// Length of the path up to a waypoint, metres: up to the last one for numbers beyond.
+    /// Length of the path up to a waypoint, metres; up to the last one for a larger number.
     pub fn distance_to_waypoint_m(&self, number: u32) -> f32 {
         let Some(lane) = self.lanes.get(self.lane_of(number)) else { return 0.0 };
         lane.start_m + lane.length_m() * lane.fraction_at(number - lane.first)
     }
 
-    /// Numbers the waypoints and computes the lengths along the path.
+    /// Sets the number of waypoints of each lane by the spacing, numbers them, and computes lengths
+    /// along the path.
     pub(super) fn number_waypoints<const N: usize>(
         &mut self,
         spacing: &Spacing,
@@ -140,7 +142,7 @@ impl<const L: usize> Tracks<L> {
         self.measure_lengths(transit)
     }
 
-    /// Numbers the waypoints that each lane already has, and computes the lengths along the path.
+    /// Numbers the waypoints that each lane already has, and computes lengths along the path.
     pub(super) fn measure_lengths<const N: usize>(
         &mut self,
         transit: &Transit<'_, N>,

@@ -1,9 +1,10 @@
-//! The division after a loss: what is left of the area goes to the vehicles that fly on, from where
-//! they hold.
+//! The division after a loss: the waypoints that are left go to the remaining vehicles, which
+//! continue from where they hold.
 //!
-//! Beyond CPP, which has this as future work. It is BINPAT over what is left ([`super::divide`]), a
-//! pure function of the plan before it and of what all vehicles agree on, their [`VehicleStatus`]s:
-//! every vehicle computes the same bits. A further loss is divided from the division before.
+//! Beyond CPP, which names this as future work. It is BINPAT over the remaining lanes
+//! ([`super::divide`]): a pure function of the plan before it and of the [`VehicleStatus`] of every
+//! vehicle, on which all vehicles agree. So every vehicle computes the same bits. A further loss is
+//! divided starting from the division before.
 
 use heapless::Vec;
 
@@ -17,34 +18,34 @@ use crate::flight::{Task, WaypointRange, WaypointSet};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::ScheduleWorkspace;
 
-/// Most separate ranges of waypoints that are done.
+/// Most separate ranges of waypoints that are photographed or promised.
 const MAX_DONE_RANGES: usize = 128;
 
-/// State of one vehicle. All vehicles agree on it before the area is divided again.
+/// Status of one vehicle at a division. All vehicles agree on it before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleStatus {
-    /// Whether it flies on.
+    /// Whether it continues.
     pub alive: bool,
-    /// Place along its path up to which the pictures are the vehicle's own, taken or promised,
-    /// metres. A vehicle that lives holds there; at 0 it still stands on its pad. Of a vehicle that
-    /// does not live the last picture is taken again: it may be missing. Infinite: the vehicle took
-    /// all pictures.
+    /// Arc length of its path up to which the pictures count as its own, taken or promised, metres.
+    /// A vehicle that continues holds there; at 0 it is still on its pad. If it does not continue,
+    /// its last picture is taken again, since it may be missing. Infinite if it took all its
+    /// pictures.
     pub along_m: f32,
 }
 
-/// Memory lent for areas of at most `L` lanes and `K` vehicles.
+/// Memory of divisions, for areas of at most `L` lanes and fleets of at most `K` vehicles.
 pub struct Workspace<const L: usize, const K: usize> {
     done: WaypointSet<MAX_DONE_RANGES>,
     remaining: Tracks<L>,
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
     rest: Plan<K>,
-    /// Layers of vehicles that left: they may be on their way home there.
+    /// Transit layers of lost vehicles, which may be flying home in them: bit `i` is layer `i`.
     held_layers: u64,
 }
 
 impl<const L: usize, const K: usize> Workspace<L, K> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
             done: WaypointSet::new(),
@@ -56,9 +57,9 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
         }
     }
 
-    /// To be called before the first division of a plan: these waypoints are done, by their numbers
-    /// on the whole path. Where that is all of it, the area is begun again. Returns the lanes that
-    /// are left, and what is done.
+    /// Starts a new plan, before its first division, with the waypoints `done` photographed already
+    /// (numbers on the whole path). If these are all waypoints, the area is photographed once more.
+    /// Returns the remaining lanes and what is done.
     ///
     /// # Errors
     /// Those of [`divide::remaining_lanes`]; [`CoverageError::LanesFull`] for too many ranges.
@@ -85,7 +86,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
         Ok((&self.remaining, self.done.ranges()))
     }
 
-    /// Waypoints that are done or promised, in rising order, by their numbers on the whole path.
+    /// Waypoints that are photographed or promised: ascending, by their numbers on the whole path.
     pub fn done(&self) -> &[WaypointRange] {
         self.done.ranges()
     }
@@ -97,23 +98,23 @@ impl<const L: usize, const K: usize> Default for Workspace<L, K> {
     }
 }
 
-/// A loss: the plan before it, and what all agree on.
+/// A loss: the plan before it, and the status of all vehicles.
 #[derive(Clone, Copy)]
 pub struct Loss<'a, const L: usize, const N: usize> {
-    /// The division before: the lanes of the whole area, all vehicles.
+    /// The lanes of the whole area and all vehicles, as before any loss.
     pub work: &'a Work<'a, L, N>,
-    /// Inputs of the flights.
+    /// Pads and settings with which the flights before the loss were planned.
     pub swarm: &'a FlightInputs<'a>,
-    /// State of each vehicle.
+    /// Status of each vehicle, in the order of [`Work::vehicles`].
     pub fates: &'a [VehicleStatus],
 }
 
 /// Reason why there is no division.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Error {
-    /// The area.
+    /// Lanes or routes could not be computed.
     Coverage(CoverageError),
-    /// The flights.
+    /// The flights could not be planned.
     Plan(PlanError),
 }
 
@@ -129,12 +130,11 @@ impl From<PlanError> for Error {
     }
 }
 
-/// Divides what is left. `routes` are those of the plan before, `out` has its flights; afterwards
-/// both are those of the division.
+/// Divides the remaining waypoints. On entry `routes` and `out` are the routes and flights of the
+/// plan before; on success they are those of the division.
 ///
-/// # Errors
 /// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
-/// [`CoverageError::Vehicles`] where fates, routes and vehicles do not belong together;
+/// [`CoverageError::Vehicles`] if fates, routes and vehicles are inconsistent;
 /// [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
 pub fn redivide_work<
     const L: usize,
@@ -183,13 +183,12 @@ pub fn redivide_work<
     Ok(flights::plan_flights(&work, routes, &swarm, schedule, out)?)
 }
 
-/// The bit of a layer.
+/// The bit of a transit layer in `held_layers`.
 const fn layer_bit(layer: u8) -> u64 {
     1u64.wrapping_shl(layer as u32)
 }
 
-/// Adds the waypoints that each vehicle has photographed, or keeps as its commitment, to the
-/// earlier ones.
+/// Adds the waypoints that each vehicle has photographed, or promised to photograph, to `ws.done`.
 fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: usize>(
     fates: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
@@ -209,7 +208,7 @@ fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: u
     Ok(())
 }
 
-/// Sets the place from which each vehicle continues.
+/// Sets the place and height from which each vehicle continues.
 fn set_start_places<
     const L: usize,
     const N: usize,
@@ -240,7 +239,7 @@ fn set_start_places<
     Ok(())
 }
 
-/// Divides the remaining work among the vehicles that are alive.
+/// Divides the remaining lanes among the vehicles that continue.
 fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     fates: &[VehicleStatus],

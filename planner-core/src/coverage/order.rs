@@ -1,14 +1,15 @@
-//! The order in which lanes are flown, and each one's direction: the shortest way from lane to
-//! lane.
+//! The order in which lanes are flown, and the direction of each: a local search for the shortest
+//! path along all of them.
 //!
-//! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1), from the end
-//! where that joins them by less. Elsewhere a first order takes one cell after the other (`cells`).
-//! Parts of it are turned round (2-opt) and cells of up to ten lanes moved (Or-opt) as long as that
-//! shortens the way. Lanes that are laid for what no strip shows (`patches`) are put where they
-//! make the way longer by least; then the same is done with lanes instead of cells, until the looks
-//! are used up. Both ends of the way are free. O(n²) sums a round, rounds bounded by `steps_left`,
-//! and O(n²) for the first order: ways between lanes that follow each other are kept, and a
-//! distance around zones is taken only where straight lines would be shorter.
+//! A convex area has one lane per strip. These are flown back and forth (CPP §3.2.1), from the end
+//! of the first lane that gives the shorter links. Other areas start from an order by cells
+//! (`cells`). Parts of it are reversed (2-opt) and cells of up to ten lanes moved (Or-opt) as long
+//! as that shortens the path. Then the lanes that were added beside no-fly zones (`patches`) are
+//! inserted where they lengthen the path least. Then the same moves are tried with single lanes
+//! instead of cells, until the search steps are used up. Both ends of the path are free. O(n²) sums
+//! per round, rounds bounded by `steps_left`, and O(n²) for the initial order. The lengths of links
+//! between consecutive lanes are stored, and a distance around zones is computed only where
+//! straight lines would be shorter.
 
 use super::Flat;
 use super::cells::{is_break, order_cells};
@@ -16,13 +17,14 @@ use super::lanes::Lane;
 use super::transit::Transit;
 use crate::Length;
 
-/// Least shortening of the tour that counts, metres: a smaller gain is rounding.
+/// Least shortening of the path that counts, metres: a smaller one may be rounding.
 const MIN_GAIN_M: f32 = 1e-3;
-/// Most lanes that Or-opt moves together: whole cells at first.
+/// Most lanes that Or-opt moves together; in the first search these are whole cells.
 const MAX_MOVED: usize = 10;
 
-/// Sorts lanes into the order and the directions in which they are flown. The first `strips` of
-/// them are along the middle of strips, in the strips' order and grouped into cells.
+/// Sorts lanes into the order, and turns them in the directions, in which they are flown. The first
+/// `strips` of them run along the middle of strips, in the order of the strips, grouped into cells.
+/// `looks` is the number of search steps.
 pub(super) fn order_lanes<const N: usize>(
     lanes: &mut [Lane],
     strips: usize,
@@ -41,14 +43,15 @@ pub(super) fn order_lanes<const N: usize>(
     (1..=strips).for_each(|k| search.measure_links(&mut lanes[..strips], &[k]));
     search.shorten(&mut lanes[..strips]);
     (strips..lanes.len()).for_each(|k| search.insert_last(&mut lanes[..=k]));
-    // From here on each lane is moved by itself.
+    // From here on each lane is moved by itself: it is a cell of its own.
     for (lane, k) in lanes.iter_mut().zip(0..) {
         lane.first = k;
     }
     search.shorten(lanes);
 }
 
-/// Whether lanes in a row, flown back and forth, are joined by less if the first one is turned.
+/// Whether lanes in consecutive strips, flown back and forth, have shorter links if the first one
+/// is reversed.
 fn should_reverse_first(lanes: &[Lane]) -> bool {
     let mut gain_m = 0.0;
     for (i, pair) in lanes.windows(2).enumerate() {
@@ -58,28 +61,29 @@ fn should_reverse_first(lanes: &[Lane]) -> bool {
     gain_m > MIN_GAIN_M
 }
 
-/// Changes of an order. Meanwhile `start_m` of a lane is the length of the way from it to the next
-/// one.
+/// Local search over orders. During the search `start_m` of a lane is the length of the link from
+/// it to the next lane.
 struct LaneOrderSearch<'t, 'a, const N: usize> {
     transit: &'t Transit<'a, N>,
     steps_left: u32,
 }
 
 impl<const N: usize> LaneOrderSearch<'_, '_, N> {
-    /// Changes the order as long as that shortens the way.
+    /// Applies Or-opt and 2-opt moves as long as they shorten the path.
     #[inline(never)]
     fn shorten(&mut self, lanes: &mut [Lane]) {
         while self.or_opt(lanes) | self.two_opt(lanes) {}
     }
 
-    /// Uses up one search step. Returns false if none is left.
+    /// Uses up one search step. Returns false if none was left.
     fn take_search_step(&mut self) -> bool {
         let left = self.steps_left > 0;
         self.steps_left = self.steps_left.saturating_sub(1);
         left
     }
 
-    /// Length between two lane ends; zero where the path begins or ends.
+    /// Length of the link between two lane ends, around zones, metres; 0 where one is `None`, at an
+    /// end of the path.
     fn transit_length_m(&self, from: Option<Flat>, to: Option<Flat>) -> f32 {
         match (from, to) {
             (Some(from), Some(to)) => self.transit.distance_m(&from, &to),
@@ -87,7 +91,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         }
     }
 
-    /// Measures the ways to these lanes from those before them.
+    /// Computes and stores the lengths of the links that lead to the lanes with these indices.
     #[inline(never)]
     fn measure_links(&self, lanes: &mut [Lane], to: &[usize]) {
         for &k in to.iter().filter(|k| **k > 0) {
@@ -96,7 +100,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         }
     }
 
-    /// 2-opt: reverses parts of the order where that shortens the path.
+    /// 2-opt: reverses parts of the order where that shortens the path. Returns whether any was.
     fn two_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         for i in 0..lanes.len() {
@@ -111,7 +115,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
                 let before = i.checked_sub(1).map(|k| lanes[k].to);
                 let after = lanes.get(j + 1).map(|lane| lane.from);
                 let (from, to) = (lanes[i].from, lanes[j].to);
-                // No way is shorter than the straight one.
+                // No link around zones is shorter than the straight line.
                 if straight_distance_m(before, to) + straight_distance_m(after, from)
                     > old - MIN_GAIN_M
                 {
@@ -129,8 +133,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// Or-opt: moves up to [`MAX_MOVED`] lanes that follow each other, at first whole cells, as
-    /// they are or turned round.
+    /// Or-opt: moves up to [`MAX_MOVED`] consecutive lanes, in the first search whole cells, as
+    /// they are or reversed, where that shortens the path. Returns whether any were.
     fn or_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();
@@ -160,8 +164,9 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// The best place for `len` lanes from `i` on: they would stand before the lane that is at it
-    /// now.
+    /// The place in the order to which `len` lanes from `i` on are best moved, and whether
+    /// reversed: they would come before the lane that is there now. `None` if no place shortens the
+    /// path.
     fn best_insertion(&mut self, lanes: &[Lane], i: usize, len: usize) -> Option<(usize, bool)> {
         let before = i.checked_sub(1).map(|k| lanes[k].to);
         let after = lanes.get(i + len).map(|lane| lane.from);
@@ -182,7 +187,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         best.at
     }
 
-    /// Puts the last lane where it makes the way longer by least.
+    /// Inserts the last lane where it lengthens the path least.
     fn insert_last(&self, lanes: &mut [Lane]) {
         let Some((last, others)) = lanes.split_last_mut() else { return };
         last.start_m = 0.0;
@@ -197,7 +202,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         self.measure_links(lanes, &[place, place + 1]);
     }
 
-    /// Whether the way becomes longer by less where a part with these ends comes before a lane.
+    /// Updates `best` if a part with ends `from` and `to` lengthens the path less when it is
+    /// inserted before lane `place`.
     #[inline(never)]
     fn try_insertion(
         &self,
@@ -225,14 +231,14 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
     }
 }
 
-/// Where a part of the order is put: by how much the way becomes longer; before which lane, and
-/// whether turned round.
+/// The best insertion so far: by how much it lengthens the path, before which lane, and whether the
+/// part is reversed.
 struct Insertion {
     more_m: f32,
     at: Option<(usize, bool)>,
 }
 
-/// Length of the way to a lane from the one before it.
+/// Length of the link to lane `k` from the one before it, metres; 0 for the first lane.
 fn link_before_m(lanes: &[Lane], k: usize) -> f32 {
     k.checked_sub(1).map_or(0.0, |before| lanes[before].start_m)
 }
@@ -241,10 +247,10 @@ fn straight_distance_m(from: Option<Flat>, to: Flat) -> f32 {
     from.map_or(0.0, |from| (to - from).length())
 }
 
-/// Flies lanes the other way, the last one first.
+/// Reverses the order and the directions of lanes.
 fn reverse_lanes(lanes: &mut [Lane]) {
     lanes.reverse();
-    // The way that led to a lane now leads from it.
+    // The link that led to a lane now leads from it.
     for k in 1..lanes.len() {
         lanes[k - 1].start_m = lanes[k].start_m;
     }

@@ -1,16 +1,18 @@
-//! SIMPLE-BINPAT and BINPAT: the path is cut into contiguous routes, and routes go to vehicles.
+//! SIMPLE-BINPAT and BINPAT: the path is cut into contiguous routes, which are assigned to
+//! vehicles.
 //!
-//! Source: CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills one bin after the
-//! other with tracks until its share of the whole length is full; the track that would exceed the
-//! share goes in only where the result is nearer to it. The last bin with a share takes the rest.
-//! Bins go to vehicles by linear sum assignment over the way from a vehicle's place to the first
-//! waypoint and from the last one home, in the better of both directions. The higher the cost, the
-//! lower the layer. `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (CPP eq. 4).
+//! Source: CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills bin after bin with
+//! tracks until the bin's share of the path's length is reached. The track that would exceed the
+//! share goes in only if the result is nearer to the share. The last bin with a share gets the
+//! rest. Bins are assigned to vehicles by linear sum assignment of transit lengths: from the
+//! vehicle's place to the first waypoint and from the last one home, in the shorter of both
+//! directions. The longer a route takes, the lower its layer.
+//! `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (CPP eq. 4).
 //!
-//! Δh is at least one layer: a vehicle in transit never is at the height at which others
+//! Δh is at least one layer, so a vehicle in transit is never at the height at which others
 //! photograph.
 //!
-//! Cost: K vehicles, n lanes: K · log n, K² ways, one assignment (K³).
+//! Cost for K vehicles and n lanes: K · log n steps, K² transits, one assignment (K³).
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -20,12 +22,12 @@ use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::assignment::{AssignmentWorkspace, assign};
 
-/// One vehicle.
+/// What packing needs of a vehicle: ends of its transits, speeds, weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
-    /// Start of the vehicle's transit to the first waypoint.
+    /// Place where the vehicle begins its transit to the first waypoint, east and north.
     pub place: Flat,
-    /// End of the vehicle's transit home.
+    /// Place where the vehicle's transit home ends, east and north.
     pub home: Flat,
     /// Speed over ground, m/s.
     pub cruise_mps: f32,
@@ -33,61 +35,61 @@ pub struct Vehicle {
     pub climb_mps: f32,
     /// Speed of descent (V_d in the paper), m/s.
     pub descend_mps: f32,
-    /// W_k: its share of the work is this by the sum of all.
+    /// W_k: the vehicle's share of the path is this divided by the sum over all vehicles.
     pub weight: f32,
 }
 
-/// Heights of a mission.
+/// Heights of a coverage mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heights {
-    /// h_m: the height at which pictures are taken, above the ground from which vehicles take off,
-    /// metres.
+    /// h_m: height at which pictures are taken, metres above the ground from which vehicles take
+    /// off.
     pub mission_m: f32,
-    /// Height from one transit layer to the next, metres.
+    /// Vertical distance between neighbouring transit layers, metres.
     pub layer_m: f32,
 }
 
-/// Definition of a track: the smallest part of the path that goes to one vehicle as a whole.
+/// What a track is: the smallest part of the path that goes to one vehicle as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackUnit {
-    /// A lane: the simple back-and-forth pattern, SIMPLE-BINPAT.
+    /// A whole lane: the simple back-and-forth pattern, SIMPLE-BINPAT.
     Lane,
-    /// A waypoint and the way to it: the sampled pattern, BINPAT.
+    /// A waypoint and the step that leads to it: the sampled pattern, BINPAT.
     Waypoint,
 }
 
 /// Direction in which a route is flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heading {
-    /// In rising order of the waypoints' numbers.
+    /// In ascending order of waypoint numbers.
     Forward,
-    /// In falling order of the waypoints' numbers.
+    /// In descending order of waypoint numbers.
     Backward,
 }
 
-/// Route of one vehicle: waypoints `first` up to before `end`, without a break.
+/// The route of one vehicle: all waypoints with numbers `first` to `end` − 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Route {
-    /// Index of the vehicle.
+    /// Index of the vehicle in [`Work::vehicles`].
     pub vehicle: u8,
-    /// The waypoint with the lowest number.
+    /// Lowest waypoint number of the route.
     pub first: u32,
-    /// After the one with the highest.
+    /// Highest waypoint number of the route plus one.
     pub end: u32,
-    /// Which way it is flown.
+    /// Direction in which the route is flown.
     pub heading: Heading,
-    /// The layer of its transit, from 1: layers above the height of the mission.
+    /// Transit layer, from 1: it is this many layer heights above the height of pictures.
     pub layer: u8,
-    /// Way over ground: to the first waypoint, along the route, home; metres.
+    /// Length over ground, metres: transit to the first waypoint, route, transit home.
     pub ground_m: f32,
-    /// Length with climb and descent, metres.
+    /// `ground_m` with climb and descent, metres.
     pub cost_m: f32,
-    /// C_k, seconds: way over ground at cruise speed, and H_d.
+    /// C_k: `ground_m` at cruise speed plus H_d, seconds.
     pub cost_s: f32,
 }
 
 impl Route {
-    /// The waypoint that is flown to first, and the last one. A route has one at least.
+    /// Numbers of the first and the last waypoint in the direction of flight.
     pub fn end_waypoints(&self) -> (u32, u32) {
         let last = self.end.saturating_sub(1);
         match self.heading {
@@ -96,7 +98,7 @@ impl Route {
         }
     }
 
-    /// Numbers of its waypoints in the order in which they are flown.
+    /// Waypoint numbers in the order in which they are flown.
     pub fn waypoints(&self) -> impl Iterator<Item = u32> + use<> {
         let Self { first, end, heading, .. } = *self;
         (first..end).map(move |i| match heading {
@@ -106,27 +108,27 @@ impl Route {
     }
 }
 
-/// All routes, in the order of the path: at most one a vehicle. A vehicle without one stays on the
-/// ground.
+/// The division of a path: at most one route per vehicle, in the order of the path. A vehicle
+/// without a route stays on the ground.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan<const K: usize> {
-    /// The routes.
+    /// The routes, in the order of the path.
     pub routes: Vec<Route, K>,
 }
 
 impl<const K: usize> Plan<K> {
-    /// No routes.
+    /// Creates a plan without routes.
     pub const fn new() -> Self {
         Self { routes: Vec::new() }
     }
 
-    /// max C_k, seconds: when the last vehicle is done.
+    /// max C_k, seconds: when the last vehicle lands.
     pub fn max_cost_s(&self) -> f32 {
         self.routes.iter().map(|route| route.cost_s).fold(0.0, fmaxf)
     }
 }
 
-/// Memory lent for at most `K` vehicles.
+/// Memory for packing with at most `K` vehicles.
 pub struct PackWorkspace<const K: usize> {
     transits_m: Vec<f32, 1024>,
     columns: [Option<u16>; K],
@@ -136,7 +138,7 @@ pub struct PackWorkspace<const K: usize> {
 }
 
 impl<const K: usize> PackWorkspace<K> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         assert!(K * K <= 1024, "the cost matrix has room for 32 vehicles");
         Self {
@@ -150,7 +152,7 @@ impl<const K: usize> PackWorkspace<K> {
 }
 
 impl<const K: usize> PackWorkspace<K> {
-    /// The shares by which the bins were filled last.
+    /// The shares by which the bins were filled last, one per vehicle, in any unit.
     pub fn shares(&self) -> &[f32; K] {
         &self.shares
     }
@@ -162,27 +164,28 @@ impl<const K: usize> Default for PackWorkspace<K> {
     }
 }
 
-/// Work to divide: the path, the transits around no-fly zones, the vehicles.
+/// What is to be divided: the path, the transits around no-fly zones, vehicles and heights.
 #[derive(Clone, Copy)]
 pub struct Work<'a, const L: usize, const N: usize> {
-    /// The lanes.
+    /// The lanes and the path along them.
     pub tracks: &'a Tracks<L>,
-    /// Ways around no-fly zones.
+    /// Shortest paths around no-fly zones.
     pub transit: &'a Transit<'a, N>,
-    /// Which vehicle flies it.
+    /// The vehicles among which the path is divided.
     pub vehicles: &'a [Vehicle],
-    /// Heights.
+    /// Heights of pictures and of transit layers.
     pub heights: Heights,
-    /// Definition of a track.
+    /// What a track is: a lane or a waypoint.
     pub unit: TrackUnit,
 }
 
 impl<const L: usize, const N: usize> Work<'_, L, N> {
-    /// Whether all settings are what they may be.
+    /// Checks that all settings are in range.
     ///
     /// # Errors
-    /// The setting that is not; [`CoverageError::Vehicles`] for none or more than `K`;
-    /// [`CoverageError::NothingToCover`].
+    /// [`CoverageError::Setting`] with the name of the setting that is out of range;
+    /// [`CoverageError::Vehicles`] for no vehicle or more than `K`;
+    /// [`CoverageError::NothingToCover`] without lanes.
     pub fn check<const K: usize>(&self) -> Result<(), CoverageError> {
         if self.vehicles.is_empty() || self.vehicles.len() > K.min(usize::from(u8::MAX)) {
             return Err(CoverageError::Vehicles);
@@ -212,13 +215,13 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         Ok(())
     }
 
-    /// H_d of a vehicle in a layer, seconds.
+    /// H_d: time that a vehicle takes to climb to a layer and to descend from it, seconds.
     pub fn altitude_delay_s(&self, vehicle: &Vehicle, layer: u8) -> f32 {
         let top_m = self.heights.mission_m + f32::from(layer) * self.heights.layer_m;
         top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
     }
 
-    /// The ends of waypoints `first` up to before `end`.
+    /// The ends of the part of the path with waypoints `first` to `end` − 1.
     #[inline(never)]
     pub(super) fn route_ends(&self, first: u32, end: u32) -> RouteEnds {
         let place = |number| self.tracks.waypoint(number).unwrap_or_default();
@@ -230,7 +233,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         }
     }
 
-    /// A vehicle's way over ground for a route with these ends, in the better direction.
+    /// Length over ground of a vehicle's flight along a route with these ends, metres, and the
+    /// direction in which it is shorter.
     #[inline(never)]
     pub(super) fn ground_distance_m(&self, vehicle: &Vehicle, ends: &RouteEnds) -> (f32, Heading) {
         let transit_m = |from: &Flat, to: &Flat| {
@@ -239,7 +243,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         };
         let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.place == vehicle.home {
-            // The same transits the other way round.
+            // The same transits in the opposite direction.
             forward
         } else {
             transit_m(&ends.last, &ends.first)
@@ -251,17 +255,17 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     }
 }
 
-/// The first and the last waypoint of a route, and the way between them, metres.
+/// First and last waypoint of a route, and the length of the path between them, metres.
 pub(super) struct RouteEnds {
     first: Flat,
     last: Flat,
     inside_m: f32,
 }
 
-/// BINPAT, or SIMPLE-BINPAT where a track is a lane: shares by the vehicles' weights.
+/// BINPAT, or SIMPLE-BINPAT where a track is a lane, with the vehicles' weights as shares.
 ///
 /// # Errors
-/// See [`Work::check`]; [`CoverageError::Unreachable`].
+/// Those of [`Work::check`]; [`CoverageError::Unreachable`] if no path leads to a route.
 pub fn binpat<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     ws: &mut PackWorkspace<K>,
@@ -280,11 +284,11 @@ pub fn binpat<const L: usize, const N: usize, const K: usize>(
     )
 }
 
-/// BINPAT by shares that were found before (POWELL's W): any vehicle may take any bin.
+/// BINPAT with given shares, such as those that POWELL found: any vehicle may get any bin.
 ///
 /// # Errors
-/// See [`Work::check`]; [`CoverageError::Setting`] for shares that are not one a vehicle, finite,
-/// at least 0 and not all 0.
+/// Those of [`Work::check`]; [`CoverageError::Setting`] unless there is one share per vehicle, all
+/// finite and at least 0, and not all 0.
 pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     shares: &[f32],
@@ -301,16 +305,16 @@ pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     pack_routes(work, BinEligibility::Anyone, ws, out)
 }
 
-/// Vehicles that may receive a bin.
+/// Which vehicles may be assigned a bin.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum BinEligibility {
-    /// Any.
+    /// Any vehicle.
     Anyone,
-    /// Bins that were filled by equal weights.
+    /// Only vehicles of the weight by which the bin was filled.
     SameWeight,
 }
 
-/// Cuts the path into bins by `ws.shares`, assigns the bins to vehicles, and sets the layers.
+/// Cuts the path into bins by `ws.shares`, assigns the bins to vehicles, and sets layers and costs.
 pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     bins: BinEligibility,
@@ -324,7 +328,7 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
-/// CBinPack: `ends[k]` becomes the number after bin `k`'s last waypoint.
+/// CBinPack: sets `ends[k]` to the number after that of the last waypoint of bin `k`.
 pub fn cbinpack<const L: usize>(
     tracks: &Tracks<L>,
     unit: TrackUnit,
@@ -335,7 +339,7 @@ pub fn cbinpack<const L: usize>(
     let total_m = tracks.length_m();
     let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
     let mut end = 0;
-    // Length of the path that is in bins: up to and with the last track packed.
+    // Length of the path up to the end of the last track that was packed.
     let mut packed_m = 0.0;
     for (k, (share, slot)) in shares.iter().zip(ends).enumerate() {
         if k >= last {
@@ -347,8 +351,8 @@ pub fn cbinpack<const L: usize>(
     }
 }
 
-/// Puts tracks from waypoint `from` on into a bin that is full at `full_m` along the path: the
-/// number after its last waypoint, and how far along the path that is.
+/// Fills a bin with tracks from waypoint `from` on, up to the length `full_m` of the path. Returns
+/// the number after that of its last waypoint, and the length of the path up to that waypoint.
 fn fill_bin<const L: usize>(
     tracks: &Tracks<L>,
     unit: TrackUnit,
@@ -356,7 +360,7 @@ fn fill_bin<const L: usize>(
     full_m: f32,
 ) -> (u32, f32) {
     let lanes = tracks.lanes();
-    // The lane in which the bin gets full.
+    // The lane in which the bin becomes full.
     let lane = lanes.partition_point(|lane| lane.start_m + lane.length_m() <= full_m);
     let before = |lane: usize| {
         let end = lanes.get(lane).map_or(tracks.waypoint_count(), |lane| lane.first);
@@ -381,7 +385,7 @@ fn fill_bin<const L: usize>(
     };
     let nearer = more.1 - full_m < full_m - fits.1;
     let best = if nearer { more } else { fits };
-    // A bin never gives back what the one before it holds.
+    // A bin takes nothing away from the bin before it.
     if best.0 >= from {
         best
     } else {
@@ -389,7 +393,7 @@ fn fill_bin<const L: usize>(
     }
 }
 
-/// Gives each bin that holds something to the vehicle for which the sum of all transits is least.
+/// Assigns each bin that is not empty to a vehicle so that the sum of all transits is least.
 fn assign_bins<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     bins: BinEligibility,
@@ -442,7 +446,8 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
-/// Gives the lowest layer to the route that takes longest, and so on; then the costs.
+/// Gives the lowest layer to the route that takes longest over ground, the next one to the second
+/// longest, and so on; then sets the costs.
 pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     plan: &mut Plan<K>,
@@ -460,7 +465,7 @@ pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
     set_costs(work, plan);
 }
 
-/// Sets the costs of routes that have their layers.
+/// Computes the costs of routes whose layers are set.
 pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     plan: &mut Plan<K>,

@@ -1,11 +1,11 @@
-//! More lanes where a no-fly zone covers the middle of a strip and not all of it.
+//! Additional lanes where a no-fly zone covers the middle of a strip but not all of the strip.
 //!
-//! A strip that a zone reaches into, and of which something is left, is cut into eighths. What no
-//! lane shows of one yet gets lanes along the strip's border next to it, which is furthest from the
-//! middle that is not free, then along the eighth's own middle and lines beside that: a footprint
-//! reaches at least half a lane to both sides. What one picture shows gets one, as near to the
-//! middle of it as is free. O(strips at zones · 8 · (vertices + lanes)), and 18 lines for each
-//! eighth of which something stays left.
+//! A strip that a zone reaches into, and of which the lanes leave ground unphotographed, is cut
+//! into eighths. Each eighth with such ground gets lanes along the strip border next to it, which
+//! is furthest from the blocked middle, then along its own middle, then along lines beside that: an
+//! image reaches at least half a lane spacing to both sides. Ground that one image shows gets one
+//! image, as near to its middle as is free. O(strips at zones · 8 · (vertices + lanes)), and 18
+//! lines for each eighth of which some ground remains.
 
 use libm::{fmaxf, fminf};
 
@@ -16,10 +16,10 @@ use super::lanes::Tracks;
 use super::strips::{Sets, Strips, WIDTH_ROUNDING};
 use super::transit::ZONE_CLEARANCE_M;
 
-/// Parts into which a strip is cut.
+/// Number of parts into which a strip is cut.
 const STRIP_PARTS: u32 = 8;
 
-/// Adds lanes for the parts that no lane covers yet.
+/// Adds lanes for ground that no lane shows yet, in all strips that a no-fly zone reaches into.
 pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     ws: &mut Sets<V>,
@@ -28,13 +28,14 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     for strip in
         (0..strips.count).filter(|strip| overlaps_no_fly_zone(strips, strips.strip_borders(*strip)))
     {
-        // Where lanes show all of a strip, they show all of its parts.
+        // The whole strip is checked first: if its lanes show all of it, no eighth of it is
+        // missing.
         let [low, high] = strips.strip_borders(strip);
         compute_uncovered(strips, [low, high], out, ws)?;
         if ws.needed.spans().is_empty() {
             continue;
         }
-        // From both borders inwards: beside a slanted zone most is left there.
+        // From both borders inwards: beside a slanted zone most ground is left at the borders.
         let wide = (high - low) / STRIP_PARTS as f32;
         for step in 0..STRIP_PARTS / 2 {
             let (lower, upper) = (low + step as f32 * wide, high - step as f32 * wide);
@@ -45,8 +46,8 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     Ok(())
 }
 
-/// Lays lanes for an eighth of a strip, the nearer border of which is given, until nothing is left
-/// of it.
+/// Adds lanes for an eighth of a strip, `span`, until no ground of it is left or all lines are
+/// tried. `border` is the strip's border nearer to it.
 fn lay_missing_lanes_of<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),
@@ -69,25 +70,27 @@ fn lay_missing_lanes_of<const L: usize, const V: usize>(
     Ok(())
 }
 
-/// Lines along the middle of an eighth and beside it, half an eighth apart, the nearest first.
+/// Lines along the middle of an eighth and beside it, half an eighth apart, nearest first.
 fn lines_beside(strips: &Strips<'_>, span: Span) -> impl Iterator<Item = f32> {
     let (middle, half) = (strips.centre_line(span), (span[1] - span[0]) / 2.0);
     let side = move |k: u32| if k.is_multiple_of(2) { half } else { -half };
     (0..=2 * STRIP_PARTS).map(move |k| middle + side(k) * k.div_ceil(2) as f32)
 }
 
-/// Whether pictures along the line `v` show all between two other `v`, and a little more.
+/// Whether images along the line `v` show the whole band from `low` to `high` across the lanes, and
+/// a little more.
 fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
     let spacing = strips.pattern.spacing;
     let across = spacing.footprint.across_m;
     let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
     let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
-    // Strips as wide as a footprint have no spare: a rounding is none.
+    // A strip as wide as an image has no spare; a difference by rounding is allowed.
     let most = reach + strips.strip_width_m * WIDTH_ROUNDING;
     v - low <= most && high - v <= most
 }
 
-/// Whether a no-fly zone comes between two `v`.
+/// Whether a no-fly zone, or its clearance, reaches into the band from `low` to `high` across the
+/// lanes.
 fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
     strips.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly).any(|(_, ring)| {
         let (first, last) =
@@ -98,8 +101,8 @@ fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
     })
 }
 
-/// `ws.needed` becomes what no lane shows yet of the strip's part between two `v`, and no zone
-/// holds.
+/// Sets `ws.needed` to the ground of the band `span` that no lane shows yet, as intervals along the
+/// lanes, without what a no-fly zone covers.
 fn compute_uncovered<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     span: Span,
@@ -112,8 +115,8 @@ fn compute_uncovered<const L: usize, const V: usize>(
     for lane in tracks.lanes().iter().filter(|lane| covers_band(strips, lane.from.y, span)) {
         ws.needed.remove([lane.from.x - along, lane.to.x + along])?;
     }
-    // Intervals that rounding left over are dropped: shorter than what two pictures that meet keep
-    // back.
+    // Intervals left over by rounding are dropped: those shorter than the overlap that two
+    // neighbouring images keep in reserve.
     let kept_back_m = strips.pattern.spacing.footprint.along_m / 2.0 - along;
     ws.needed.drop_shorter(fminf(strips.strip_width_m / 100.0, kept_back_m));
     Ok(())

@@ -1,38 +1,39 @@
-//! POWELL-BINPAT: the shares W, 0 ≤ W_k ≤ 1, that make max C_k least; a share of nothing leaves a
-//! vehicle on the ground.
+//! POWELL-BINPAT: a search for the shares W, 0 ≤ W_k ≤ 1, with the least max C_k. A vehicle with
+//! share 0 stays on the ground.
 //!
 //! Source: CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a function
-//! of several variables without calculating derivatives", Computer Journal 7 (1964). Own and
-//! bounded: at most `evaluations` packings.
+//! of several variables without calculating derivatives", Computer Journal 7 (1964). An
+//! implementation of our own, bounded by at most `evaluations` packings.
 //!
-//! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to the other),
-//! so a line search looks at points all along the line first and narrows around the best. Each
-//! bin's share is taken by the sum of all, as in [`super::pack::cbinpack`]. The start is BINPAT
-//! with equal shares, and the best plan seen is kept: never worse than that.
+//! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to another), so
+//! a line search first tries points along the whole line and then narrows around the best. Each
+//! bin's share counts relative to the sum of all, as in [`super::pack::cbinpack`]. The search
+//! starts with the vehicles' weights as shares and keeps the best plan seen, so with equal weights
+//! the result is never worse than BINPAT's.
 
 use super::CoverageError;
 use super::pack::{BinEligibility, PackWorkspace, Plan, Work, pack_routes};
 
-/// Settings of POWELL.
+/// Settings of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowellConfig {
-    /// Greatest number of packings that are evaluated.
+    /// Most packings that are evaluated.
     pub evaluations: u32,
 }
 
 impl PowellConfig {
-    /// Configuration of the plans that `host-sim` makes.
+    /// The settings with which `host-sim` plans.
     pub const USUAL: Self = Self { evaluations: 4000 };
 }
 
-/// Points that a line search tries along the whole line.
+/// Number of intervals into which a line search divides the whole line.
 const LINE_POINTS: u32 = 8;
-/// Halvings of the step around the best of those points.
+/// Times that a line search halves its step around the best point found so far.
 const STEP_HALVINGS: u32 = 7;
-/// The search ends with a round that gains less than this share of the cost.
+/// The search ends with a round that lowers the cost by less than this share of it.
 const MIN_ROUND_GAIN: f32 = 1e-4;
 
-/// The shares, and the directions along which they are searched.
+/// Memory of the search: shares, search directions, and the packings' workspace.
 pub struct Workspace<const K: usize> {
     /// Workspace of the packings.
     pub pack: PackWorkspace<K>,
@@ -43,7 +44,7 @@ pub struct Workspace<const K: usize> {
 }
 
 impl<const K: usize> Workspace<K> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
             pack: PackWorkspace::new(),
@@ -61,10 +62,10 @@ impl<const K: usize> Default for Workspace<K> {
     }
 }
 
-/// The plan of the best shares found.
+/// Writes the plan of the best shares found to `out`; the shares are in `ws.pack` afterwards.
 ///
 /// # Errors
-/// As [`super::pack::binpat`].
+/// Those of [`super::pack::binpat`].
 pub fn powell<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     config: &PowellConfig,
@@ -99,7 +100,8 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
             }
             cost = found;
         }
-        // The whole step takes the place of the direction that gained most.
+        // The sum of this round's moves becomes a search direction; it replaces the one that gained
+        // most.
         let mut whole = search.ws.current;
         whole.iter_mut().zip(from).for_each(|(to, from)| *to -= from);
         if whole[..count].iter().any(|step| *step != 0.0) {
@@ -131,7 +133,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         }
     }
 
-    /// max C_k of the shares `current`; the best plan is kept.
+    /// max C_k with the shares `current`; infinite if all are 0. Keeps the plan if it is the best
+    /// so far.
     fn evaluate(&mut self) -> Result<f32, CoverageError> {
         self.evaluations_left = self.evaluations_left.saturating_sub(1);
         let ws = &mut *self.ws;
@@ -149,7 +152,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         Ok(cost)
     }
 
-    /// The least cost along a line through `current`, inside the box; `current` moves there.
+    /// Searches along a line through `current`, within 0 ≤ W_k ≤ 1, for the least cost. Returns
+    /// that cost, and moves `current` to its place.
     fn line_search(
         &mut self,
         line: &[f32; K],
@@ -204,8 +208,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
     }
 }
 
-/// Range in which the line may be followed back and forth inside the box; none for a line of no
-/// length.
+/// Range of the line's parameter within which all shares stay from 0 to 1; `None` if that is one
+/// point, or the line has no length.
 fn range_in_box(from: &[f32], line: &[f32]) -> Option<(f32, f32)> {
     let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
     for (from, step) in from.iter().zip(line).filter(|(_, step)| **step != 0.0) {

@@ -1,4 +1,5 @@
-//! An area in strips, one lane wide: what of each is to be photographed, and where a lane is laid.
+//! An area cut into strips, one lane wide: what of each strip is to be photographed, and where its
+//! lanes are.
 
 use heapless::Vec;
 use libm::{ceilf, fmaxf, fminf};
@@ -12,28 +13,28 @@ use super::{CoverageError, Flat};
 use crate::geometry::{Length as _, clamp_to};
 use crate::sort;
 
-/// A width that is a whole number of lanes is often a rounding above it: up to this share of a
-/// lane. More is not in their pictures.
+/// Share of a lane by which rounding may raise a width that is a whole number of lanes; it does not
+/// add another strip.
 pub(super) const WIDTH_ROUNDING: f32 = 1e-4;
 
-/// Memory lent: `V` is at least the number of the area's vertices.
+/// Memory of the lanes' computation; `V` must be at least the number of the area's vertices.
 pub struct Workspace<const V: usize> {
-    /// The convex hull; then the vertices in the lanes' frame.
+    /// First the convex hull, then the area's vertices in the lane frame.
     pub(super) vertices: Vec<Flat, V>,
     pub(super) sets: Sets<V>,
 }
 
-/// Places along a line.
+/// Sets of coordinates `u` along the lanes, on one line `v` or in one strip.
 pub(super) struct Sets<const V: usize> {
     crossings: Vec<f32, V>,
     pub(super) needed: Intervals<V>,
-    /// What a zone holds, or bars.
+    /// The `u` at which a no-fly zone covers all of a strip, or is too near for a lane.
     barred: Intervals<V>,
     free: Intervals<V>,
 }
 
 impl<const V: usize> Workspace<V> {
-    /// Creates it empty.
+    /// Creates an empty workspace.
     pub const fn new() -> Self {
         let sets = Sets {
             crossings: Vec::new(),
@@ -51,7 +52,7 @@ impl<const V: usize> Default for Workspace<V> {
     }
 }
 
-/// The lanes' frame: `u` along them and `v` across, metres from the first vertex.
+/// The lane frame: `u` along the lanes and `v` across them, metres from the area's first vertex.
 pub(super) struct LaneFrame {
     pub(super) base: Flat,
     pub(super) direction: LaneDirection,
@@ -62,19 +63,19 @@ impl LaneFrame {
         Self { base: area.vertices()[0], direction }
     }
 
-    /// A place in this frame.
+    /// A point of the mission frame in the lane frame.
     pub(super) fn to_frame(&self, place: &Flat) -> Flat {
         let from_base = place - self.base;
         Flat::new(self.direction.along.dot(&from_base), self.direction.across.dot(&from_base))
     }
 
-    /// The place of a point of this frame.
+    /// A point of the lane frame in the mission frame.
     pub(super) fn to_place(&self, point: &Flat) -> Flat {
         self.base + self.direction.along * point.x + self.direction.across * point.y
     }
 }
 
-/// An area in strips. It and the lanes that are laid are in the lanes' frame.
+/// An area cut into strips. The area, and the lanes that are laid, are in the lane frame.
 pub(super) struct Strips<'a> {
     pub(super) area: Area<'a>,
     pub(super) pattern: LanePattern,
@@ -102,7 +103,7 @@ impl<'a> Strips<'a> {
         Ok(Self { area: *area, pattern: *pattern, low, strip_width_m: wide, count: count as usize })
     }
 
-    /// Both borders of a strip, across the lanes.
+    /// Lower and upper border of a strip: coordinates `v` across the lanes.
     pub(super) fn strip_borders(&self, strip: usize) -> Span {
         let low = self.low + strip as f32 * self.strip_width_m;
         [low, low + self.strip_width_m]
@@ -112,7 +113,8 @@ impl<'a> Strips<'a> {
         (low + high) / 2.0
     }
 
-    /// Sets `ws.needed` to every `u` at which there is something to photograph between two `v`.
+    /// Sets `ws.needed` to all `u` along the lanes at which something is to be photographed between
+    /// the two `v` of `span`.
     pub(super) fn compute_needed<const V: usize>(
         &self,
         span: Span,
@@ -122,15 +124,16 @@ impl<'a> Strips<'a> {
         project_rings(self.area.edges(), self.inset(span), &mut ws.crossings, &mut ws.needed)
     }
 
-    /// A little less than what lies between two `v`: a ring that only touches the border of a strip
-    /// is its neighbour's.
+    /// `span` made slightly narrower: a ring that only touches a strip's border belongs to the
+    /// neighbouring strip.
     fn inset(&self, [low, high]: Span) -> Span {
         let inset = self.strip_width_m * 1e-4;
         [low + inset, high - inset]
     }
 
-    /// Takes from `ws.needed` every `u` at which one no-fly zone holds all between two `v`: those
-    /// inside it on both border lines, without those of its edges between them.
+    /// Removes from `ws.needed` all `u` at which one no-fly zone covers everything between the two
+    /// `v` of `span`: the `u` inside the zone on both border lines, without those of its edges
+    /// between the lines.
     pub(super) fn subtract_no_fly_zones<const V: usize>(
         &self,
         span: Span,
@@ -160,8 +163,8 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Sets `ws.barred` to every `u` at which the line `v` comes nearer than the clearance to a
-    /// no-fly zone.
+    /// Sets `ws.barred` to all `u` along the lane line `v` at which it is nearer than
+    /// [`ZONE_CLEARANCE_M`] to a no-fly zone, or inside one.
     fn compute_barred<const V: usize>(
         &self,
         v: f32,
@@ -180,7 +183,8 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Lays lanes along the line `v` for what `ws.needed` holds, from border to border.
+    /// Lays lanes along the line `v` that photograph what is in `ws.needed`, from border to border
+    /// of the area.
     pub(super) fn lay_lanes<const L: usize, const V: usize>(
         &self,
         strip: u16,
@@ -193,7 +197,8 @@ impl<'a> Strips<'a> {
         self.lay_between_borders(strip, v, ws, out)
     }
 
-    /// Lays lanes along the line `v` no longer than shows what `ws.needed` holds.
+    /// Lays lanes along the line `v` that photograph what is in `ws.needed`, and are no longer than
+    /// that takes.
     pub(super) fn lay_missing<const L: usize, const V: usize>(
         &self,
         strip: u16,
@@ -206,8 +211,9 @@ impl<'a> Strips<'a> {
         self.lay_between_borders(strip, v, ws, out)
     }
 
-    /// Lays lanes where `ws.barred` lets them be, from border to border of those in `ws.crossings`.
-    /// What one picture shows that is on no border gets one, as near to its middle as can be.
+    /// Lays lanes along the line `v` where `ws.barred` allows them, from border to border among
+    /// `ws.crossings`. A part that one image shows, and that contains no border, gets one image, as
+    /// near to its middle as is allowed.
     #[inline(never)]
     fn lay_between_borders<const L: usize, const V: usize>(
         &self,
@@ -249,9 +255,9 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Where a lane begins and ends for an area that reaches over `need` in its strip: from border
-    /// to border, further where the first or last picture would else leave a part out. It ends
-    /// before it begins where one picture between both shows all.
+    /// First and last image of the lane that photographs `need` in its strip: from border to
+    /// border, and further where a part would otherwise be beyond the first or last image. The
+    /// first is greater than the last if one image between both shows all.
     fn lane_extent(&self, need: &Span, borders: &[f32]) -> Span {
         let reach = self.picture_half_width();
         let inside = borders.iter().filter(|u| (need[0]..=need[1]).contains(u));
@@ -260,9 +266,10 @@ impl<'a> Strips<'a> {
         })
     }
 
-    /// Distance beyond its middle to which a picture shows the lane: half its side, less a
-    /// rounding. Where pictures overlap, one of them is to show all of a cell, a tenth of the
-    /// spacing, that a border cuts: two of them that meet overlap by more than that.
+    /// Distance along the lane that an image reliably shows on each side of its middle: half its
+    /// side, less a margin for rounding. Where images overlap, the margin is such that a cell (a
+    /// tenth of the lane spacing) that a border cuts is entirely in one image: two neighbouring
+    /// images overlap by more than that.
     pub(super) fn picture_half_width(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
@@ -279,7 +286,7 @@ impl<'a> Strips<'a> {
     }
 }
 
-/// Places where the line `v` crosses these edges, in rising order.
+/// The `u` at which the line `v` crosses these edges, in ascending order.
 fn line_crossings<const V: usize>(
     edges: impl Iterator<Item = (Flat, Flat)>,
     v: f32,
@@ -296,9 +303,9 @@ fn line_crossings<const V: usize>(
     Ok(())
 }
 
-/// Projects these rings on the strip between two `v`: adds every `u` at which they hold a place
-/// there, those of the places on the lines at both borders, and those of the rings' own edges
-/// between them. A place inside that is not on a border line crosses an edge before it.
+/// Adds to `out` all `u` at which the rings contain a point between the two `v`: those inside on
+/// both border lines, and those of the rings' edges between the lines. From any other inner point
+/// the way across to a border line crosses an edge first, at the same `u`.
 fn project_rings<const V: usize>(
     edges: impl Iterator<Item = (Flat, Flat)> + Clone,
     [low, high]: Span,
@@ -314,7 +321,7 @@ fn project_rings<const V: usize>(
     edges.filter_map(|edge| clip_edge(edge, [low, high])).try_for_each(|span| out.add(span))
 }
 
-/// Range of an edge between two `v`; none where it does not reach them.
+/// Range of `u` of the part of an edge between the two `v`; `None` if there is no such part.
 fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
     if a.y > b.y {
         core::mem::swap(&mut a, &mut b);
@@ -328,8 +335,8 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
     Some([fminf(from, to), fmaxf(from, to)])
 }
 
-/// Range of the line `v` that is nearer than the clearance to an edge: between the circles around
-/// its ends and the lines beside it.
+/// Range of `u` on the line `v` that is nearer than [`ZONE_CLEARANCE_M`] to an edge: within the
+/// circles around its ends and the lines beside it. `None` if there is none.
 fn near_edge((a, b): (Flat, Flat), v: f32) -> Option<Span> {
     const CLEAR_M: f32 = ZONE_CLEARANCE_M;
     if fmaxf(a.y, b.y) < v - CLEAR_M || fminf(a.y, b.y) > v + CLEAR_M {

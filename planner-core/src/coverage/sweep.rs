@@ -1,8 +1,8 @@
-//! The direction of the lanes: along the side of the hull across which it is least wide, so that
-//! there are the fewest lanes and turns.
+//! The direction of the lanes: that across which the area's convex hull is least wide, so that
+//! lanes and turns are fewest. It is parallel to a side of the hull.
 //!
-//! Source: CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978. The hull is Andrew's
-//! monotone chain. O(n log n).
+//! Source: CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978; hull: Andrew's monotone
+//! chain. O(n log n).
 
 use heapless::Vec;
 
@@ -10,18 +10,18 @@ use super::area::{Area, AreaError, RingKind};
 use super::{CoverageError, Flat};
 use crate::sort;
 
-/// Lanes run along `along`; they are counted along `across`, a quarter turn to the left of it. Both
-/// have length 1.
+/// Unit vectors along the lanes and across them. `across` is `along` turned left by 90°; strips are
+/// numbered along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneDirection {
-    /// Along the lanes.
+    /// Unit vector along the lanes, east and north.
     pub along: Flat,
-    /// Vector from lane to lane.
+    /// Unit vector from one strip to the next, east and north.
     pub across: Flat,
 }
 
 impl LaneDirection {
-    /// Lanes at an angle, degrees from east to the left.
+    /// Lanes at an angle, degrees counter-clockwise from east.
     pub fn at_deg(angle_deg: f32) -> Self {
         let (sin, cos) = libm::sincosf(angle_deg.to_radians());
         Self::along_vector(Flat::new(cos, sin))
@@ -33,11 +33,11 @@ impl LaneDirection {
     }
 }
 
-/// The direction across which the area's outer rings are least wide. `hull` is memory lent: as many
-/// places as the outer rings have vertices.
+/// The direction across which the area's outer rings are least wide. `hull` is scratch memory; `V`
+/// must be at least the number of vertices of the outer rings.
 ///
 /// # Errors
-/// `AreaFull` where `hull` is too small.
+/// [`AreaError::AreaFull`] if `hull` is too small.
 pub fn least_width<const V: usize>(
     area: &Area<'_>,
     hull: &mut Vec<Flat, V>,
@@ -51,7 +51,8 @@ pub fn least_width<const V: usize>(
         let Some(along) = (to - from).try_normalize(0.0) else { continue };
         let direction = LaneDirection::along_vector(along);
         let height = |k: usize| direction.across.dot(&(hull[k % n] - from));
-        // Around the hull the furthest corner only moves on, n steps in all for all sides.
+        // Around the hull the corner furthest from the side only advances: n steps in all for all
+        // sides.
         if i == 0 {
             far = (0..n).max_by(|a, b| height(*a).total_cmp(&height(*b))).unwrap_or(0);
         }
@@ -67,7 +68,7 @@ pub fn least_width<const V: usize>(
     Ok(best.1)
 }
 
-/// The corners of the convex hull of the outer rings, turning left.
+/// Computes the corners of the convex hull of the outer rings, counter-clockwise.
 fn convex_hull<const V: usize>(
     area: &Area<'_>,
     hull: &mut Vec<Flat, V>,
@@ -79,12 +80,12 @@ fn convex_hull<const V: usize>(
     }
     sort::sort_by(&mut sorted, |a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let count = sorted.len();
-    // The lower side from left to right, then the upper one back.
+    // The lower chain from left to right, then the upper chain from right to left.
     let mut side = 0;
     for step in 0..2 * count {
         let place = sorted[if step < count { step } else { 2 * count - 1 - step }];
-        // A vertex above the line between both ends is no corner of the lower side, and the other
-        // way round.
+        // A vertex above the line between both ends is no corner of the lower chain, one below it
+        // none of the upper chain.
         let above = (sorted[count - 1] - sorted[0]).perp(&(place - sorted[0]));
         if (step < count && above > 0.0) || (step > count && step + 1 < 2 * count && above <= 0.0) {
             continue;

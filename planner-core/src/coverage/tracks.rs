@@ -1,13 +1,13 @@
-//! Back-and-forth lanes over an area: concave, with holes and no-fly zones.
+//! Back-and-forth lanes over an area that may be concave and have holes and no-fly zones.
 //!
-//! Source: CPP §3.2.1, Fig. 4. The area is cut into strips as wide as the lane spacing or a little
-//! less, all alike. In each strip the lane runs along the middle. It reaches from border to border
-//! along that line, and further where the strip's area would else lie beyond the last picture.
-//! "Simple" and "sampled" patterns are the same lanes: the first packs whole lanes, the second
-//! waypoints ([`super::pack::TrackUnit`]).
+//! Source: CPP §3.2.1, Fig. 4. The area is cut into strips of equal width, at most the lane
+//! spacing. In each strip a lane runs along the middle, from border to border of the area along
+//! that line, and further where the strip's area would otherwise extend beyond the last image. The
+//! "simple" and "sampled" patterns of the paper have the same lanes: the first packs whole lanes,
+//! the second single waypoints ([`super::pack::TrackUnit`]).
 //!
-//! Frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes · vertices),
-//! and the order of the lanes ([`super::order`]).
+//! Lane frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes ·
+//! vertices), and the ordering of the lanes ([`super::order`]).
 
 use super::CoverageError;
 use super::area::{Area, AreaError};
@@ -21,10 +21,10 @@ use super::transit::Transit;
 pub use super::lanes::{Lane, LanePattern, Tracks};
 pub use super::strips::Workspace;
 
-/// Lanes over an area, in the order in which they are flown.
+/// Computes the lanes over an area, in the order in which one vehicle would fly them.
 ///
 /// # Errors
-/// Settings that are wrong, memory that is too small, [`CoverageError::NothingToCover`].
+/// Settings out of range, memory too small, [`CoverageError::NothingToCover`].
 pub fn build<const L: usize, const V: usize, const N: usize>(
     area: &Area<'_>,
     pattern: &LanePattern,

@@ -1,11 +1,11 @@
-//! Shortest ways around no-fly zones: straight where nothing is between, else over corners of the
-//! zones.
+//! Shortest horizontal paths around no-fly zones: the straight line if it is clear, else over
+//! corners of the zones.
 //!
-//! Method: a visibility graph over the zones' outward corners, each pushed out by
-//! [`ZONE_CLEARANCE_M`]; shortest ways between all pairs of corners once (Floyd and Warshall, n³),
-//! then a way between two places over the least pair of corners that they see: n² sums a round, and
-//! a round more for each corner that proves hidden, at most 2 n; each corner is checked once. All
-//! in metres.
+//! Method: a visibility graph over the zones' convex corners, each moved out by
+//! [`ZONE_CLEARANCE_M`]. The shortest paths between all pairs of corners are computed once (Floyd
+//! and Warshall, n³). A path between two points then uses the cheapest pair of corners that are
+//! visible from them: n² sums per round, and one more round for each corner that turns out to be
+//! hidden, at most 2 n; visibility of each corner is checked once. All in metres.
 
 use crate::Length;
 use heapless::Vec;
@@ -14,32 +14,32 @@ use libm::fminf;
 use super::area::{Area, RingKind, doubled_signed_area};
 use super::{CoverageError, Flat};
 
-/// Distance that lanes keep from no-fly zones, and ways from the corners that they turn at, metres:
-/// more than rounding, less than any vehicle's margin. A straight way only does not touch a zone: a
-/// margin for the vehicle belongs into the zone.
+/// Distance that lanes keep from no-fly zones, and that transits keep from corners at which they
+/// turn, metres: more than rounding, less than any vehicle's margin. A straight transit may pass a
+/// zone without distance: a margin for the vehicle has to be part of the zone.
 pub const ZONE_CLEARANCE_M: f32 = 0.25;
 
-/// The visibility graph of shortest transits: corners and the lines between them, of at most `N`
-/// corners: 4 · N² bytes.
+/// The visibility graph of an area's no-fly zones with the shortest distances between its corners.
+/// At most `N` corners; 4 · N² bytes.
 pub struct Transit<'a, const N: usize> {
     area: Area<'a>,
     corners: Vec<Flat, N>,
     between_m: [[f32; N]; N],
 }
 
-/// The memory of a [`Transit`], before it knows an area.
+/// The memory of a [`Transit`], before it is given an area.
 impl<const N: usize> Transit<'_, N> {
-    /// A graph for an area that is not known yet.
+    /// Creates an empty graph; [`Transit::set_area`] gives it an area.
     pub const fn empty() -> Self {
         Self { area: Area::NOWHERE, corners: Vec::new(), between_m: [[0.0; N]; N] }
     }
 }
 
 impl<'a, const N: usize> Transit<'a, N> {
-    /// Builds the graph from the area's no-fly zones.
+    /// Builds the graph for the area's no-fly zones, replacing the one before.
     ///
     /// # Errors
-    /// [`CoverageError::NoFlyFull`] where they have more than `N` outward corners.
+    /// [`CoverageError::NoFlyFull`] if the zones have more than `N` convex corners.
     pub fn set_area(&mut self, area: Area<'a>) -> Result<(), CoverageError> {
         self.area = area;
         self.corners.clear();
@@ -53,8 +53,8 @@ impl<'a, const N: usize> Transit<'a, N> {
                 if (turn > 0.0) != left {
                     continue;
                 }
-                // Away from both edges: along their bisector, as far as keeps the clearance from
-                // both.
+                // Moved away from both edges along their bisector, by as much as keeps the
+                // clearance to both.
                 let outward = (into - out).try_normalize(1e-6);
                 let Some(outward) = outward else { continue };
                 let half = fpu::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
@@ -94,17 +94,17 @@ impl<'a, const N: usize> Transit<'a, N> {
         }
     }
 
-    /// Places where transits turn: the zones' outward corners.
+    /// The zones' convex corners, moved out by the clearance: the points at which transits turn.
     pub fn corners(&self) -> &[Flat] {
         &self.corners
     }
 
-    /// Whether a place is in a no-fly zone.
+    /// Whether a point is inside a no-fly zone.
     pub fn is_in_no_fly_zone(&self, place: &Flat) -> bool {
         self.area.is_in_no_fly_zone(place)
     }
 
-    /// Whether a straight line stays outside all no-fly zones.
+    /// Whether the straight line between two points stays outside all no-fly zones.
     #[inline(never)]
     pub fn is_line_clear(&self, from: &Flat, to: &Flat) -> bool {
         if !self.area.has_no_fly() {
@@ -112,14 +112,15 @@ impl<'a, const N: usize> Transit<'a, N> {
         }
         let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
         let (across, up) = (sorted(from.x, to.x), sorted(from.y, to.y));
-        // Both ends of an edge beyond the same end of the line, on one axis.
+        // Whether an edge lies entirely beyond one end of the line along one axis.
         let beyond = |a: f32, b: f32, (low, high): (f32, f32)| {
             (a > high && b > high) || (a < low && b < low)
         };
         let along = to - from;
         let zones = self.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly);
         zones.map(|(_, ring)| ring).all(|ring| {
-            // An edge is looked at where its ends are on different sides of the line: of few edges.
+            // Only an edge whose ends are on different sides of the line is checked further: few
+            // are.
             let mut a = ring[ring.len() - 1];
             let mut p = along.perp(&(a - from));
             ring.iter().all(|&b| {
@@ -134,7 +135,7 @@ impl<'a, const N: usize> Transit<'a, N> {
         })
     }
 
-    /// Length of the shortest path; infinite where there is none.
+    /// Length of the shortest path between two points, metres; infinite if there is none.
     pub fn distance_m(&self, from: &Flat, to: &Flat) -> f32 {
         if self.is_line_clear(from, to) {
             return (to - from).length();
@@ -142,12 +143,12 @@ impl<'a, const N: usize> Transit<'a, N> {
         let far_m =
             |place: &Flat| self.corners.iter().map(|corner| (corner - place).length()).collect();
         let (mut first_m, mut last_m): (Vec<f32, N>, Vec<f32, N>) = (far_m(from), far_m(to));
-        // The shortest way of those over corners that may be hidden: a look costs more than the
-        // sums, so only at its ends.
+        // The shortest path over corners that may still prove hidden. A visibility check costs more
+        // than the sums, so only the corners at the ends of that path are checked.
         loop {
             let mut best = (f32::INFINITY, 0, 0);
             for (i, first) in first_m.iter().enumerate().filter(|(_, first)| first.is_finite()) {
-                // No way over a corner is shorter than straight on from it.
+                // No path over a corner is shorter than the straight line from it.
                 if first + (to - self.corners[i]).length() >= best.0 {
                     continue;
                 }
@@ -174,10 +175,11 @@ impl<'a, const N: usize> Transit<'a, N> {
         }
     }
 
-    /// The corners of the shortest way between two places, in order, without the places themselves.
+    /// Writes the corners of the shortest path between two points to `corners`, in order, without
+    /// the points themselves.
     ///
     /// # Errors
-    /// [`CoverageError::Unreachable`] where there is none.
+    /// [`CoverageError::Unreachable`] if there is no path.
     pub fn shortest_path(
         &self,
         from: &Flat,
@@ -186,7 +188,8 @@ impl<'a, const N: usize> Transit<'a, N> {
     ) -> Result<(), CoverageError> {
         corners.clear();
         let mut here = *from;
-        // Each step is to a corner from which the rest is shorter: no more steps than corners.
+        // Each step leads to a corner from which the rest is shorter, so there are at most as many
+        // as corners.
         while !self.is_line_clear(&here, to) {
             let mut best = (f32::INFINITY, None);
             for corner in self.corners.iter().filter(|corner| **corner != here) {

@@ -1,11 +1,12 @@
-//! A path above the field, with few corners: between the field and a tolerance above it, no steeper
-//! than vehicles fly.
+//! A path with few corners at a height above the field and at most a tolerance higher, no steeper
+//! than the vehicle can climb and descend.
 //!
-//! Method: the cone of slopes that stay between both at each sample so far; where the next sample
-//! closes it, a corner before that one, as high as can be where the ground rises and as low where
-//! it falls. Each corner lies in the tunnel, and the field is nowhere steeper than the path may be:
-//! so the next sample can always be reached. Samples are half a node apart. Cost: one lookup of the
-//! field for each sample.
+//! Method: at each sample the path's height must be in the tunnel between the two bounds. The
+//! slopes from the last corner that keep it there for all samples so far form a cone. Where the
+//! next sample would empty the cone, the path gets a corner at the sample before: as high as
+//! possible where the ground rises, as low as possible where it falls. Each corner lies in the
+//! tunnel and the field is nowhere steeper than the path may be, so the next sample can always be
+//! reached. Samples are half a node spacing apart. Cost: one lookup of the field per sample.
 
 use libm::{ceilf, fmaxf, fminf};
 
@@ -13,34 +14,35 @@ use super::FieldView;
 use crate::coverage::Flat;
 use crate::{Length, Point};
 
-/// Most height samples of one leg: on a longer leg the samples are further apart.
+/// Most height samples of one leg; on a longer leg the samples are further apart.
 const MAX_LEG_SAMPLES: f32 = 65_536.0;
 
-/// Height that a path keeps from the field.
+/// The height band above a field in which a path has to stay, and its steepest slope.
 #[derive(Clone, Copy, Debug)]
 pub struct TerrainFollowing<'a> {
-    /// The field.
+    /// The height field.
     pub field: FieldView<'a>,
-    /// At least so high above it, metres.
+    /// Least height of the path above the field, metres.
     pub height_m: f32,
-    /// At most so much higher, metres.
+    /// Most metres by which the path may be higher than that.
     pub tolerance_m: f32,
-    /// Metres up or down for each metre over ground, at most.
+    /// Greatest slope of the path: metres up or down per metre over ground.
     pub slope: f32,
 }
 
 impl TerrainFollowing<'_> {
-    /// The least height of a path at a place, metres.
+    /// The least height that a path may have at `place`, metres up in the mission frame.
     pub fn lowest_m(&self, place: &Flat) -> f32 {
         self.field.height_at(place) + self.height_m
     }
 
-    /// The least height that is above all of the field, metres, with the tolerance.
+    /// The highest point of the field plus height and tolerance: z in the mission frame, metres.
     pub fn top_m(&self) -> f32 {
         self.field.highest_m() + self.height_m + self.tolerance_m
     }
 
-    /// Start of a path to `corners_to` with the fewest corners, and of those the lowest.
+    /// Start, above `from`, of the path to `to` with the fewest corners; of three start heights in
+    /// the tunnel (bottom, middle, top) the lowest such one.
     pub fn start_point(&self, from: &Flat, to: &Flat) -> Point {
         let low_m = self.lowest_m(from);
         let mut best = (usize::MAX, low_m);
@@ -59,11 +61,11 @@ impl TerrainFollowing<'_> {
         Point::new(from.x, from.y, best.1)
     }
 
-    /// The corners of a path from a point between the field and the tolerance, the last of them at
-    /// `corners_to`.
+    /// Passes the corners of a path from `from`, which is in the tunnel, to above `to` to `corner`,
+    /// in order and without the start; the last one is above `to`.
     ///
     /// # Errors
-    /// What `corner` says.
+    /// The first error that `corner` returns; the path ends there.
     pub fn corners_to<E>(
         &self,
         from: &Point,
@@ -91,7 +93,8 @@ impl TerrainFollowing<'_> {
             let own = ((low_m - z_m) / far_m, (low_m + self.tolerance_m - z_m) / far_m);
             let next = (fmaxf(cone.0, own.0), fminf(cone.1, own.1));
             if next.0 <= next.1 || sample == last + 1 {
-                // A step that rounding closes is taken nevertheless, above the field.
+                // A step for which rounding leaves no slope is taken at the slope to the lower
+                // bound.
                 cone = if next.0 <= next.1 { next } else { (own.0, own.0) };
                 floor_m = low_m;
                 sample += 1;
@@ -104,12 +107,12 @@ impl TerrainFollowing<'_> {
             corner(Point::new(place.x, place.y, z_m))?;
             (last, cone) = (at, (-steep, steep));
         }
-        // The lowest end there is.
+        // The path ends as low as the cone allows.
         z_m = self.clamp_to_tunnel(z_m + cone.0 * (count - last) as f32 * step_m, floor_m);
         corner(Point::new(to.x, to.y, z_m))
     }
 
-    /// A height in the tunnel: rounding leaves it by little.
+    /// `z_m` limited to the tunnel above `low_m`: rounding may leave it slightly.
     fn clamp_to_tunnel(&self, z_m: f32, low_m: f32) -> f32 {
         fminf(fmaxf(z_m, low_m), low_m + self.tolerance_m)
     }

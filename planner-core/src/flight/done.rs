@@ -1,18 +1,19 @@
-//! Which waypoints of an area are done: ranges of their numbers on the path along all lanes.
+//! Sets of photographed waypoints of an area, as ranges of waypoint numbers. Waypoints are numbered
+//! along the path over all lanes.
 
 use heapless::{Vec, VecView};
 
-/// Waypoints `first` up to before `end`.
+/// The waypoints with numbers `first` to `end` − 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WaypointRange {
-    /// The first number.
+    /// Number of the first waypoint.
     pub first: u32,
-    /// After the last number.
+    /// Number after that of the last waypoint.
     pub end: u32,
 }
 
-/// A set of waypoints that only grows, of at most `N` ranges: in rising order, apart from each
-/// other.
+/// A set of waypoints that only grows, kept as at most `N` ranges in ascending order, which neither
+/// overlap nor touch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WaypointSet<const N: usize> {
     ranges: Vec<WaypointRange, N>,
@@ -24,36 +25,37 @@ impl<const N: usize> WaypointSet<N> {
         Self { ranges: Vec::new() }
     }
 
-    /// The ranges, in rising order; none is empty, and none touches the next.
+    /// The ranges in ascending order; none is empty, and none touches the next.
     pub fn ranges(&self) -> &[WaypointRange] {
         &self.ranges
     }
 
-    /// Number of waypoints.
+    /// Number of waypoints in the set.
     pub fn count(&self) -> u32 {
         self.ranges.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add)
     }
 
-    /// Whether it is empty.
+    /// Whether the set has no waypoints.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty()
     }
 
-    /// Forgets all.
+    /// Removes all waypoints.
     pub fn clear(&mut self) {
         self.ranges.clear();
     }
 
-    /// Adds a range; whether anything of it is new.
+    /// Adds a range. Returns whether at least one of its waypoints was not in the set.
     ///
     /// # Errors
-    /// The range, where it touches none and there are `N` already: nothing changes.
+    /// The range, if it touches no range of the set and there are `N` already; the set is then
+    /// unchanged.
     pub fn insert(&mut self, range: WaypointRange) -> Result<bool, WaypointRange> {
         insert(&mut self.ranges, range)
     }
 }
 
-/// Independent of the capacity, so that the program has one copy of this function.
+/// A function that does not depend on `N`, so that the program has one copy of it.
 fn insert(
     ranges: &mut VecView<WaypointRange>,
     range: WaypointRange,
@@ -70,8 +72,8 @@ fn insert(
         }
         whole = WaypointRange { first: whole.first.min(held.first), end: whole.end.max(held.end) };
     }
-    // The later ranges move from there: one on, or back to behind the one that holds all touched
-    // ranges.
+    // The later ranges move: back by one place to make room, or forward to follow the range that
+    // now holds all touched ones.
     if touched == 0 {
         ranges.push(whole)?;
         ranges[from..].rotate_right(1);

@@ -1,50 +1,52 @@
-//! What a vehicle photographs along its path.
+//! Where along its path a vehicle takes pictures, and how they are triggered.
 
 use super::{Path, PathError, Waypoint, WaypointRange};
 use crate::Length;
 
-/// Two points nearer than this along a path are the same place, metres.
+/// Tolerance of arc lengths: a picture this far ahead of the vehicle counts as reached, metres.
 const SAME_PLACE_M: f32 = 1e-2;
 
-/// Heading of a vehicle while it photographs.
+/// Heading of a vehicle along its path while it photographs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HeadingMode {
-    /// One heading on the whole flight: radians from east to the left.
+    /// One heading for the whole flight: radians from east, counter-clockwise.
     Fixed(f32),
-    /// The way it flies.
+    /// In the direction of flight.
     Ahead,
 }
 
-/// Trigger of the pictures.
+/// How the camera is triggered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
-    /// The autopilot by distance, switched at both ends of a lane.
+    /// By the autopilot, each time it has flown a distance; switched on and off at the ends of a
+    /// stretch.
     Distance,
-    /// A command for each picture.
+    /// By one command of the companion for each picture.
     Waypoint,
-    /// Another trigger, which the vehicle does not command.
+    /// By other means: the companion commands nothing.
     None,
 }
 
-/// A stretch of a path on which pictures are taken, metres along it: one picture at each end,
-/// others in between, as far apart over ground. Both ends are the same where one picture is enough.
+/// A stretch of a path along which pictures are taken: one at each end, and between them more at
+/// equal distances over ground. Arc lengths in metres. Where one picture is enough, both ends are
+/// the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureStretch<'p> {
-    /// Place of the first picture.
+    /// Arc length of the first picture.
     pub from_m: f32,
-    /// Place of the last picture.
+    /// Arc length of the last picture.
     pub to_m: f32,
-    /// Distance over ground from one picture to the next; the whole stretch is a multiple of it. 0
-    /// for a single picture.
+    /// Distance over ground between neighbouring pictures, metres; the length of the stretch over
+    /// ground is a multiple of it. 0 for a single picture.
     pub step_m: f32,
     /// Number of pictures, at least one.
     pub count: u32,
-    /// The corners of the path from the one end to the other.
+    /// The waypoints of the path from one end of the stretch to the other.
     corners: &'p [Waypoint],
 }
 
-/// A straight piece of a stretch: where it begins and how long it is, along the path and over
-/// ground, metres.
+/// A straight part of a stretch: arc length of its beginning, and its length along the path and
+/// over ground, metres.
 #[derive(Clone, Copy)]
 struct StraightPiece {
     begin_m: f32,
@@ -52,12 +54,12 @@ struct StraightPiece {
     ground_m: f32,
 }
 
-/// The pieces between these corners.
+/// The straight parts between these waypoints.
 fn straight_pieces(corners: &[Waypoint]) -> impl Iterator<Item = StraightPiece> {
     corners.windows(2).map(|ends| {
         let (begin_m, length_m) = (ends[0].along_m, ends[1].along_m - ends[0].along_m);
         let step = ends[1].position - ends[0].position;
-        // Level ones are as long over ground, to the bit.
+        // A level part is as long over ground as along the path, to the bit.
         let ground_m = if step.z == 0.0 { length_m } else { step.xy().length() };
         StraightPiece { begin_m, length_m, ground_m }
     })
@@ -71,8 +73,8 @@ impl<'p> PictureStretch<'p> {
         Some(Self { from_m, to_m, step_m, count, corners })
     }
 
-    /// Pictures of the stretch with these corners that are taken once the vehicle is `along_m`
-    /// metres along the path.
+    /// Number of pictures, of the `count` on the stretch with these corners, at an arc length of up
+    /// to `along_m`: those taken once the vehicle is there.
     fn taken_count(corners: &'p [Waypoint], count: u32, along_m: f32) -> u32 {
         let Some([first, last]) = corners.first().zip(corners.last()).map(<[_; 2]>::from) else {
             return 0;
@@ -86,16 +88,16 @@ impl<'p> PictureStretch<'p> {
         }
     }
 
-    /// The same between its ends.
+    /// As [`Self::taken_count`], for an `along_m` between the ends of the stretch.
     fn taken_within(&self, along_m: f32) -> u32 {
         if self.step_m <= 0.0 {
             return self.count;
         }
-        // A number that is too large for a count becomes the largest.
+        // The cast saturates, so a quotient too large for a u32 gives the largest number.
         ((self.ground_m(along_m) / self.step_m) as u32).saturating_add(1).min(self.count)
     }
 
-    /// Distance over ground from the stretch's begin to `along_m`, metres.
+    /// Distance over ground from the beginning of the stretch to arc length `along_m`, metres.
     fn ground_m(&self, along_m: f32) -> f32 {
         let mut ground_m = 0.0;
         for piece in straight_pieces(self.corners) {
@@ -108,7 +110,7 @@ impl<'p> PictureStretch<'p> {
         ground_m
     }
 
-    /// Place of picture `k`, metres along the path; the last of all where there are fewer.
+    /// Arc length of picture `k` (from 0), metres; that of the last picture if `k` is too large.
     pub fn picture_at_m(&self, k: u32) -> f32 {
         let mut left_m = self.step_m * k as f32;
         for piece in straight_pieces(self.corners) {
@@ -121,42 +123,42 @@ impl<'p> PictureStretch<'p> {
     }
 }
 
-/// Which parts of a path of at most [`PicturePlan::MAX_PATH_WAYPOINTS`] waypoints are photographed,
-/// and how.
+/// Which parts of a path are photographed, and how. The path has at most
+/// [`PicturePlan::MAX_PATH_WAYPOINTS`] waypoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PicturePlan {
-    /// Bit `i`: a stretch begins at waypoint `i`.
+    /// Bit `i`: a stretch begins at waypoint `i` of the path.
     begins: u64,
-    /// Bit `i`: it ends at waypoint `i`.
+    /// Bit `i`: a stretch ends at waypoint `i` of the path.
     ends: u64,
-    /// For each stretch in its order the lowest number that one of its waypoints has in the area.
+    /// For each stretch, in order, the lowest number that the area gives to one of its pictures.
     numbers: [u16; Self::MAX_STRETCHES],
-    /// For each stretch the number of its pictures.
+    /// For each stretch, in order, the number of its pictures.
     counts: [u16; Self::MAX_STRETCHES],
-    /// Whether numbers fall along the path.
+    /// Whether the area's numbers fall along the path, which is flown backwards.
     backward: bool,
-    /// Waypoints of the whole area.
+    /// Number of waypoints of the whole area; 0 where they have no numbers.
     area: u32,
-    /// Greatest distance from one picture to the next, metres.
+    /// Greatest distance over ground between neighbouring pictures, metres.
     pub spacing_m: f32,
-    /// Heading of the vehicle.
+    /// Heading of the vehicle along its path.
     pub heading_mode: HeadingMode,
-    /// Trigger of the pictures.
+    /// How the camera is triggered.
     pub trigger: Trigger,
-    /// Whether the route has more lanes than the path: a stretch of it, after which all divide what
-    /// is left.
+    /// Whether the path holds only the first lanes of the vehicle's route: at its end the fleet
+    /// divides all remaining lanes again.
     pub goes_on: bool,
 }
 
 impl PicturePlan {
-    /// Most waypoints of a path along which a vehicle photographs.
+    /// Most waypoints of a path along which a vehicle photographs: a bit each.
     pub const MAX_PATH_WAYPOINTS: usize = 64;
-    /// Most photographed stretches of a path.
+    /// Most stretches of a path along which pictures are taken.
     pub const MAX_STRETCHES: usize = 32;
-    /// Most waypoints of an area.
+    /// Most waypoints of an area, whose numbers are stored in 16 bits.
     pub const MAX_AREA_WAYPOINTS: u32 = u16::MAX as u32 + 1;
 
-    /// A flight without pictures yet; they are to be `spacing_m` apart at most.
+    /// A plan without stretches; pictures are to be at most `spacing_m` apart over ground.
     pub const fn new(spacing_m: f32, look: HeadingMode, trigger: Trigger) -> Self {
         let (numbers, counts) = ([0; Self::MAX_STRETCHES], [0; Self::MAX_STRETCHES]);
         Self {
@@ -173,22 +175,24 @@ impl PicturePlan {
         }
     }
 
-    /// The pictures of an area with so many waypoints, along its path or back.
+    /// The same plan for an area of `area` waypoints, whose numbers rise along the path, or fall if
+    /// `backward`.
     pub const fn with_area(self, area: u32, backward: bool) -> Self {
         Self { area, backward, ..self }
     }
 
-    /// Waypoints of the whole area; 0 where they have no numbers.
+    /// Number of waypoints of the whole area; 0 where they have no numbers.
     pub fn area(&self) -> u32 {
         self.area
     }
 
-    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was
-    /// marked before: these waypoints of the area, evenly from one end to the other.
+    /// Adds a stretch from waypoint `from` to waypoint `to` of the path, both after those of the
+    /// stretches before. It has one picture for each of the area's `waypoints`, spread evenly from
+    /// end to end.
     ///
     /// # Errors
-    /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`] and [`Self::MAX_STRETCHES`], for
-    /// numbers beyond [`Self::MAX_AREA_WAYPOINTS`], and for no waypoint.
+    /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`], [`Self::MAX_STRETCHES`] or
+    /// [`Self::MAX_AREA_WAYPOINTS`], and if `waypoints` is empty.
     pub fn add_stretch(
         &mut self,
         from: usize,
@@ -209,7 +213,8 @@ impl PicturePlan {
         Ok(())
     }
 
-    /// The stretches, in their order along the path they were marked on.
+    /// The photographed stretches, in order along `path`, which must be the one that they were
+    /// added for.
     pub fn stretches<'p, const W: usize>(
         &self,
         path: &'p Path<W>,
@@ -218,7 +223,7 @@ impl PicturePlan {
             .filter_map(|(corners, count)| PictureStretch::new(corners, count))
     }
 
-    /// The corners of each stretch and the number of its pictures.
+    /// The waypoints of each stretch and the number of its pictures.
     fn corners_and_counts<'p, const W: usize>(
         &self,
         path: &'p Path<W>,
@@ -234,7 +239,7 @@ impl PicturePlan {
         })
     }
 
-    /// Pictures taken once the vehicle is `along_m` metres along the path.
+    /// Number of pictures taken once the vehicle is at arc length `along_m`.
     pub fn taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         let reached_m = along_m + SAME_PLACE_M;
         self.corners_and_counts(path)
@@ -242,20 +247,20 @@ impl PicturePlan {
             .fold(0, u32::saturating_add)
     }
 
-    /// The pictures passed by `along_m`, but for one that the vehicle has not come a spacing
-    /// further than yet: that one may be missing.
+    /// Number of pictures certainly taken at arc length `along_m`: those up to one spacing before
+    /// it. A later one may still be missing.
     pub fn passed_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         self.taken_count(path, along_m - self.spacing_m)
     }
 
-    /// Place of the last picture of all; none where there is none.
+    /// Arc length of the last picture of the path, metres; `None` if there are no pictures.
     pub fn last_picture_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
         let last = Self::MAX_PATH_WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
         path.waypoints().get(last).map(|waypoint| waypoint.along_m)
     }
 
-    /// Place of the last picture no further than `along_m` metres along the path; none before the
-    /// first.
+    /// Arc length of the last picture at or before `along_m`, metres; `None` before the first
+    /// picture.
     pub fn last_picture_before_m<const W: usize>(
         &self,
         path: &Path<W>,
@@ -271,7 +276,8 @@ impl PicturePlan {
         PictureStretch::new(corners, count).map(|stretch| stretch.picture_at_m(taken - 1))
     }
 
-    /// The waypoints of the area that these pictures show, counted along the path.
+    /// The waypoints of the area that correspond to the path's pictures with these numbers, which
+    /// count along the path from 0.
     pub fn shown_waypoints<const W: usize>(
         &self,
         path: &Path<W>,
@@ -288,7 +294,7 @@ impl PicturePlan {
         })
     }
 
-    /// Pictures of the whole path.
+    /// Number of pictures along the whole path.
     pub fn count<const W: usize>(&self, path: &Path<W>) -> u32 {
         self.corners_and_counts(path).map(|(_, count)| count).fold(0, u32::saturating_add)
     }

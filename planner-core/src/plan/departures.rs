@@ -1,9 +1,9 @@
-//! Earlier landings: the order in which vehicles are taken decides how long all of them wait.
+//! A local search for the order of take-offs with which the last vehicle lands earliest.
 //!
-//! The paths stay as they are. For each pair of flights the differences of their take-off times
-//! that bring both near each other are covered by one interval. With these, an order gives take-off
-//! times in a few comparisons a pair, so many orders are tried: a local search that moves one
-//! vehicle to another place in the order. The best order is then scheduled exactly, and kept if the
+//! Paths do not change. For each pair of flights one interval covers all differences of their
+//! take-off times at which they would come near each other. With these intervals, the take-off
+//! times of an order cost a few comparisons per pair, so many orders can be tried, each made by
+//! moving one vehicle to another place. The best order is then scheduled exactly, and kept if the
 //! last vehicle lands earlier.
 //!
 //! Cost: the timed segments of each pair of flights, then [`MAX_COMPARISONS`] comparisons.
@@ -19,18 +19,19 @@ use crate::flight::Flight;
 use crate::schedule::{self, ScheduleError};
 use crate::sort;
 
-/// Most comparisons of a take-off time with a scheduled flight, over a whole search: a third of a
-/// second on a board.
+/// Most comparisons of a take-off time with that of a scheduled flight, in a whole search: a third
+/// of a second on a board.
 const MAX_COMPARISONS: u32 = 150_000;
-/// Comparisons for each pair of vehicles in a swarm larger than [`BOARD_VEHICLES`].
+/// Comparisons per pair of vehicles in a swarm larger than [`BOARD_VEHICLES`], if that is more.
 const COMPARISONS_PER_PAIR: u32 = 200;
-/// Weight of the mean landing time beside the last landing time: of two orders that end together
-/// the one with less waiting wins.
+/// Weight of the mean landing time relative to the last landing time: of two orders with the same
+/// end of the mission, the one with less waiting wins.
 const MEAN_LANDING_WEIGHT: f32 = 0.02;
 
-/// The differences of take-off times, of flight `i` after flight `j`, that are forbidden.
+/// For each pair of flights the forbidden interval of take-off time differences: of `i` minus that
+/// of `j`, seconds.
 struct ForbiddenDifferences<'a> {
-    /// For each pair the lower end at `[i][j]` with i < j, the upper one at `[j][i]`.
+    /// For a pair i < j the interval's lower end is at `[i][j]`, its upper end at `[j][i]`.
     ends: &'a [f32],
     count: usize,
 }
@@ -42,8 +43,9 @@ impl ForbiddenDifferences<'_> {
         if i < j { (from, to) } else { (-to, -from) }
     }
 
-    /// Take-off times of vehicles taken in this `order`, and how good they are: smaller is better,
-    /// infinite is no schedule.
+    /// Computes the take-off times of vehicles that are scheduled in this `order`, each as early as
+    /// those before it allow. Returns the order's cost in seconds: last landing time and weighted
+    /// mean landing time.
     fn departure_times(
         &self,
         order: &[u16],
@@ -55,7 +57,7 @@ impl ForbiddenDifferences<'_> {
         for (place, &i) in order.iter().enumerate() {
             let i = usize::from(i);
             let mut depart_s = 0.0;
-            // Each pass takes it past the interval of one vehicle at least.
+            // Each pass moves the take-off past the interval of at least one vehicle.
             for _ in 0..=place {
                 let before_s = depart_s;
                 for &j in &order[..place] {
@@ -78,8 +80,9 @@ impl ForbiddenDifferences<'_> {
     }
 }
 
-/// Takes the vehicles in the order that ends the mission earliest, of those that are tried. A place
-/// is free `handover_s` after its vehicle has left it.
+/// Changes the take-off times to those of the best order that the local search finds, if the last
+/// vehicle then lands earlier. The schedule lets a vehicle be at a place `handover_s` after another
+/// one has left it.
 pub(super) fn improve_departure_order<
     const N: usize,
     const V: usize,
@@ -98,7 +101,7 @@ pub(super) fn improve_departure_order<
     let mut found_s: Vec<f32, V> = Vec::new();
     for (i, flight) in out.flights.iter().enumerate() {
         if flight.task.leaves_pad() {
-            // Cannot overflow: one entry a flight, as below.
+            // Cannot overflow: one entry per flight, as below.
             let _ = order.push(i as u16);
         }
         let _ = (lasts_s.push(flight.duration_s(cfg)), found_s.push(flight.depart_s));
@@ -140,7 +143,7 @@ pub(super) fn improve_departure_order<
         } else {
             move_element(&mut order, to, from);
         }
-        // Even a move to the same place ends the search some time.
+        // Each iteration counts, so that moves to the same place end the search as well.
         looks = looks.saturating_sub(1);
     }
     let makespan_s = |flights: &[Flight<W>]| {
@@ -161,8 +164,8 @@ pub(super) fn improve_departure_order<
 /// Largest swarm that is planned on a board.
 const BOARD_VEHICLES: usize = 32;
 
-/// Each vehicle in turn takes off as early as those before it allow; one that stays on its pad
-/// comes before all.
+/// Schedules the vehicles in this order, each to take off as early as those before it allow.
+/// Vehicles that stay on their pads count as scheduled before all.
 fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: usize>(
     order: &[u16],
     request: &PlanRequest<'_>,
@@ -189,7 +192,7 @@ fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: 
     Ok(())
 }
 
-/// Moves one element to another index.
+/// Moves the element at index `from` to index `to`.
 fn move_element(order: &mut [u16], from: usize, to: usize) {
     if from < to {
         order[from..=to].rotate_left(1);

@@ -1,9 +1,10 @@
-//! The order of the swarm: each vehicle in turn gets its path and its place in the schedule.
+//! Prioritised planning: vehicle by vehicle gets its path and its times in the schedule.
 //!
-//! Prioritised planning: a vehicle keeps clear of those before it. Shortest path and a wait on the
-//! pad where that is enough, stepping aside on the way ([`sipp`]) where it is not. A vehicle that
-//! cannot be fitted in goes first in the next round; when that does not help, the others leave it a
-//! head start; then all of it again with the shortest path first. Rounds are bounded.
+//! Each vehicle keeps clear of those planned before it: by the shortest path and a wait on the pad
+//! if that is enough, else by waiting and stepping aside on the way ([`sipp`]). A vehicle for which
+//! no times are found is moved to the front in the next round. When that does not help, the others
+//! leave it a head start. If this fails, all is tried again with the shortest path first. The
+//! number of rounds is bounded.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -18,8 +19,9 @@ use crate::schedule::{self, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleErr
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::sort;
 
-/// Schedules the longest path first, and where that leads to no schedule the shortest. A place is
-/// free `handover_s` after its vehicle has left it.
+/// Schedules all flights, those with the longest path first; if that fails, those with the shortest
+/// path first. The schedule lets a vehicle be at a place `handover_s` after another one has left
+/// it.
 pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -39,13 +41,13 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
             }
             None => f32::INFINITY,
         };
-        // Cannot overflow: one entry per flight.
+        // Cannot overflow: each has one entry per flight.
         let _ = (order.push(i as u16), straight.push(length));
     }
     let mut failed = Ok(());
     for first in [InitialOrder::Longest, InitialOrder::Shortest] {
-        // A vehicle that stays on its pad comes first: it blocks all others. Ties go to the higher
-        // id (P3D §3.4).
+        // Vehicles that stay on their pads come first, since they block all others. Among equal
+        // lengths the higher id is first (P3D §3.4).
         sort::sort_by(&mut order, |&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) = (
@@ -65,15 +67,15 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     failed
 }
 
-/// Order in which vehicles are scheduled before any reordering.
+/// Order in which vehicles are scheduled in the first round.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum InitialOrder {
     Longest,
     Shortest,
 }
 
-/// Schedules in this order; a vehicle that cannot be fitted in goes first in the next round, or
-/// later gets a head start.
+/// Schedules in this order. In the next round a vehicle for which no times were found is moved to
+/// the front; after [`MAX_REORDERINGS`] of these it is moved to the end and gets a head start.
 fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -89,7 +91,7 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
         };
         failed = Err(error);
         let blocked = order.remove(place);
-        // Cannot overflow: one was just removed.
+        // Cannot overflow: an entry of `order` was just removed.
         if round < reorderings {
             let front = order
                 .iter()
@@ -105,16 +107,18 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
     failed
 }
 
-/// Most rounds in which a vehicle that finds no free times is moved to the front, before other
-/// vehicles are held back for it instead. The number of vehicles bounds it as well: in a crowd,
-/// where many swap places, nearly every vehicle has to leave its place before another one comes.
+/// Most rounds after which a vehicle for which no times were found is moved to the front; in later
+/// rounds the others depart later instead. At most the number of vehicles, too: in a crowd where
+/// many swap places, nearly every vehicle has to leave its place before another one comes.
 const MAX_REORDERINGS: usize = 64;
-/// Most rounds in which other vehicles are held back, each round by [`HEAD_START_S`] more.
+/// Most rounds in which the others depart later, each time by [`HEAD_START_S`] more.
 const MAX_HEAD_STARTS: usize = 8;
-/// Time that two vehicles head-on need to clear a side room, seconds.
+/// Time that two vehicles need to get out of each other's way from head-on into a side room,
+/// seconds.
 const HEAD_START_S: f32 = 3.0;
 
-/// Head start: the last `count` vehicles in the order may leave at once, all others later.
+/// Head start: the last `count` vehicles in the order may take off at once, all others after
+/// `head_start_s`.
 struct HeadStart {
     count: usize,
     head_start_s: f32,
@@ -122,15 +126,15 @@ struct HeadStart {
     handover_s: f32,
 }
 
-/// State of one vehicle's turn to be scheduled.
+/// The vehicle to be scheduled next, and those before and after it.
 struct SchedulingTurn<'a> {
     /// Index of the vehicle in the request.
     index: usize,
-    /// Vehicles scheduled already.
+    /// Indices of the vehicles that are scheduled already.
     before: &'a [u16],
-    /// Vehicles still to be scheduled.
+    /// Indices of the vehicles that are still to be scheduled.
     waiting: &'a [u16],
-    /// Earliest take-off, seconds.
+    /// Earliest take-off of this vehicle, seconds.
     not_before_s: f32,
     /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
@@ -164,7 +168,8 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
     Ok(())
 }
 
-/// The flight along a shortest path, after a wait on the pad; `None` if no wait is long enough.
+/// The vehicle's flight on a shortest path after the shortest wait on its pad that avoids
+/// conflicts; `None` if no wait is long enough.
 fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -201,8 +206,9 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     Ok(None)
 }
 
-/// The flight that waits and steps aside on its way. The earliest to arrive may leave its pad only
-/// to wait for long among the others; then a later departure is tried, as often as that helps.
+/// The vehicle's flight with waits and sidesteps on its way. The flight that arrives earliest may
+/// take off only to wait long in the air. Then a later take-off is tried, at most
+/// [`MAX_DEPARTURES`] times; the flight with the shortest longest wait is returned.
 fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -225,7 +231,7 @@ fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
         for _ in 0..MAX_DEPARTURES {
             let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
             match sipp::find_route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
-                // Looked for again with the longer segments that it is cut into.
+                // Searched again with the longer timed segments that the flight needs.
                 Ok(()) if flight.segment_count() > MAX_TIMED_SEGMENTS => {
                     flight.fit_segment_length();
                     continue;
@@ -250,30 +256,30 @@ fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     Err(ScheduleError::Blocked)
 }
 
-/// Most departure times that are tried for one vehicle.
+/// Most take-off times that are tried for one vehicle.
 const MAX_DEPARTURES: usize = 6;
-/// Longest wait in one place in the air that the planner does not try to avoid, seconds: half of
-/// what counts as a standstill (20 s).
+/// Longest wait in the air at one place that the planner accepts without trying a later take-off,
+/// seconds: half of what counts as a standstill (20 s).
 const LONG_WAIT_S: f32 = 10.0;
 
-/// The longest wait on the way, and all of them together, seconds.
+/// The longest wait of a flight on its way, and the sum of all its waits, seconds.
 fn wait_durations_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
     let waits = flight.path.waypoints().iter().map(|w| w.leave_s - w.arrive_s);
     waits.fold((0.0, 0.0), |(longest, all), wait| (fmaxf(longest, wait), all + wait))
 }
 
-/// Vehicles that a path keeps clear of, beyond obstacles.
+/// Parked vehicles that a path keeps clear of.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Avoid {
-    /// The pads of vehicles that may still stand there.
+    /// The pads of vehicles that stay, or that are not scheduled yet and so may still be there.
     WaitingPads,
-    /// The pads and landing places of all others: then waiting on the pad is always enough.
+    /// The pads and landing places of all other vehicles: then waiting on the pad is always enough.
     AllPlaces,
-    /// No vehicle: another one has to leave before.
+    /// None: one that is parked on the path has to leave first.
     Nothing,
 }
 
-/// Points on the ground where other vehicles stand, before and after their flights.
+/// Points on the ground where other vehicles are parked, before and after their flights.
 struct ParkedVehicles<const V: usize> {
     before_flight: Vec<Point, V>,
     after_flight: Vec<Point, V>,
@@ -319,7 +325,7 @@ impl<const V: usize> ParkedVehicles<V> {
     }
 }
 
-/// The vehicle that a path is for, and the nodes of its start and of its goal.
+/// The vehicle that a path is for, and the roadmap nodes of its start and its goal.
 struct PathEnds<'a> {
     vehicle: &'a VehicleTask,
     from: u16,
@@ -333,7 +339,8 @@ impl<'a> PathEnds<'a> {
     }
 }
 
-/// The shortest path between the ends for their vehicle, clear of `parked`; infinite without one.
+/// Finds the shortest path for the vehicle between its ends that keeps `parked_separation_m` from
+/// the `parked` vehicles. Returns its length in metres, infinite if there is none.
 fn find_path<const N: usize, const V: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -364,7 +371,7 @@ fn path_from_nodes<const W: usize>(
     let mut path = Path::new();
     for (i, &node) in nodes.iter().enumerate() {
         let edge = i.checked_sub(1).and_then(|before| view.edge_between(nodes[before], node));
-        // The first waypoint ends no leg.
+        // No leg ends at the first waypoint.
         let clearance_m = edge.map_or(view.header().max_clearance_m, |e| e.clearance_m);
         path.push(view.node(node), clearance_m)?;
     }

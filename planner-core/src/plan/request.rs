@@ -1,4 +1,4 @@
-//! What is asked of the planner, and why there is no plan.
+//! The request for a plan of the swarm, and the reasons why there is none.
 
 use crate::ConfigError;
 use crate::assignment::AssignmentError;
@@ -6,21 +6,21 @@ use crate::flight::PathError;
 use crate::schedule::{ScheduleConfig, ScheduleError};
 use crate::search::SearchError;
 
-/// Objective that an assignment minimises.
+/// What the assignment of goals minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objective {
     /// The sum of all path lengths.
     TotalDistance,
-    /// The longest path.
+    /// The length of the longest path.
     Makespan,
 }
 
-/// Rule by which goals are assigned to vehicles.
+/// Whether goals are given to vehicles or assigned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Every vehicle has its goal.
+    /// The request names the goal of each vehicle.
     Labelled,
-    /// Any vehicle may take any goal.
+    /// Any vehicle may get any goal; the planner assigns them by this objective.
     Unlabelled(Objective),
 }
 
@@ -29,32 +29,34 @@ pub enum Mode {
 pub struct VehicleTask {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// Radius + safety margin, metres: edges must have more clearance.
+    /// Vehicle radius + safety margin, metres: edges must have more clearance.
     pub required_clearance_m: f32,
-    /// Height of the start above its pad, metres.
+    /// Height of the start node above the pad, metres.
     pub climb_m: f32,
-    /// Labelled: index of its goal.
+    /// Index of the vehicle's goal if goals are labelled; `None` if it stays on its pad.
     pub goal: Option<u16>,
 }
 
-/// A swarm's task.
+/// The request for a plan of the whole swarm.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanRequest<'a> {
     /// The vehicles, in the order of the roadmap's starts.
     pub vehicles: &'a [VehicleTask],
-    /// Height of each goal above the ground below it, metres; as many as the roadmap has goals.
+    /// Height of each goal above the ground below it, metres; one entry for each goal of the
+    /// roadmap.
     pub descents_m: &'a [f32],
-    /// Rule by which goals are assigned to vehicles.
+    /// Whether goals are given to vehicles or assigned.
     pub mode: Mode,
-    /// Separation and nominal speeds.
+    /// Separations and nominal speeds.
     pub schedule: ScheduleConfig,
-    /// Most gates of one vehicle: the least `G` that [`super::vehicle_plan`] is to be called with.
+    /// Most gates that a vehicle may have: the least capacity `G` with which
+    /// [`super::vehicle_plan`] is called.
     pub max_gates: usize,
 }
 
 impl PlanRequest<'_> {
-    /// Whether every number is one that can be planned with, every id is one vehicle's and,
-    /// labelled, every goal as well.
+    /// Checks that every number is finite and in range, that ids are unique and, if labelled, that
+    /// no two vehicles have the same goal.
     pub fn check(&self) -> Result<(), PlanError> {
         self.schedule.check().map_err(PlanError::Config)?;
         let good = |number: f32| number >= 0.0 && number.is_finite();
@@ -81,28 +83,28 @@ impl PlanRequest<'_> {
 /// Reason why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanError {
-    /// The roadmap has other numbers of starts or goals than the request.
+    /// The numbers of starts and goals in the roadmap are not those of the request.
     Terminals,
-    /// More vehicles or goals than `V`.
+    /// More than `V` vehicles or goals.
     SwarmFull,
-    /// A setting of the schedule.
+    /// A setting of the schedule is out of range.
     Config(ConfigError),
-    /// Height or clearance of the vehicle with this id is negative, NaN or infinite.
+    /// Height or required clearance of the vehicle with this id is negative, NaN or infinite.
     BadTask(u8),
     /// The height of the goal with this index above its ground is negative, NaN or infinite.
     BadDescent(u16),
     /// Two vehicles have this id.
     SameId(u8),
-    /// The vehicle with this id has a goal that is another one's too.
+    /// Another vehicle has the same labelled goal as the vehicle with this id.
     SameGoal(u8),
-    /// A labelled goal that is not in the roadmap, for the vehicle with this id.
+    /// The labelled goal of the vehicle with this id is not in the roadmap.
     BadGoal(u8),
-    /// A search failed for a reason other than "no path", for the vehicle with this id.
+    /// The roadmap search for the vehicle with this id failed, for a reason other than "no path".
     Search(u8, SearchError),
-    /// The costs could not be assigned.
+    /// The goals could not be assigned.
     Assignment(AssignmentError),
     /// The path of the vehicle with this id was refused.
     Path(u8, PathError),
-    /// The vehicle with this id cannot be scheduled among the others.
+    /// No schedule, or too many gates, for the vehicle with this id.
     Schedule(u8, ScheduleError),
 }

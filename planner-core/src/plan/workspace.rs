@@ -1,4 +1,4 @@
-//! The plan of a swarm, and the memory to make it in.
+//! The plan of a swarm, and the memory in which it is computed.
 
 use heapless::Vec;
 
@@ -8,19 +8,19 @@ use crate::schedule::ScheduleWorkspace;
 use crate::schedule::sipp::SippWorkspace;
 use crate::search::SearchWorkspace;
 
-/// The plan of a whole swarm: flight `i` is vehicle `i` of the request. A vehicle without a goal
-/// stays on its pad.
+/// The plan of a whole swarm: flight `i` is that of vehicle `i` of the request. A vehicle without a
+/// goal has a flight too, with [`Task::Stay`](crate::flight::Task::Stay).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SwarmPlan<const V: usize, const W: usize> {
     /// One flight per vehicle.
     pub flights: Vec<Flight<W>, V>,
-    /// CRC-32 over separation and speeds, ids, goals, climbs, descents, waypoints with their times,
+    /// CRC-32 over separations, speeds, ids, goals, climbs, descents, waypoints with their times,
     /// and departures.
     pub crc: u32,
 }
 
 impl<const V: usize, const W: usize> SwarmPlan<V, W> {
-    /// Without vehicles.
+    /// Creates a plan without vehicles.
     pub const fn new() -> Self {
         Self { flights: Vec::new(), crc: 0 }
     }
@@ -31,23 +31,23 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// Scratch of [`super::plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V`
-/// vehicles and goals, and `P` pieces of flights among which one steps aside.
+/// Memory of [`super::plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles
+/// and goals, and `P` timed segments of all scheduled flights in [`crate::schedule::sipp`].
 pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
-    /// Scratch of searches, also for [`crate::detour`].
+    /// Memory of roadmap searches, also for [`crate::detour`].
     pub search: SearchWorkspace<N>,
-    /// Scratch of [`crate::schedule::sipp`].
+    /// Memory of [`crate::schedule::sipp`].
     pub sipp: SippWorkspace<N, P>,
-    /// Scratch of [`crate::assignment`].
+    /// Memory of [`crate::assignment`].
     pub assignment: AssignmentWorkspace<V>,
-    /// Starts × goals, packed from the front.
+    /// Starts × goals, row-major and contiguous from the first number on.
     pub(super) costs: [[f32; V]; V],
-    /// Scratch of the schedule, also for [`super::vehicle_plan`].
+    /// Memory of the schedule, also for [`super::vehicle_plan`].
     pub schedule: ScheduleWorkspace,
 }
 
 impl<const N: usize, const V: usize, const P: usize> PlanWorkspace<N, V, P> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
             search: SearchWorkspace::new(),

@@ -1,11 +1,11 @@
-//! What to build, why it could not be built, and which lengths an edge may have.
+//! Settings and errors of the roadmap builder, and the range of edge lengths.
 
-/// Random points tried for one free node before the map counts as full. A map with one free cell in
-/// a thousand still yields a node with a probability of 1 − e⁻¹⁰.
+/// Random points that are drawn for one free node before [`PrmError::NoFreeSpace`]. In a map with
+/// one free cell in a thousand a node is still found with a probability of 1 − e⁻¹⁰.
 pub const TRIES_PER_NODE: usize = 10_000;
 
-/// Random pairs tried for one bridge sample before a uniform node replaces it: a map without narrow
-/// passages has none.
+/// Random pairs that are drawn for one node by the bridge test before a uniform node replaces it: a
+/// map without narrow passages has no such node.
 pub const TRIES_PER_BRIDGE: usize = 1_000;
 
 /// Distribution of the random nodes.
@@ -13,27 +13,28 @@ pub const TRIES_PER_BRIDGE: usize = 1_000;
 pub enum Sampling {
     /// Independent and uniform, as in the paper.
     Uniform,
-    /// The Halton sequence in bases 2, 3 and 5, shifted by the seed (Cranley and Patterson 1976):
-    /// more even.
+    /// The Halton sequence in bases 2, 3 and 5, shifted by a random vector: nodes are spread more
+    /// evenly (Cranley and Patterson 1976).
     Halton,
-    /// Every second node by the bridge test (Hsu et al. 2003), the others uniform: more of them in
-    /// doors and narrow passages. Such a node is clear and lies half way between two points that
-    /// are not.
+    /// Every second node by the bridge test (Hsu et al. 2003), the others uniform: more nodes in
+    /// doors and narrow passages. A node of the bridge test has clearance and lies half way between
+    /// two points without it.
     Bridge,
 }
 
 /// Settings of the roadmap to build.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Random nodes, beside the terminals.
+    /// Number of random nodes; terminals are not counted.
     pub nodes: usize,
-    /// Shortest edge, metres (Dmin).
+    /// Length of the shortest edge allowed, metres (Dmin).
     pub edge_min_m: f32,
-    /// Longest edge, metres (Dmax).
+    /// Length of the longest edge allowed, metres (Dmax).
     pub edge_max_m: f32,
-    /// Distance every edge keeps to obstacles, strictly: radius and safety margin, metres.
+    /// Distance to obstacles that every edge has to exceed: vehicle radius plus safety margin,
+    /// metres.
     pub clearance_m: f32,
-    /// Seed of the nodes.
+    /// Seed of the random nodes.
     pub seed: u64,
     /// Distribution of the random nodes.
     pub sampling: Sampling,
@@ -42,15 +43,16 @@ pub struct Config {
 /// Reason why a roadmap could not be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PrmError {
-    /// The named field is NaN, infinite, negative, or makes an empty range.
+    /// The named setting is NaN, infinite, negative, too large, or makes an empty range.
     Config(&'static str),
-    /// The terminal of this index is not finite, not in the map or inside an obstacle.
+    /// The terminal with this index is not finite, not in the map or inside an obstacle.
     TerminalBlocked(usize),
-    /// More nodes than the caller's memory holds.
+    /// More nodes than the caller's memory or 16-bit indices hold.
     TooManyNodes,
-    /// After this many nodes none was found in [`TRIES_PER_NODE`] draws: hardly any space is free.
+    /// After this many random nodes none was found in [`TRIES_PER_NODE`] draws: hardly any space is
+    /// free.
     NoFreeSpace(usize),
-    /// The node of this index is not finite.
+    /// The node with this index is not finite, or beyond 1e6 m.
     NotFinite(usize),
     /// More edges than the caller's memory holds.
     RoadmapFull,
@@ -66,13 +68,13 @@ pub struct Edge {
 }
 
 impl Config {
-    /// Checks every number.
+    /// Returns an error with the name of the first setting that is out of range.
     pub fn check(&self) -> Result<(), PrmError> {
         let good = |x: f32| x >= 0.0 && x.is_finite();
         if !(good(self.edge_min_m)) {
             return Err(PrmError::Config("edge_min_m"));
         }
-        // Beyond 1e6 m squares of lengths lose their meaning next to other f32 coordinates.
+        // Longer than 1e6 m the square of a length is too coarse in f32.
         if !(good(self.edge_max_m) && self.edge_max_m > 0.0 && self.edge_max_m <= 1e6)
             || self.edge_max_m < self.edge_min_m
         {
@@ -88,15 +90,16 @@ impl Config {
     }
 }
 
-/// Squared length of the segment from `a` to `b`, m²; the one place where it is computed, so that
-/// every builder rounds alike.
+/// Squared length of the segment from `a` to `b`, m². All builders of edges call this function, so
+/// that all round alike.
 #[inline(always)]
 pub fn squared_length(a: [f32; 3], b: [f32; 3]) -> f32 {
     let (x, y, z) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);
     x * x + y * y + z * z
 }
 
-/// The squared lengths an edge may have. Two nodes in one place are never joined.
+/// The range of squared edge lengths. Length 0 is never in it: two nodes at one place are not
+/// joined.
 #[derive(Clone, Copy)]
 pub(super) struct LengthRange {
     min: f32,

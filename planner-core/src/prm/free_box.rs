@@ -1,10 +1,12 @@
-//! What a node sees at once: an empty box of cells around it, and the walls that close it.
+//! Line of sight from a node by an empty box of cells around it, without walking the map for each
+//! segment.
 //!
-//! Boxes are convex, so a segment with both ends strictly inside is clear; and a segment that
-//! leaves one goes through the cell behind that face, mostly a wall. One box answers for all rays
-//! of a node, and for the nodes beside it. Both answers are given only where no rounding can turn
-//! them: ends at least [`ROUNDING_CELLS`] cells inside, and a point of the ray at least
-//! [`ROUNDING_CELLS`] cells inside an occupied cell. All other rays go to the exact check.
+//! Boxes are convex, so a segment with both ends strictly inside the box is clear; a segment that
+//! leaves it enters the cell behind a face, which is mostly an obstacle. One box serves all
+//! segments from a node, and those from other nodes in it. Both answers are given only where
+//! rounding cannot change them: if the ends are at least [`ROUNDING_CELLS`] cells inside the box,
+//! or if a point of the segment is at least [`ROUNDING_CELLS`] cells inside an occupied cell. All
+//! other segments go to the exact check.
 
 use super::config::Config;
 use super::neighbours::Workspace;
@@ -15,52 +17,55 @@ use crate::segment::{
 };
 use crate::voxel::VoxelGrid;
 
-/// Margin for rounding, in cells. Places below are computed to within 2⁻¹¹ cell as long as the grid
-/// has at most [`MAX_CELLS`] cells a side: two roundings of a coordinate make 2 · 4096 · 2⁻²⁴ =
-/// 2⁻¹¹ at worst, and snapping in the exact check 2⁻¹⁵.
+/// Margin for rounding, in cells. Coordinates in cells are computed to within 2⁻¹¹ cell as long as
+/// the grid has at most [`MAX_CELLS`] cells a side: two roundings of a coordinate err by 2 · 4096 ·
+/// 2⁻²⁴ = 2⁻¹¹ at worst, and snapping in the exact check by 2⁻¹⁵.
 const ROUNDING_CELLS: f32 = 1.0 / 512.0;
 const MAX_CELLS: u32 = 4096;
-/// Depth behind a face at which the cell is probed, cells.
+/// Depth behind a face of the box at which the cell that a segment enters is looked up, in cells.
 const PROBE_DEPTH_CELLS: f32 = 1.0 / 64.0;
-/// Most free boxes remembered. Nodes come in the order of their cubes, a few rooms at a time.
+/// Most free boxes that are kept for reuse. Nodes come in the order of their cubes, a few rooms at
+/// a time.
 const MAX_BOXES: usize = 32;
 
-/// Cells `low..high` on each axis, all free.
+/// A box of free cells: indices `low..high` on each axis.
 #[derive(Clone, Copy, Default)]
 struct FreeBox {
     low: [i32; 3],
     high: [i32; 3],
 }
 
-/// Line-of-sight checks from one node.
+/// Line-of-sight checks from one node, `here`, to others.
 pub(super) struct NodeVisibility<'g, 'a> {
     grid: &'g VoxelGrid<'a>,
     clearance_m: f32,
     clearance_cells: f32,
     cells_per_m: f32,
-    /// Reach of a box from the node it is made for, cells.
+    /// Most cells by which a free box is grown from its node's cell in each direction.
     reach: i32,
     boxes: [FreeBox; MAX_BOXES],
     newest: usize,
     here: [f32; 3],
-    /// `here` in cells.
+    /// `here` in cells, relative to the grid's minimum corner.
     at: [f32; 3],
-    /// `here` as the exact check takes it.
+    /// `here` on the lattice of the exact check.
     snapped: Option<Snapped>,
-    /// The box around `here` relative to it, cells; `None` where it cannot be used.
+    /// The free box around `here`; `None` where the box cannot be used, and all segments go to the
+    /// exact check.
     view: Option<BoxView>,
 }
 
 #[derive(Clone, Copy)]
 struct BoxView {
-    /// A ray that ends between these is clear. Empty if `here` itself is nearer to a face than the
-    /// clearance.
+    /// Bounds, in cells relative to `here`: a segment that ends strictly between them is clear.
+    /// Empty if `here` itself is nearer to a face of the box than the clearance.
     clear_low: [f32; 3],
     clear_high: [f32; 3],
-    /// The faces, [`PROBE_DEPTH_CELLS`] farther out.
+    /// The box's faces, moved out by [`PROBE_DEPTH_CELLS`], in cells relative to `here`.
     face_low: [f32; 3],
     face_high: [f32; 3],
-    /// Distance that a ray keeps from the faces where it is known to be clear.
+    /// Distance from the box's faces at which a segment is known to be clear, in cells: clearance
+    /// and rounding.
     inset: f32,
 }
 
@@ -82,7 +87,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         }
     }
 
-    /// Moves to a node, and finds the free box around it.
+    /// Sets the node to check from, and finds the free box around it.
     pub(super) fn move_to(&mut self, here: [f32; 3]) {
         let shape = self.grid.shape();
         self.here = here;
@@ -126,8 +131,9 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         self.view = Some(view);
     }
 
-    /// Calls `found` with those of `places` to which the segment from here is clear, and with what
-    /// it keeps from the faces of the box, metres: 0 where it leaves the box.
+    /// Calls `found` with each of `places` whose node the segment from `here` reaches with
+    /// clearance, and with the least distance of that segment from the box's faces in metres, or 0
+    /// if it leaves the box.
     #[inline(always)]
     pub(super) fn for_each_visible<E, const NODES: usize, const CUBES: usize>(
         &self,
@@ -157,7 +163,8 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         Ok(())
     }
 
-    /// The exact check of the segment from here; the share `known` of it lies in the box.
+    /// The exact check of the segment from `here` to `there`; its first share `known` lies in the
+    /// free box and is skipped.
     #[inline]
     fn check_exactly(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
@@ -179,7 +186,8 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         !snapped_rest_touches(self.grid, a, &b, known)
     }
 
-    /// Whether the segment from here is clear, where that is certain.
+    /// Whether the segment from `here` to `there` is clear, as far as the free box can decide with
+    /// certainty.
     #[inline(always)]
     fn classify_ray(&self, view: &BoxView, there: [f32; 3]) -> RayClass {
         let d = [0, 1, 2].map(|axis| (there[axis] - self.here[axis]) * self.cells_per_m);
@@ -196,7 +204,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
             });
             return RayClass::Clear(room[0].min(room[1]).min(room[2]) + view.inset);
         }
-        // A component of zero never leaves: the quotient is infinite.
+        // A component of zero never leaves the box: its quotient is infinite.
         let leave = [0, 1, 2].map(|axis| {
             let face = if d[axis] < 0.0 { view.face_low[axis] } else { view.face_high[axis] };
             face / d[axis]
@@ -206,15 +214,16 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         if t < 0.999 && self.is_obstacle(at(t)) {
             return RayClass::Blocked;
         }
-        // The probe lies outside, on a ray along a face far outside: back to where the first face
-        // is still ahead, and as far away as the clearance.
+        // The segment leaves the box, but the cell behind is free or not certain. Clear for certain
+        // is the share up to the first face ahead, less the probe depth and the clearance.
         let near =
             [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
         RayClass::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
     }
 
-    /// Whether a place, in cells, is certain to lie inside an obstacle.
+    /// Whether a point, in cells from the grid's minimum corner, lies in an occupied cell, and not
+    /// within rounding of the cell's border.
     #[inline(always)]
     fn is_obstacle(&self, place: [f32; 3]) -> bool {
         let mut cell = [0; 3];
@@ -230,13 +239,15 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     }
 }
 
-/// Classification of a ray by the free box alone.
+/// What the free box alone says about the segment from `here` to another node.
 enum RayClass {
-    /// The ray ends inside, so many cells from the nearest face, but for rounding.
+    /// The segment ends inside the box; at least this many cells from the nearest face, up to
+    /// rounding.
     Clear(f32),
-    /// The ray leaves the box into an occupied cell.
+    /// The segment leaves the box into an occupied cell.
     Blocked,
-    /// This share of the ray lies in the box; the rest is open.
+    /// The first share of the segment, this number, lies in the box and is clear; the exact check
+    /// decides on the rest.
     Leaves(f32),
 }
 
@@ -245,8 +256,8 @@ impl FreeBox {
         (0..3).all(|axis| cell[axis] >= self.low[axis] && cell[axis] < self.high[axis])
     }
 
-    /// Grows up and down to floor and ceiling, then along x and y to the walls; `None` if the cell
-    /// is an obstacle.
+    /// The largest free box that grows from `cell` by at most `reach` cells: along z to floor and
+    /// ceiling, then along x, then along y. `None` if the cell is an obstacle.
     fn grow(grid: &VoxelGrid<'_>, cell: [i32; 3], reach: i32) -> Option<Self> {
         if grid.is_occupied(cell.map(|c| c as u32)) {
             return None;
@@ -260,7 +271,7 @@ impl FreeBox {
         Some(grown)
     }
 
-    /// Cells by which the box could be extended up along `axis`.
+    /// Upper bound (exclusive cell index) to which the box can grow along `axis`, at most `limit`.
     fn free_up_to(&self, grid: &VoxelGrid<'_>, axis: usize, limit: i32) -> i32 {
         let start = self.high[axis];
         let mut brick = start >> 2;
@@ -277,7 +288,7 @@ impl FreeBox {
         limit.max(start)
     }
 
-    /// Cells by which the box could be extended down along `axis`.
+    /// Lower bound (inclusive cell index) to which the box can grow along `axis`, at least `limit`.
     fn free_down_to(&self, grid: &VoxelGrid<'_>, axis: usize, limit: i32) -> i32 {
         let start = self.low[axis];
         let mut brick = (start - 1) >> 2;
@@ -294,8 +305,8 @@ impl FreeBox {
         limit.min(start)
     }
 
-    /// Which of the four layers of cells of brick layer `brick` along `axis` hold an obstacle
-    /// within the box's extent on the other two axes.
+    /// Bit i is set if layer i of the four layers of cells of brick layer `brick` along `axis`
+    /// holds an obstacle within the box's extent on the other two axes.
     fn occupied_layers(&self, grid: &VoxelGrid<'_>, axis: usize, brick: i32) -> u32 {
         let [v, w] = [[1, 2], [0, 2], [0, 1]][axis];
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
@@ -305,7 +316,7 @@ impl FreeBox {
             let high = (self.high[axis] - 1 - brick * 4).min(3);
             (0b1111 << low) & (0b1111 >> (3 - high))
         };
-        // Only the first and the last brick along `v` may reach beyond the box.
+        // Along `v` only the first and the last brick may extend beyond the box, and are masked.
         let (first, last) = (self.low[v] >> 2, (self.high[v] - 1) >> 2);
         let (first_mask, last_mask) = (lane_mask(v, lanes(v, first)), lane_mask(v, lanes(v, last)));
         let mut all = 0;

@@ -1,25 +1,27 @@
-//! Nodes sorted into cubes, so that the pairs in range are found without looking at all pairs.
+//! Spatial index of the nodes: they are sorted into cubes, so that pairs within the length range
+//! are found without measuring all pairs.
 //!
-//! A counting sort over a box of cubes around the nodes, half the longest edge a side (more where
-//! that would be too many cubes), x fastest: the nodes of neighbouring cubes in a row lie side by
-//! side, and a node's neighbours are a few runs.
+//! A counting sort over a grid of cubes around the nodes. A cube's edge is half the longest roadmap
+//! edge (longer where that would be too many cubes). Cubes are numbered x fastest, so the nodes of
+//! cubes that are neighbours in x are neighbours in the sorted order, and a node's candidates are a
+//! few contiguous runs.
 
 use super::config::{Config, LengthRange, PrmError, squared_length};
 use crate::Point;
 
-/// Candidates whose distances are computed at once.
+/// Candidate nodes whose distances are computed at once.
 const CANDIDATE_LANES: usize = 16;
 
-/// Scratch for `NODES` nodes and `CUBES` cubes: 14 bytes a node, 2 a cube. The default board has
-/// 4096 of each.
+/// The index of up to `NODES` nodes in fewer than `CUBES` cubes: 14 bytes per node, 2 per cube. The
+/// default board has 4096 of each.
 pub struct Workspace<const NODES: usize, const CUBES: usize> {
-    /// Coordinates in sorted order.
+    /// Coordinates of the nodes in sorted order.
     x: [f32; NODES],
     y: [f32; NODES],
     z: [f32; NODES],
-    /// Node at each place of the sorted order.
+    /// Node index at each place of the sorted order.
     node: [u16; NODES],
-    /// First place of each cube; after the last cube the number of nodes.
+    /// Place of the first node of each cube; the entry after the last cube is the number of nodes.
     first: [u16; CUBES],
     len: usize,
     min: [f32; 3],
@@ -34,7 +36,7 @@ impl<const NODES: usize, const CUBES: usize> Default for Workspace<NODES, CUBES>
 }
 
 impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
-    /// Empty, all zero: a static of this costs no flash.
+    /// Creates an empty index, all zero: a static of it takes no flash.
     pub const fn new() -> Self {
         const { assert!(NODES <= u16::MAX as usize && CUBES >= 2) };
         Self {
@@ -50,17 +52,17 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         }
     }
 
-    /// Nodes in the index.
+    /// Number of nodes in the index.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether nothing is indexed.
+    /// Whether the index has no nodes.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Sorts the nodes. O(nodes + cubes).
+    /// Sorts the nodes into the index, replacing what it held. O(nodes + cubes).
     pub fn build_index(&mut self, nodes: &[Point], config: &Config) -> Result<(), PrmError> {
         config.check()?;
         self.len = 0;
@@ -72,7 +74,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         };
         let (mut min, mut max) = (*first_node, *first_node);
         for (i, node) in nodes.iter().enumerate() {
-            // Beyond 1e6 m f32 is too coarse to fly by.
+            // Beyond 1e6 m f32 coordinates are too coarse to fly by.
             if !node.iter().all(|c| c.abs() <= 1e6) {
                 return Err(PrmError::NotFinite(i));
             }
@@ -83,8 +85,8 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         let [nx, ny, nz] = self.dims;
         let count = nx * ny * nz;
         self.first.fill(0);
-        // Counts become the ends of the cubes, and placing the nodes moves each end down to the
-        // beginning.
+        // `first` counts the nodes of each cube, then holds the end of each cube's run. Placing a
+        // node moves that end down by one, so that it ends as the run's beginning.
         for node in nodes {
             self.first[self.cube_of(node)] += 1;
         }
@@ -94,7 +96,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
             *first = sum;
         }
         self.first[count] = sum;
-        // Backwards, so that nodes keep their order inside a cube.
+        // Placed from the last node on, so that the nodes of a cube keep their order.
         for (i, node) in nodes.iter().enumerate().rev() {
             let cube = self.cube_of(node);
             self.first[cube] -= 1;
@@ -106,10 +108,12 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         Ok(())
     }
 
-    /// The smallest cubes from `edge` on that fit the memory, with one entry left for the end.
+    /// Sets the cubes' edge to the least of `edge`, `edge` · 1.25, … for which the cubes fit
+    /// `CUBES`, with one entry left for the end.
     fn choose_cubes(&mut self, size: [f32; 3], edge: f32) {
         let longest = size[0].max(size[1]).max(size[2]);
-        // Lower than this no count fits anyway, and the casts below stay small.
+        // With a smaller edge the cubes would not fit anyway; this also keeps the casts below
+        // small.
         self.cube_m = edge.max(longest / CUBES as f32).max(1e-6);
         loop {
             self.dims = size.map(|s| (s / self.cube_m) as usize + 1);
@@ -129,19 +133,19 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         (k * self.dims[1] + j) * self.dims[0] + i
     }
 
-    /// The node at a place.
+    /// Node index at a place of the sorted order.
     pub(super) fn node(&self, place: usize) -> u16 {
         self.node[place]
     }
 
-    /// Position of the node at a place.
+    /// Position of the node at a place of the sorted order, metres.
     #[inline(always)]
     pub(super) fn point(&self, place: usize) -> [f32; 3] {
         [self.x[place], self.y[place], self.z[place]]
     }
 
-    /// Calls `visit` with the places after `place` whose nodes are in the range of lengths from it,
-    /// up to [`CANDIDATE_LANES`] at a time.
+    /// Calls `visit` with the places after `place` whose nodes are within the length range of the
+    /// node at `place`, up to [`CANDIDATE_LANES`] places per call.
     #[inline(always)]
     pub(super) fn for_each_in_range<E>(
         &self,
@@ -151,8 +155,8 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
     ) -> Result<(), E> {
         let lengths = LengthRange::new(config);
         let here = self.point(place);
-        // Rounding of `x ± reach` must not lose a cube: a millionth more, and an ulp of the largest
-        // coordinate.
+        // The search radius is a millionth and four ulps of the largest coordinate more than the
+        // longest edge, so that the rounding of `x ± reach` loses no cube.
         let largest = here[0].abs().max(here[1].abs()).max(here[2].abs());
         let reach = config.edge_max_m * (1.0 + 1e-6) + largest * 4.0 * f32::EPSILON;
         let [_, j0, k0] = [0, 1, 2].map(|axis| self.cube_along(axis, here[axis]));
@@ -191,7 +195,8 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         visit(&near[..count])
     }
 
-    /// A bit for each of the `lanes` places from `from` on whose distance is in range.
+    /// Bit i is set if the node at place `from + i`, i < `lanes`, is within the length range of
+    /// `here`.
     #[inline(always)]
     fn in_range(&self, here: [f32; 3], lengths: LengthRange, from: usize, lanes: usize) -> u32 {
         let mut hits = 0;

@@ -1,13 +1,13 @@
-//! What makes a file a roadmap: rows in order, edges both ways within the header's limits, ways to
-//! the landmarks that are right.
+//! The checks of a roadmap file's content: rows in order, each edge stored from both ends within
+//! the header's limits, and distances to landmarks that are those of shortest paths.
 
 use super::{LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapView, in_range};
 
 impl RoadmapView<'_> {
-    /// Rows, nodes and edges are what the header and one another say.
+    /// Checks row offsets, coordinates, targets, opposite half-edges, clearances and lengths.
     pub(super) fn check_graph(&self) -> Result<(), RoadmapError> {
-        // Ranges first: the opposite of a half-edge is looked up in a row that must already be
-        // known to be sound.
+        // Rows first: the opposite of a half-edge is looked up by binary search in a row that must
+        // be known to be valid.
         let mut end = 0;
         for (i, raw) in self.offsets.iter().enumerate() {
             let node = i.min(MAX_NODES) as u16;
@@ -57,11 +57,12 @@ impl RoadmapView<'_> {
         Ok(())
     }
 
-    /// The ways to the landmarks must be, to the bit, those that a search over all edges finds;
-    /// then their differences bound every way from below. Nothing is searched: the ways are right
-    /// if that to the landmark is zero, no edge shortens one, and each other one is the sum of an
-    /// edge and of a shorter way from the edge's other end. (Along the shorter ways one comes to
-    /// the landmark, so none is too short; along the true shortest way, none is too long.)
+    /// Checks that the distances to landmarks are, to the bit, the shortest ones over all edges;
+    /// only then are their differences lower bounds. No search is needed. They are right if the
+    /// landmark's own is zero, no edge makes one shorter, and each other one is the sum of an
+    /// edge's length and the smaller distance at the edge's other end. (Following ever smaller
+    /// distances leads to the landmark, so none is too small; along the true shortest path, none is
+    /// too large.)
     pub(super) fn check_landmarks(&self) -> Result<(), RoadmapError> {
         if self.landmarks.is_empty() {
             return Ok(());

@@ -1,32 +1,34 @@
-//! The ground below nodes, and the ground below any place, found from the nodes around it.
+//! Ground height below nodes, and an estimate of it below any point from the nodes around.
 //!
-//! The desk writes with each node how high it is over the first obstacle below it. Between a node
-//! and its ground all is free, so a place beside it at a height between the two is on the same
-//! storey. A node that is lower than the place may be below the storey's floor, but not if it is
-//! lower by less than twice the clearance of every edge: both have that much room.
+//! The desktop writes with each node its height above the first obstacle below it. Between a node
+//! and its ground all space is free, so a point beside the node at a height between the two is on
+//! the same storey. A node lower than the point may be below that storey's floor, but not if it is
+//! lower by less than twice the clearance of every edge: each of the two has at least that
+//! clearance to the floor.
 
 use libm::{fmaxf, fminf};
 
 use super::{MAX_LANDMARK_DISTANCE_M, RoadmapError, RoadmapView};
 use crate::Point;
 
-/// Horizontal distance within which nodes show the ground below a place, metres.
+/// Horizontal distance within which nodes count for the ground below a point, metres.
 pub const GROUND_REACH_M: f32 = 3.0;
-/// Most nodes, the nearest ones, that show the ground below a place. Fewer know too little where
-/// the floor has edges, more see the ground too wide to leave a path; measured by
+/// Most nodes, the nearest ones, that count for the ground below a point. Fewer miss edges of the
+/// floor; more give a range of heights too wide for a detour to leave the path. Measured by
 /// `tests/tests/detours.rs`.
 const MAX_GROUND_NODES: usize = 6;
 
 impl RoadmapView<'_> {
-    /// Height of the ground below a node, metres; `None` where the file does not say, or nothing is
-    /// below.
+    /// Height of the ground below a node, metres up in the mission frame; `None` if the file has no
+    /// heights, or nothing is below the node.
     pub fn ground_m(&self, node: u16) -> Option<f32> {
         let height_m = f32::from_le_bytes(*self.heights.get(usize::from(node))?);
         height_m.is_finite().then(|| self.node(node).z - height_m)
     }
 
-    /// The lowest and the highest ground that the nodes around a place have on its storey, metres;
-    /// `None` where none has any. O(nodes).
+    /// Lowest and highest ground below `place`, metres up in the mission frame: of the nearest
+    /// nodes on the same storey within [`GROUND_REACH_M`]. `None` if none of these has a ground.
+    /// O(nodes).
     pub fn ground_range_near(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;
         let mut nearest = [(GROUND_REACH_M * GROUND_REACH_M, None); MAX_GROUND_NODES];

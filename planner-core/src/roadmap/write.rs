@@ -1,4 +1,4 @@
-//! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and
+//! Writes a roadmap into the caller's buffer, without other memory: rows are counted, filled and
 //! sorted in place.
 
 use super::{
@@ -10,20 +10,20 @@ use crate::Point;
 use crate::file::{CRC32, FileError};
 use crate::search::{SearchWorkspace, shortest_path_tree};
 
-/// An undirected edge to be written.
+/// An undirected edge to write.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// One node of the edge.
+    /// Index of one node.
     pub a: u16,
-    /// The other node.
+    /// Index of the other node.
     pub b: u16,
-    /// Distance from the segment to the nearest obstacle, metres; stored rounded down to a
-    /// millimetre and saturated at [`RoadmapHeader::max_clearance_m`].
+    /// Distance from the edge to the nearest obstacle, metres; stored rounded down to a millimetre,
+    /// at most [`RoadmapHeader::max_clearance_m`].
     pub clearance_m: f32,
 }
 
-/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length. `columns` are
-/// the numbers that each node has beside its place: 0, or [`LANDMARKS`] for
+/// Length of a roadmap file in bytes, or `None` if it exceeds the file's 32-bit length. `columns`
+/// is how many numbers are stored per node besides position and row: 0, or [`LANDMARKS`] for
 /// [`write_with_landmarks`], and one more with heights.
 pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
     let a_node = columns.checked_add(4)?;
@@ -32,11 +32,11 @@ pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> 
     u32::try_from(bytes).ok().map(|_| bytes)
 }
 
-/// Writes a roadmap and returns its length in bytes. O(nodes + edges · log degree), no memory but
-/// `out`.
+/// Writes a roadmap without landmarks and returns its length in bytes. O(nodes + edges · log
+/// degree), no memory but `out`.
 ///
-/// Terminals come first in `nodes`: starts, then goals. The order of `edges` and of their ends does
-/// not change the bytes. On an error `out` holds nothing of use.
+/// The terminals come first in `nodes`: starts, then goals. Neither the order of `edges` nor that
+/// of an edge's two ends changes the bytes. After an error the content of `out` is undefined.
 pub fn write(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -47,12 +47,12 @@ pub fn write(
     Ok(append_crc(out))
 }
 
-/// As [`write()`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in
-/// a building: node 0, a start where there are any, and the node farthest from it. Adds a search
-/// from each.
+/// As [`write()`], with the shortest distances from each node to [`LANDMARKS`] landmarks, which
+/// spare a search half its nodes in a building. The first landmark is node 0, a start if there are
+/// any; the second is the node farthest from it. Costs one more search per landmark.
 ///
-/// `heights_m` are those of the nodes over the ground, infinite where there is none; or there are
-/// none at all.
+/// `heights_m` are the nodes' heights above the ground, infinite where nothing is below; or it is
+/// empty, and the file has none.
 pub fn write_with_landmarks<const N: usize>(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -95,7 +95,8 @@ pub fn write_with_landmarks<const N: usize>(
             }
         }
     }
-    // An edge too short to lengthen a way leaves what no reader can check.
+    // Where an edge is so short that adding it does not change an f32 sum, [`RoadmapView::parse`]
+    // would refuse the file.
     let body = &out[HEADER_LEN..out.len() - WORD_LEN];
     let view = RoadmapView::from_body(*header, 0, body, [nodes.len(), 2 * edges.len(), LANDMARKS]);
     view.check_landmarks()?;
@@ -103,8 +104,8 @@ pub fn write_with_landmarks<const N: usize>(
     Ok(append_crc(out))
 }
 
-/// Everything but the `columns` of numbers and the CRC; the bytes of the whole roadmap are
-/// returned.
+/// Writes all but the `columns` of numbers per node and the CRC; returns the bytes of the whole
+/// file.
 fn write_graph<'a>(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -139,7 +140,7 @@ fn write_graph<'a>(
     Ok(out)
 }
 
-/// Closes the roadmap with its CRC; its length.
+/// Writes the CRC at the end of the file; returns the file's length.
 fn append_crc(out: &mut [u8]) -> usize {
     let (body, crc) = out.split_at_mut(out.len() - WORD_LEN);
     crc.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
@@ -181,7 +182,7 @@ fn check_edges(
     Ok(())
 }
 
-/// `counts` are those of nodes, half-edges and landmarks.
+/// `counts` are the numbers of nodes, half-edges and landmarks; `total` is the file's length.
 fn write_header(
     header: &RoadmapHeader,
     version: u16,
@@ -213,8 +214,8 @@ fn write_header(
     }
 }
 
-/// Fills the compressed rows: the offsets first count the degrees, then serve as cursors, then are
-/// moved back by one.
+/// Fills the compressed sparse rows. `offsets` first counts the degrees, then holds each row's
+/// write position, then is shifted by one entry to hold each row's begin.
 fn write_rows(
     header: &RoadmapHeader,
     edges: &[Edge],

@@ -1,8 +1,8 @@
-//! A vehicle's own set, prepared once to be compared with those of many neighbours.
+//! The own vehicle's reachable set, prepared once to be compared with those of many neighbours.
 //!
-//! Most pairs of legs are far apart, and a board sees that without their distance: by the box
-//! around the own set and by balls around the legs. What is left is compared leg by leg. Each of
-//! these bounds is a little wider than it has to be, so rounding skips no pair that counts.
+//! Most pairs of legs are far apart, which cheap bounds show without a distance: the bounding box
+//! of the own set, and balls around the legs. Only the remaining pairs are compared leg by leg.
+//! Each bound is slightly wider than necessary, so rounding rules out no pair that conflicts.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -11,23 +11,23 @@ use super::{MAX_SET_POINTS, ReachableSet};
 use crate::Point;
 use crate::geometry::{point_distance_sq, segments_distance_sq};
 
-/// Rounding of distances, metres: an approach by less than this is not counted as one, and no
-/// vehicle can creep past another by so little.
+/// Rounding of distances, metres: an approach by less than this does not count as one. No vehicle
+/// can creep past another by so little.
 const APPROACH_ROUNDING_M: f32 = 0.003;
-/// Margin added to bounding boxes, metres: more than a coordinate of the mission frame is rounded
-/// by.
+/// Margin added to bounding boxes, metres: more than the rounding of a coordinate of the mission
+/// frame.
 const BOUNDS_ROUNDING_M: f32 = 0.01;
-/// No less than the square root, and at most 7 % more: half the exponent, and the line between two
+/// Upper bound of a square root, at most 7 % above it: half the exponent, and linear between two
 /// powers of four.
 #[inline]
 fn sqrt_upper_bound(square: f32) -> f32 {
     f32::from_bits((square.to_bits() >> 1) + (127 << 22))
 }
 
-/// Room for the legs of a set.
+/// Memory for the legs of a set, which the caller lends to [`OwnSet::new`].
 pub type Legs<'a> = Vec<Leg<'a>, MAX_SET_POINTS>;
 
-/// A leg with its midpoint and an upper bound of half its length.
+/// A leg of the own set, with its midpoint and an upper bound of half its length.
 #[derive(Clone, Copy, Debug)]
 pub struct Leg<'a> {
     from: &'a Point,
@@ -43,14 +43,14 @@ impl<'a> Leg<'a> {
         Self { from, to, middle: from + half, half_m: sqrt_upper_bound(half.norm_squared()) }
     }
 
-    /// Whether two cannot come nearer than `apart_m`.
+    /// Whether two legs are certainly at least `apart_m` from each other.
     #[inline]
     fn is_apart(&self, other: &Leg<'_>, apart_m: f32) -> bool {
         let most_m = self.half_m + other.half_m + apart_m;
         (self.middle - other.middle).norm_squared() >= most_m * most_m
     }
 
-    /// Whether it may come nearer to a place than `near_m`.
+    /// Whether the leg may come nearer to a point than `near_m`.
     #[inline]
     fn may_come_within(&self, place: &Point, near_m: f32) -> bool {
         let most_m = self.half_m + near_m + BOUNDS_ROUNDING_M;
@@ -58,27 +58,28 @@ impl<'a> Leg<'a> {
     }
 }
 
-/// The own set.
+/// The own vehicle's reachable set with its legs and its bounding box.
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
     set: &'a ReachableSet,
     legs: &'a [Leg<'a>],
-    /// Middle of the box around it, and half of its size.
+    /// Centre of the bounding box, and half of its size.
     middle: Point,
     half: Point,
 }
 
 impl<'a> OwnSet<'a> {
-    /// The set that a vehicle can no longer avoid. The caller lends the room for its legs: a board
-    /// takes long to copy them.
+    /// Prepares the set that the own vehicle can no longer avoid. The caller lends the memory for
+    /// its legs: copying them takes a board long.
     pub fn new<'s: 'a>(set: &'s ReachableSet, legs: &'a mut Legs<'s>) -> Self {
         let first = set.points[0];
-        // The second leg begins at the same point where a first leg has no length.
+        // Where the first leg has length 0, the second begins at the same point, and the first is
+        // left out.
         let double = set.points.len() > 2 && first == set.points[1];
         let (mut low, mut high) = (first, first);
         legs.clear();
         for (from, to) in set.segments().skip(usize::from(double)) {
-            // Cannot overflow: as many legs as points at most.
+            // Cannot overflow: there are at most as many legs as points.
             let _ = legs.push(Leg::new(from, to));
             low = merge_coordinates(&low, to, |a, b| a < b);
             high = merge_coordinates(&high, to, |a, b| a > b);
@@ -86,8 +87,8 @@ impl<'a> OwnSet<'a> {
         Self { set, legs, middle: (low + high) * 0.5, half: (high - low) * 0.5 }
     }
 
-    /// From the box around the set to a place, metres; 0 on each axis along which the place is
-    /// beside no face.
+    /// Distances from the set's bounding box to a point along each axis, metres; 0 on an axis along
+    /// which the point is within the box.
     #[inline]
     pub fn away_from_box(&self, place: &Point) -> Point {
         let axis = |axis: usize| {
@@ -97,8 +98,8 @@ impl<'a> OwnSet<'a> {
         Point::new(axis(0), axis(1), axis(2))
     }
 
-    /// Whether a segment, given by its middle and half of it, stays outside the box around this
-    /// set, by `apart_m`.
+    /// Whether a segment, given by its midpoint and half its vector, is at least `apart_m` outside
+    /// the set's bounding box along some axis.
     #[inline]
     fn is_outside(&self, middle: &Point, half: &Point, apart_m: f32) -> bool {
         let apart = |axis: usize| {
@@ -107,7 +108,8 @@ impl<'a> OwnSet<'a> {
         apart(0) || apart(1) || apart(2)
     }
 
-    /// Square of the least distance between the polylines of both sets, at most `most_m` squared.
+    /// Square of the least distance between the two sets without their widening, at most `most_m`
+    /// squared, m².
     fn centreline_distance_sq(&self, other: &ReachableSet, most_m: f32) -> f32 {
         let mut wide_m = most_m + BOUNDS_ROUNDING_M;
         let mut least_sq = most_m * most_m;
@@ -130,8 +132,8 @@ impl<'a> OwnSet<'a> {
         least_sq
     }
 
-    /// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place`
-    /// now, and nearer than the vehicle is already.
+    /// Whether this set comes nearer than `apart_m` to a neighbour's set, and this motion brings
+    /// the vehicle nearer than it is already. `place` is the neighbour's present position.
     pub fn conflicts(&self, other: &ReachableSet, place: &Point, apart_m: f32) -> bool {
         let most_m = apart_m + other.widened_by_m + self.set.widened_by_m;
         let most_sq = most_m * most_m;
@@ -139,7 +141,7 @@ impl<'a> OwnSet<'a> {
         motion_sq < most_sq && self.comes_nearer(motion_sq, other, place, most_m)
     }
 
-    /// Whether a motion that comes too near comes nearer than the vehicle is.
+    /// Whether a motion that comes too near also comes nearer than the vehicle is now.
     #[inline(never)]
     fn comes_nearer(
         &self,
@@ -152,14 +154,15 @@ impl<'a> OwnSet<'a> {
             return true;
         }
         let here = &self.set.points[0];
-        // A motion leads no nearer where the vehicle is as near to one leg already.
+        // The motion comes no nearer if the vehicle is already as near to a leg of the neighbour's
+        // set.
         let here_m = sqrtf(motion_sq) + APPROACH_ROUNDING_M;
         let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
         if here_m < most_m && !other.segments().any(is_here) {
             return true;
         }
-        // The vehicle stays as far from where the neighbour may come; but it must not fly towards
-        // where the neighbour comes from.
+        // The vehicle stays as far from the neighbour's set as it is, but it must not fly towards
+        // the neighbour's present position either.
         let now_sq = (here - place).norm_squared();
         let nearer_m = sqrtf(now_sq.min(4.0 * most_m * most_m)) - APPROACH_ROUNDING_M;
         let is_nearer = |leg: &Leg<'_>| {
@@ -170,8 +173,8 @@ impl<'a> OwnSet<'a> {
     }
 }
 
-/// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about
-/// numbers that are none takes a board three times as long.
+/// For each coordinate that of `b` if it is `more` than that of `a`, else that of `a`. Not `min`:
+/// its handling of NaN takes a board three times as long.
 #[inline]
 fn merge_coordinates(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
     let of = |a: f32, b: f32| if more(b, a) { b } else { a };

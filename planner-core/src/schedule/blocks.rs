@@ -1,9 +1,10 @@
-//! Which timed segments of two flights may come near each other: some in a row have a box and a
-//! capsule around them, and segments are compared only where those of two flights come near.
+//! Bounding volumes that rule out pairs of timed segments: each block of consecutive segments of a
+//! flight has a bounding box and a capsule. Segments of two flights are compared only where the
+//! volumes of both come near each other.
 //!
-//! What it leaves out is never in conflict, and what it gives out comes in order: schedules are,
-//! bit by bit, those of a comparison of all with all. Cost: one pass over the own flight, and the
-//! straight parts or the blocks of the other × the own blocks.
+//! Pairs in conflict are never ruled out, and the others come in order, so schedules are, bit by
+//! bit, those of a comparison of all with all. Cost: one pass over the own flight, and the straight
+//! parts or blocks of the other flight × the own blocks.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -14,23 +15,24 @@ use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
-/// Timed segments of a block: more make capsules wide at corners, fewer make more capsules.
+/// Timed segments per block. More make capsules wide at corners, fewer make more capsules.
 pub(super) const SEGMENTS_PER_BLOCK: usize = 8;
-/// Most blocks of a flight, a bit each.
+/// Most blocks of a flight; each is a bit of [`Bits`].
 pub(super) const MAX_BLOCKS: usize = MAX_TIMED_SEGMENTS / SEGMENTS_PER_BLOCK;
-/// Blocks of a group.
+/// Blocks per group.
 const BLOCKS_PER_GROUP: usize = 8;
-/// Most groups of a flight.
+/// Most groups of blocks of a flight.
 const MAX_GROUPS: usize = MAX_BLOCKS.div_ceil(BLOCKS_PER_GROUP);
-/// Most that rounding takes from a distance between places kilometres away, metres.
+/// Most by which f32 rounding shortens a distance between points kilometres from the origin,
+/// metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
-/// Most that rounding takes from the length of a block's segments, metres, and as a share of the
-/// path up to there: eight segments, each end rounded.
+/// Most by which rounding shortens the length of a block's eight segments, metres, and as a share
+/// of the arc length up to there.
 const LENGTH_ROUNDING_M: f32 = 0.01;
 const LENGTH_ROUNDING: f32 = 2e-6;
 
-/// Blocks of a flight, a bit each.
+/// A set of blocks of a flight: bit `i` is block `i`.
 pub(super) type Bits = u64;
 
 const _: () = assert!(
@@ -38,19 +40,20 @@ const _: () = assert!(
     "a bit for each block"
 );
 
-/// A block of consecutive timed segments, with its bounding volumes.
+/// Bounding box and capsule of consecutive timed segments.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     bounding_box: BoundingBox,
-    /// Line from the beginning of the first segment to the end of the last.
+    /// Axis of the capsule: from the beginning of the first segment to the end of the last.
     line: (Point, Point),
-    /// A bound of the distance of its segments beside that line, metres.
+    /// Radius of the capsule: an upper bound on the distance of the segments from its axis, metres.
     lateral_extent_m: f32,
 }
 
 impl Block {
-    /// Around consecutive segments. No point of them is further beside the line from end to end
-    /// than a curve as long can go: half the minor axis of the ellipse about both ends.
+    /// The block around consecutive segments. A curve of their length between the same ends
+    /// deviates from the straight line by at most half the minor axis of the ellipse with foci at
+    /// both ends; that is the radius.
     fn around_segments(pieces: &[TimedSegment]) -> Self {
         let (first, last) = (&pieces[0], &pieces[pieces.len() - 1]);
         let mut block = Self::around_line(first.from, last.to);
@@ -62,14 +65,14 @@ impl Block {
         block
     }
 
-    /// Around a straight line.
+    /// The block around a straight line, with radius 0.
     fn around_line(from: Point, to: Point) -> Self {
         let mut bounding_box = BoundingBox(from, from);
         bounding_box.include(&to, &to);
         Self { bounding_box, line: (from, to), lateral_extent_m: 0.0 }
     }
 
-    /// All of a box: it meets every line, and only the box limits it.
+    /// The block of all that is in a box: its radius is infinite, so only the box rules out pairs.
     fn filling(bounding_box: BoundingBox) -> Self {
         Self {
             bounding_box,
@@ -81,13 +84,13 @@ impl Block {
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
         let apart_m = reach_m + self.lateral_extent_m + other.lateral_extent_m;
         let (own, theirs) = (&self.line, &other.line);
-        // Of lines of 10^15 m the distance is no number.
+        // Between lines of 10^15 m the distance is not a number.
         apart_m.is_infinite()
             || segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
     }
 }
 
-/// A box: its lowest and its highest corner.
+/// An axis-aligned box, from its lowest to its highest corner.
 #[derive(Clone, Copy, Debug, Default)]
 struct BoundingBox(Point, Point);
 
@@ -99,7 +102,7 @@ impl BoundingBox {
 
     #[inline(never)]
     fn include(&mut self, low: &Point, high: &Point) {
-        // Not `fminf`: what that does about numbers that are none takes a board ten times as long.
+        // Not `fminf`: its handling of NaN takes a board ten times as long.
         for axis in 0..3 {
             if low[axis] < self.0[axis] {
                 self.0[axis] = low[axis];
@@ -110,7 +113,7 @@ impl BoundingBox {
         }
     }
 
-    /// Makes it wider on each side.
+    /// Moves each face outwards by `reach_m`.
     fn widen(&mut self, reach_m: f32) {
         (self.0, self.1) = (self.0.add_scalar(-reach_m), self.1.add_scalar(reach_m));
     }
@@ -119,7 +122,7 @@ impl BoundingBox {
         (0..3).all(|axis| self.0[axis] <= other.1[axis] && other.0[axis] <= self.1[axis])
     }
 
-    /// Whether a line lies wholly beyond one of its sides.
+    /// Whether a line lies entirely beyond one face of the box. False does not mean that they meet.
     #[inline(never)]
     fn is_beside_line(&self, from: &Point, to: &Point) -> bool {
         (0..3).any(|axis| {
@@ -129,14 +132,14 @@ impl BoundingBox {
     }
 }
 
-/// The blocks of one flight, and boxes around groups of them and around all. Boxes are as much
-/// wider as another flight's line must come near.
+/// The blocks of one flight, with boxes around groups of blocks and around all. Boxes are widened
+/// by `reach_m`, so that a line outside one is in no conflict with its segments.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<Block, MAX_BLOCKS>,
     groups: Vec<BoundingBox, MAX_GROUPS>,
     whole: BoundingBox,
-    /// Distance from which on two segments are in no conflict, metres.
+    /// Distance from which on two segments are not in conflict, metres.
     reach_m: f32,
 }
 
@@ -146,14 +149,14 @@ impl Blocks {
         Self { blocks: Vec::new(), groups: Vec::new(), whole, reach_m: 0.0 }
     }
 
-    /// Rebuilds the blocks from the timed segments of a flight.
+    /// Builds blocks, groups and the whole box from the timed segments of a flight.
     pub(super) fn rebuild(&mut self, cfg: &ScheduleConfig, pieces: &[TimedSegment]) {
         self.reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M;
         self.blocks.clear();
         for some in pieces.chunks(SEGMENTS_PER_BLOCK) {
             let mut block = Block::around_segments(some);
             block.bounding_box.widen(self.reach_m);
-            // Cannot overflow: there are no more pieces than blocks have room for.
+            // Cannot overflow: there are no more segments than all blocks have room for.
             let _ = self.blocks.push(block);
         }
         self.groups.clear();
@@ -164,13 +167,13 @@ impl Blocks {
                 .iter()
                 .for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
             self.whole.include(&around.0, &around.1);
-            // Cannot overflow either.
+            // Cannot overflow: there are no more blocks than all groups have room for.
             let _ = self.groups.push(around);
         }
     }
 
-    /// The straight parts of another flight that may come too near, in order, each with the blocks
-    /// that it may come near to.
+    /// The straight parts of another flight that may be in conflict with this one, in order, each
+    /// with the blocks of this flight that it may be in conflict with.
     pub(super) fn parts_near<'f, const W: usize>(
         &'f self,
         cfg: &'f ScheduleConfig,
@@ -196,7 +199,8 @@ impl Blocks {
         })
     }
 
-    /// The blocks that may come too near to another flight on a straight line.
+    /// The blocks that may be in conflict with another flight on the straight line between two
+    /// points.
     pub(super) fn blocks_near_line(&self, from: Point, to: Point) -> Bits {
         if self.whole.is_beside_line(&from, &to) {
             return 0;
@@ -204,13 +208,13 @@ impl Blocks {
         self.blocks_near_block(&Block::around_line(from, to))
     }
 
-    /// The blocks that may come too near to these segments of another flight, which are at most
-    /// [`SEGMENTS_PER_BLOCK`] in a row.
+    /// The blocks that may be in conflict with these at most [`SEGMENTS_PER_BLOCK`] consecutive
+    /// segments of another flight.
     pub(super) fn blocks_near(&self, pieces: &[TimedSegment]) -> Bits {
         if pieces.is_empty() { 0 } else { self.blocks_near_block(&Block::around_segments(pieces)) }
     }
 
-    /// The blocks that may come too near to another block.
+    /// The blocks that may be in conflict with a block of another flight.
     #[inline(never)]
     fn blocks_near_block(&self, other: &Block) -> Bits {
         let mut near = 0;
@@ -231,8 +235,8 @@ impl Blocks {
         near
     }
 
-    /// Puts out the indices of the segments of these blocks that may come too near to another
-    /// flight on a straight line, in order.
+    /// Writes the indices of those segments of the blocks `near` that may be in conflict with
+    /// another flight on a straight line to `out`, in ascending order.
     pub(super) fn segments_near_line(
         &self,
         near: Bits,
@@ -249,7 +253,7 @@ impl Blocks {
             let end = (first + SEGMENTS_PER_BLOCK).min(pieces.len());
             for (index, piece) in (first..).zip(pieces.get(first..end).unwrap_or_default()) {
                 if !line.is_beside_line(&piece.from, &piece.to) {
-                    // Cannot overflow: there are no more segments.
+                    // Cannot overflow: `out` has room for all segments.
                     let _ = out.push(index as u16);
                 }
             }
@@ -257,8 +261,8 @@ impl Blocks {
     }
 }
 
-/// The legs between the first waypoints at one height, and a box around them: they are first
-/// compared together.
+/// Number of legs from the first waypoint on that stay at its height, and their bounding box, by
+/// which all of them can be ruled out at once.
 fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
     let (first, rest) = waypoints.split_first()?;
     let (mut low, mut high) = (first.position, first.position);
@@ -277,7 +281,7 @@ fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
     Some((legs, BoundingBox(low, high)))
 }
 
-/// Indices of the set bits, in rising order.
+/// Indices of the set bits, in ascending order.
 pub(super) fn set_bit_indices(mut bits: Bits) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
@@ -286,7 +290,7 @@ pub(super) fn set_bit_indices(mut bits: Bits) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The segments of these blocks and their indices, in order.
+/// The segments of the blocks `near` with their indices, in ascending order.
 pub(super) fn segments_in_blocks(
     near: Bits,
     pieces: &[TimedSegment],

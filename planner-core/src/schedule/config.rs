@@ -1,23 +1,23 @@
-//! Settings of a schedule, and why there is none.
+//! Settings of a schedule, and reasons why none can be made.
 
 use crate::{ConfigError, all_positive};
 
-/// Tunables of the schedule.
+/// Separations and nominal speeds of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduleConfig {
-    /// Distance kept between the paths of two vehicles that move: the safety distance and what both
-    /// deviate from their paths, metres.
+    /// Distance that two moving vehicles keep, metres: the safety distance, and the deviation of
+    /// both from their paths.
     pub separation_m: f32,
-    /// Distance kept from a vehicle that stands on the ground, metres.
+    /// Distance that a vehicle keeps from one that stands on the ground, metres.
     pub parked_separation_m: f32,
-    /// Nominal speed along paths, m/s.
+    /// Nominal speed along the path, m/s.
     pub cruise_mps: f32,
-    /// Nominal speed of take-off and landing, m/s.
+    /// Nominal speed of climb and descent, m/s.
     pub vertical_mps: f32,
 }
 
 impl ScheduleConfig {
-    /// Whether all are positive and finite; the error names the first that is not.
+    /// Checks that all numbers are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         all_positive(&[
             ("separation_m", self.separation_m),
@@ -31,12 +31,14 @@ impl ScheduleConfig {
 /// Reason why a schedule could not be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
-    /// A flight has more than [`PIECES`](super::MAX_TIMED_SEGMENTS) timed segments.
+    /// A flight has more timed segments than [`MAX_TIMED_SEGMENTS`](super::MAX_TIMED_SEGMENTS), or
+    /// all flights more than the workspace holds; or the roadmap has more nodes, or the path more
+    /// waypoints, than there is room for.
     PiecesFull,
-    /// A vehicle has more than `G` gates.
+    /// A vehicle has more than `G` gates, even merged.
     GatesFull,
-    /// No delay keeps this vehicle clear of those already scheduled.
+    /// At no take-off time is this vehicle without conflict with those already scheduled.
     Blocked,
-    /// A flight or a node with an index that there is none of.
+    /// A flight or a node with this index does not exist.
     BadIndex,
 }

@@ -1,7 +1,7 @@
-//! Which scheduled pieces come near a place: they are sorted into the cells of a square grid, so
-//! that a look around asks only the cells about it.
+//! Scheduled timed segments sorted into the cells of a square horizontal grid, so that the search
+//! for segments near another one visits only the cells around it.
 //!
-//! Cost: one sort to build; a look takes the pieces in the cells within reach.
+//! Cost: one sort to build; a search visits the segments in the cells within reach.
 
 use crate::Length;
 use libm::{fmaxf, fminf};
@@ -9,25 +9,25 @@ use libm::{fmaxf, fminf};
 use super::pieces::TimedSegment;
 use crate::sort;
 
-/// Cells along one side of the grid.
+/// Number of cells along one side of the grid.
 const CELLS_PER_SIDE: usize = 32;
-/// Least side of a cell, metres: far below any separation finer cells find nothing less.
+/// Least side of a cell, metres: far below the separation, smaller cells rule out no more segments.
 const MIN_CELL_M: f32 = 0.5;
 
-/// Pieces by the cell of their middle, seen from above.
+/// Index of timed segments by the horizontal cell of their midpoint.
 #[derive(Clone, Debug)]
 pub(super) struct SegmentGrid {
     min: [f32; 2],
     cell_m: f32,
-    /// Half of the longest piece, metres.
+    /// Half of the length of the longest segment, metres.
     half_m: f32,
-    /// First timed segment of each cell, row by row.
+    /// Index of the first segment of each cell, row by row.
     starts: [u16; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
 }
 
 impl SegmentGrid {
     pub(super) const fn new() -> Self {
-        // All zero; `sort_into_cells` sets the size before a piece is looked for.
+        // All zero; `sort_into_cells` sets the size before the first search.
         Self {
             min: [0.0; 2],
             cell_m: 0.0,
@@ -36,7 +36,7 @@ impl SegmentGrid {
         }
     }
 
-    /// Sorts `pieces`, at most `u16::MAX` of them, into cells.
+    /// Sorts `pieces`, at most `u16::MAX` of them, by their cells, and indexes them.
     pub(super) fn sort_into_cells(&mut self, pieces: &mut [TimedSegment]) {
         let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         self.half_m = 0.0;
@@ -53,7 +53,7 @@ impl SegmentGrid {
             let [x, y] = middle(piece);
             self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x)
         };
-        // Any order within a cell will do, if it is the same on all boards.
+        // The order within a cell does not matter, as long as it is the same on all boards.
         sort::sort_by(pieces, |a, b| cell(a).cmp(&cell(b)));
         self.starts.fill(0);
         for piece in &*pieces {
@@ -65,13 +65,14 @@ impl SegmentGrid {
         }
     }
 
-    /// The cell of a coordinate, the nearest if it lies outside.
+    /// Index along `axis` of the cell that holds a coordinate, or of the nearest cell if it is
+    /// outside the grid.
     fn cell_index(&self, axis: usize, value: f32) -> usize {
         (((value - self.min[axis]) / self.cell_m) as usize).min(CELLS_PER_SIDE - 1)
     }
 
-    /// The pieces whose middle is so near that they may come within `apart_m` of `own`, and some
-    /// more.
+    /// All segments whose midpoint is so near that they may come within `apart_m` of `own`, and
+    /// some that may not.
     pub(super) fn candidates_near<'a>(
         &'a self,
         pieces: &'a [TimedSegment],

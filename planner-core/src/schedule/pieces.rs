@@ -1,4 +1,5 @@
-//! Timed segments: a flight cut into stretches, each with when it is held.
+//! Timed segments: a flight cut into short parts, each with the interval of time in which it is
+//! held.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -8,43 +9,44 @@ use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
-/// Longest timed segment, metres: shorter ones let vehicles follow one another closer, longer ones
-/// cost less.
+/// Longest timed segment, metres. With shorter ones vehicles follow one another more closely,
+/// longer ones cost less.
 pub const MAX_TIMED_SEGMENT_M: f32 = 1.5;
-/// Most timed segments of one flight; a flight that would need more has longer ones.
+/// Most timed segments of one flight; a flight that would need more gets longer ones.
 pub const MAX_TIMED_SEGMENTS: usize = 320;
 /// Most doublings of the length of timed segments: to 1.5 km.
 const MAX_SEGMENT_DOUBLINGS: usize = 10;
-/// Least time for which a pad is held after the take-off, seconds: a vehicle that stands on its pad
+/// Least time after take-off for which the pad is held, seconds: a vehicle that stands on its pad
 /// has not left it.
 pub(super) const OFF_PAD_S: f32 = 0.05;
 
-/// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the
-/// pad is held from −∞, the landing place to +∞.
+/// A timed segment: a straight part of a flight, and the interval in which it is held. Times are
+/// seconds after take-off; the pad is held from −∞, the landing place to +∞.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimedSegment {
     pub(super) from: Point,
     pub(super) to: Point,
-    /// Place where the vehicle waits before this segment, metres along its path: no vehicle waits
-    /// within a climb or a descent.
+    /// Arc length at which the vehicle would wait before it enters this segment, metres. That is
+    /// the segment's beginning, or in a climb or a descent the beginning of that: no vehicle waits
+    /// within one.
     pub(super) from_m: f32,
-    /// End of the segment, metres.
+    /// Arc length at which the segment ends, metres.
     pub(super) to_m: f32,
-    /// When it may have to be free: when its vehicle leaves the place where it waits before it.
+    /// Time from which the segment is held, seconds: when the vehicle leaves `from_m`.
     pub(super) from_s: f32,
-    /// When the vehicle has left it.
+    /// Time at which the vehicle has left the segment, seconds.
     pub(super) to_s: f32,
     pub(super) parked: bool,
 }
 
 impl<const W: usize> Flight<W> {
-    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has
-    /// at most [`MAX_TIMED_SEGMENTS`].
+    /// Sets `segment_m` to the shortest of [`MAX_TIMED_SEGMENT_M`], twice that, four times that …
+    /// with which the flight has at most [`MAX_TIMED_SEGMENTS`] timed segments.
     pub(crate) fn fit_segment_length(&mut self) {
         self.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_SEGMENT_DOUBLINGS {
-            // Each leg rounds its number of segments up: the path alone may show that they are too
-            // many.
+            // Each leg's number of segments is rounded up, so the path's length alone may show that
+            // there are too many.
             let too_many = self.path.length_m() > self.segment_m * (MAX_TIMED_SEGMENTS + 1) as f32;
             if !too_many && self.segment_count() <= MAX_TIMED_SEGMENTS {
                 break;
@@ -53,14 +55,15 @@ impl<const W: usize> Flight<W> {
         }
     }
 
-    /// Time from take-off to landing, seconds; zero for a vehicle that stays on its pad.
+    /// Time from take-off to landing by the schedule, seconds; zero for a vehicle that stays on its
+    /// pad.
     pub(crate) fn duration_s(&self, cfg: &ScheduleConfig) -> f32 {
         let landed_s = |w: &Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
         self.path.waypoints().last().filter(|_| self.task.leaves_pad()).map_or(0.0, landed_s)
     }
 
-    /// Timed segments that [`cut_into_segments`] makes of it, by the same lengths: as those are
-    /// rounded.
+    /// Number of timed segments into which [`cut_into_segments`] cuts the flight, counted from the
+    /// same f32 lengths.
     pub(crate) fn segment_count(&self) -> usize {
         let waypoints = self.path.waypoints();
         let legs = waypoints.windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
@@ -78,28 +81,28 @@ impl<const W: usize> Flight<W> {
     }
 }
 
-/// A straight part of a flight: a stay, a leg, a stay. Either stay may be missing, and a leg
-/// without length has no segments.
+/// A straight part of a flight: a stay at its beginning, a leg, a stay at its end. Either stay may
+/// be missing; a leg of length 0 has no segments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPart {
     before: Option<TimedSegment>,
     pub(super) leg: Leg,
-    /// Beginning and end of the leg, metres along the path.
+    /// Arc lengths of the leg's beginning and end, metres.
     from_m: f32,
     to_m: f32,
     after: Option<TimedSegment>,
 }
 
 impl StraightPart {
-    /// Refuses a leg of more timed segments than `most`: nobody goes through thousands of millions
-    /// of them.
+    /// Refuses a leg of more than `most` timed segments: enormous lengths would make billions of
+    /// them.
     pub(super) fn check_count(&self, segment_m: f32, most: usize) -> Result<(), ScheduleError> {
         let fits = segment_count(self.leg.length_m, segment_m) as usize <= most;
         if fits { Ok(()) } else { Err(ScheduleError::PiecesFull) }
     }
 
-    /// Gives out its timed segments of at most `segment_m`, in order. One copy of it: a board has
-    /// little room.
+    /// Passes the part's timed segments, the leg's at most `segment_m` long, to `tell` in order.
+    /// Not inlined: a board has little flash.
     #[inline(never)]
     pub(super) fn for_each_segment(&self, segment_m: f32, tell: &mut dyn FnMut(TimedSegment)) {
         self.before.into_iter().for_each(&mut *tell);
@@ -108,13 +111,13 @@ impl StraightPart {
     }
 }
 
-/// Straight part `part` of a flight, which lands at `vertical_mps`: the pad and the climb come
-/// first, then each leg after what is held at its beginning, and the descent after the last. `None`
-/// beyond that.
+/// Straight part `part` of a flight that descends at `vertical_mps`. Part 0 is the pad and the
+/// climb; then each leg is a part, with the hold at its beginning; the last is the descent and the
+/// landing place. `None` for a larger `part`.
 ///
-/// A climb is flown in one go, and so are a descent and what follows it, the landing place. All
-/// segments of such a group are held from its beginning; each is free again when the vehicle has
-/// left it.
+/// A climb is flown without a stop, and so is a descent with the landing place at its end. All
+/// segments of such a group are held from the group's beginning, each until the vehicle has left
+/// it.
 pub(super) fn straight_part<const W: usize>(
     vertical_mps: f32,
     flight: &Flight<W>,
@@ -137,7 +140,8 @@ pub(super) fn straight_part<const W: usize>(
     })
 }
 
-/// The ends of a straight part's leg, as [`straight_part`] has them.
+/// The ends of the leg of straight part `part`, the same as in [`straight_part`]; `None` for a
+/// larger `part`.
 pub(super) fn line_of_part<const W: usize>(
     flight: &Flight<W>,
     part: usize,
@@ -155,7 +159,7 @@ pub(super) fn line_of_part<const W: usize>(
     Some((begin, next.unwrap_or(below(begin, flight.descent_m))))
 }
 
-/// A place that is held.
+/// Timed segment of a vehicle that stays at a point, whose arc length is `m`.
 fn stay(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
     TimedSegment { from: at, to: at, from_m: m, to_m: m, from_s, to_s, parked: true }
 }
@@ -207,7 +211,7 @@ fn descent_part<const W: usize>(
     StraightPart { before: None, leg, from_m: last.along_m, to_m: end_m, after }
 }
 
-/// Cuts a flight into timed segments of at most `flight.segment_m`.
+/// Cuts a flight into timed segments of at most `flight.segment_m` metres.
 pub(super) fn cut_into_segments<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -222,16 +226,16 @@ pub(super) fn cut_into_segments<const W: usize>(
     if full { Err(ScheduleError::PiecesFull) } else { Ok(()) }
 }
 
-/// Part of a leg on which a vehicle may wait.
+/// Where on a leg a vehicle may wait for another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WaitingPlaces {
-    /// Before each of its timed segments.
+    /// Before each timed segment of the leg.
     Anywhere,
-    /// Before the leg only.
+    /// Before the whole leg only.
     Before,
 }
 
-/// A straight stretch flown at one speed.
+/// A straight leg flown at constant speed, with its times in seconds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
     pub(super) from: Point,
@@ -243,7 +247,7 @@ pub(super) struct Leg {
 }
 
 impl Leg {
-    /// A vertical leg that begins at time 0.
+    /// A vertical leg, up or down, that begins at time 0.
     pub(super) fn climb(from: Point, to: Point, to_s: f32) -> Self {
         Self {
             from,
@@ -255,13 +259,14 @@ impl Leg {
         }
     }
 
-    /// Length and duration of the first of its timed segments.
+    /// Length in metres and duration in seconds of the leg's first timed segment.
     pub(super) fn first_segment(&self, piece_m: f32) -> (f32, f32) {
         let share = 1.0 / fmaxf(segment_count(self.length_m, piece_m) as f32, 1.0);
         (self.length_m * share, (self.to_s - self.from_s) * share)
     }
 
-    /// Timed segments of the leg; `from_m` and `to_m` are its ends along the path.
+    /// The timed segments of the leg, at most `piece_m` long; `from_m` and `to_m` are the arc
+    /// lengths of its ends.
     pub(super) fn segments(
         self,
         from_m: f32,
@@ -271,7 +276,7 @@ impl Leg {
         let parts = segment_count(self.length_m, piece_m);
         let at = move |part: u32| {
             if part == parts {
-                // The next one begins where this ends, bit by bit.
+                // The next leg begins at exactly this point, bit by bit.
                 return (self.to, to_m, self.to_s);
             }
             let share = part as f32 / parts as f32;
@@ -296,15 +301,15 @@ impl Leg {
     }
 }
 
-/// Timed segments of a stretch of this length; none for zero length.
+/// Number of timed segments of a leg; 0 for length 0.
 pub(super) fn segment_count(length_m: f32, piece_m: f32) -> u32 {
     libm::ceilf(length_m / piece_m) as u32
 }
 
-/// Whether two timed segments come nearer than the separation at the same time.
+/// Whether two timed segments come nearer than the separation, whatever their times are.
 pub(super) fn is_conflict(cfg: &ScheduleConfig, p: &TimedSegment, q: &TimedSegment) -> bool {
     if p.parked && q.parked && p.from_s.is_infinite() == q.from_s.is_infinite() {
-        // Two pads, or two landing places: their distance is the mission's, not the schedule's.
+        // Two pads, or two landing places, never conflict: their distance is given by the mission.
         return false;
     }
     let apart = if p.parked || q.parked { cfg.parked_separation_m } else { cfg.separation_m };

@@ -1,14 +1,14 @@
-//! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the earliest way past
-//! flights that are already scheduled, with waiting and stepping aside at nodes. Of the ways that
-//! arrive then, the one found leaves as late as it can.
+//! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the route of earliest
+//! arrival past flights that are already scheduled, with waits and sidesteps at nodes. Its
+//! departures are as late as that arrival allows.
 //!
-//! A node's time falls into *safe intervals*, in which hovering there is clear of every scheduled
-//! piece. One search state is a node with one of its intervals; reaching it earlier is always
-//! better, so A* over these states finds the earliest arrival. Flying an edge is clear from
-//! departures outside the intervals that the pieces near it forbid.
+//! Each node has *safe intervals*: times in which a vehicle that hovers there is in no conflict
+//! with a scheduled timed segment. A search state is a node with one of its intervals. Reaching a
+//! state earlier is never worse, so A* over the states finds the earliest arrival. An edge may be
+//! flown at departures outside the intervals that the timed segments near the edge forbid.
 //!
-//! Cost: states reached × their edges × scheduled pieces, each a cheap bound. When the states are
-//! used up the search ends without a way, as if there were none.
+//! Cost: states reached × their edges × scheduled segments, most of which a cheap bound rules out.
+//! When all states are used up the search may end without a route although there is one.
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
@@ -26,17 +26,17 @@ use crate::search::heap::{Heap, SETTLED};
 use crate::sort;
 use crate::{Length, Point};
 
-/// One node in one of its safe intervals.
+/// A search state: one node in one of its safe intervals.
 #[derive(Clone, Copy)]
 struct SippState {
     node: u16,
-    /// The next state of the same node, plus one; 0 ends the list.
+    /// Index plus one of the next state of the same node; 0 ends the list.
     next: u16,
-    /// The state flown from; its own index at the start.
+    /// Index of the state from which this one is reached; its own index if that is the pad's climb.
     parent: u16,
-    /// When the parent was left, seconds.
+    /// Time at which the vehicle leaves the parent's node, seconds.
     left_parent_s: f32,
-    /// Earliest arrival, seconds; infinite while unreached.
+    /// Earliest arrival, seconds; infinite while the state is not reached.
     arrive_s: f32,
     /// End of the safe interval, seconds.
     until_s: f32,
@@ -54,25 +54,25 @@ const NO_STATE: SippState = SippState {
     from_s: 0.0,
 };
 
-/// Scratch for roadmaps of up to `N` nodes, as many states, and `P` scheduled pieces. All zero when
-/// new.
+/// Memory for roadmaps of up to `N` nodes, `N` states, and `P` timed segments of scheduled flights.
+/// All zero when new.
 pub struct SippWorkspace<const N: usize, const P: usize> {
-    /// Times are absolute here; sorted into `cells`.
+    /// The scheduled timed segments, with absolute times; sorted by the cells of `cells`.
     pieces: Vec<TimedSegment, P>,
     cells: SegmentGrid,
     states: [SippState; N],
     len: usize,
-    /// First state of each node, plus one.
+    /// Index plus one of each node's first state; 0 if its states have not been made.
     first: [u16; N],
     heap: Heap<N>,
     cut: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     forbidden: Forbidden,
-    /// Handover time of the route that is sought.
+    /// Time for which the route sought needs a place to have been left, seconds.
     handover_s: f32,
 }
 
 impl<const N: usize, const P: usize> SippWorkspace<N, P> {
-    /// Creates it empty: all zeros.
+    /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
             pieces: Vec::new(),
@@ -94,55 +94,55 @@ impl<const N: usize, const P: usize> Default for SippWorkspace<N, P> {
     }
 }
 
-/// The route to find.
+/// The route to find: ends, earliest take-off and what to keep clear of.
 #[derive(Clone, Copy, Debug)]
 pub struct RouteQuery<'a> {
     /// Separation and nominal speeds.
     pub cfg: &'a ScheduleConfig,
-    /// Node above the pad.
+    /// Node above the vehicle's pad.
     pub from: u16,
-    /// Node of the goal.
+    /// Node of the vehicle's goal.
     pub to: u16,
-    /// Take-off no earlier than this, seconds.
+    /// Earliest take-off, seconds.
     pub not_before_s: f32,
-    /// Places where others stand all the time.
+    /// Points at which other vehicles are parked at all times.
     pub parked: &'a [Point],
     /// Time from when a vehicle has left a place until another one may be there, seconds.
     pub handover_s: f32,
 }
 
-/// The way from the pad up to the first node.
+/// The climb from the pad to the first node.
 struct Climb {
     up: Leg,
-    /// Latest take-off before another vehicle needs the pad's place, seconds.
+    /// Latest take-off, seconds: later, another vehicle needs the space of the pad.
     leave_by_s: f32,
 }
 
-/// The descent.
+/// The descent from the goal's node to the ground.
 struct Landing {
     down: Leg,
-    /// The landing place is held until then, seconds.
+    /// Time until which another vehicle needs the landing place, seconds.
     after_s: f32,
 }
 
-/// A flight from one state to a node.
+/// A flight from one state, or from the pad, to another node.
 struct StateTransition {
     node: u16,
-    /// The state flown from; none from the pad.
+    /// Index of the state from which it starts; `None` from the pad.
     parent: Option<u16>,
-    /// The first and the last departure, seconds.
+    /// First and last time of departure, seconds.
     leave_s: (f32, f32),
     duration_s: f32,
 }
 
-/// A leg of the path, flown from time 0.
+/// A straight leg that begins at time 0 and takes `duration_s`.
 fn leg_from_start(from: Point, to: Point, duration_s: f32) -> Leg {
     let length_m = (to - from).length();
     Leg { from, to, length_m, from_s: 0.0, to_s: duration_s, stops: WaitingPlaces::Anywhere }
 }
 
-/// Finds the earliest way for `flight` (its climb, descent and length of timed segments are taken,
-/// its path and departure are written) that keeps clear of `scheduled`.
+/// Finds the route of earliest arrival that is in no conflict with the flights `scheduled`. Reads
+/// climb, descent and segment length of `flight`; writes its path and its take-off time.
 pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     view: &RoadmapView<'_>,
     route: &RouteQuery<'_>,
@@ -165,7 +165,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     let climb = Climb { up, leave_by_s: ws.leave_pad_by_s(cfg, pad, &up, flight.segment_m) };
     let landing = ws.plan_landing(cfg, goal, flight.descent_m)?;
     let piece_m = flight.segment_m;
-    // At most so early, seconds from a place to the goal.
+    // Lower bound of the time from `there` to the goal, seconds: the heuristic of A*.
     let left_s = |there: &Point| (goal - there).length() / cfg.cruise_mps;
 
     ws.add_states(cfg, view, route.from);
@@ -208,7 +208,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     Err(ScheduleError::Blocked)
 }
 
-/// Whether the memory is enough for the roadmap and the flight, and the ends are nodes.
+/// Checks that the workspace holds the roadmap and the flight, and that both ends are nodes.
 fn check_inputs<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     route: &RouteQuery<'_>,
@@ -229,7 +229,7 @@ fn check_inputs<const N: usize, const W: usize>(
     Ok(())
 }
 
-/// Cuts all scheduled flights into pieces with absolute times.
+/// Cuts all scheduled flights into timed segments with absolute times; adds parked vehicles.
 fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
     route: &RouteQuery<'_>,
     scheduled: impl Iterator<Item = &'a Flight<W>>,
@@ -262,7 +262,7 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
     Ok(())
 }
 
-/// The pieces in conflict with `own`.
+/// The scheduled timed segments in conflict with `own`, whatever their times.
 fn conflicting_segments<'s>(
     cells: &'s SegmentGrid,
     pieces: &'s [TimedSegment],
@@ -273,7 +273,7 @@ fn conflicting_segments<'s>(
     cells.candidates_near(pieces, own, apart_m).filter(|q| is_conflict(cfg, own, q))
 }
 
-/// Timed segment of a vehicle that stays at one place; the caller sets the times.
+/// Timed segment of a vehicle that stays at a point; the caller sets the times.
 fn stationary_segment(at: Point, parked: bool) -> TimedSegment {
     TimedSegment { from: at, to: at, from_m: 0.0, to_m: 0.0, from_s: 0.0, to_s: 0.0, parked }
 }
@@ -287,7 +287,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         conflicting_segments(&self.cells, &self.pieces, cfg, own)
     }
 
-    /// Makes the states of a node, one for each safe interval, unless they are there.
+    /// Creates the states of a node, one for each safe interval, unless it has them already.
     fn add_states(&mut self, cfg: &ScheduleConfig, view: &RoadmapView<'_>, node: u16) {
         if self.first[usize::from(node)] != 0 {
             return;
@@ -320,18 +320,18 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// The latest take-off before another vehicle needs the pad's place, seconds.
+    /// The latest take-off, seconds, before another vehicle needs the space of the pad.
     fn leave_pad_by_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, piece_m: f32) -> f32 {
-        // Held from −∞, so that it is no conflict with another pad.
+        // Held from −∞, so that it is not in conflict with another vehicle's pad.
         let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..stationary_segment(pad, true) };
-        // The pad is held until the first part of the climb is behind the vehicle.
+        // The pad is held until the vehicle has flown the first timed segment of its climb.
         let off_pad_s = fmaxf(up.first_segment(piece_m).1, OFF_PAD_S) + self.handover_s;
         let needed_s =
             self.conflicting_segments(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
         needed_s - off_pad_s
     }
 
-    /// The descent below a goal. Fails where another vehicle is parked on that place for good.
+    /// The descent from the goal. Fails if another vehicle holds the landing place forever.
     fn plan_landing(
         &self,
         cfg: &ScheduleConfig,
@@ -339,7 +339,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         descent_m: f32,
     ) -> Result<Landing, ScheduleError> {
         let ground = goal - Point::new(0.0, 0.0, descent_m);
-        // The landing place is held from the beginning of the descent.
+        // Held from the beginning of the descent, so the descent begins when others have left it.
         let standing = stationary_segment(ground, true);
         let after_s = self
             .conflicting_segments(cfg, &standing)
@@ -351,7 +351,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         Ok(Landing { down: Leg::climb(goal, ground, descent_m / cfg.vertical_mps), after_s })
     }
 
-    /// Whether some interval of the hop's node would be reached earlier if no vehicle were on it.
+    /// Whether the transition might reach some state of its node earlier than it is reached now:
+    /// checked without the scheduled segments on the way.
     fn may_improve(&self, hop: &StateTransition) -> bool {
         let &StateTransition { node, leave_s: (from_s, until_s), duration_s, .. } = hop;
         let mut at = self.first[usize::from(node)];
@@ -371,8 +372,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         false
     }
 
-    /// Collects the departures on which a flight along `leg_from_start` would meet a scheduled one,
-    /// as far as they matter for leaving between the two times of `leave_s`.
+    /// Collects in `forbidden` the departures at which a flight along `leg` would be in conflict
+    /// with a scheduled one, as far as they matter for a departure within `leave_s`.
     fn forbid_departures(
         &mut self,
         cfg: &ScheduleConfig,
@@ -393,7 +394,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
         let held_s = self.handover_s;
         for q in self.cells.candidates_near(&self.pieces, &whole, apart_m) {
-            // A segment that ends before or begins after cannot even touch the times in question.
+            // A segment that ends before, or begins after, all times in question forbids none.
             if q.to_s < leave_s.0
                 || q.from_s - held_s - leg.to_s > leave_s.1
                 || !is_conflict(cfg, &whole, q)
@@ -412,8 +413,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// Reaches every interval of the hop's node as early as it can be; from there the goal is at
-    /// least `left_s` away.
+    /// Sets the earliest arrival in every state of the transition's node, from which the flight to
+    /// the goal takes at least `left_s`.
     fn relax_intervals(&mut self, hop: &StateTransition, left_s: f32) {
         let &StateTransition { node, parent, leave_s: (from_s, until_s), duration_s } = hop;
         let mut at = self.first[usize::from(node)];
@@ -441,9 +442,9 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     }
 }
 
-/// Writes the way that ends in a state, left for the descent at a time (`end`), labelled with
-/// seconds after take-off. Every wait is moved as near to the pad as the safe intervals allow: a
-/// vehicle that waits in the air blocks others, and its battery drains.
+/// Writes the route that ends with `end` (last state, and time at which the vehicle leaves it for
+/// the descent), with times after take-off. Every wait is moved as near to the pad as the safe
+/// intervals allow: a vehicle that waits in the air blocks others, and drains its battery.
 fn write_flight<const N: usize, const P: usize, const W: usize>(
     route: &RouteQuery<'_>,
     view: &RoadmapView<'_>,
@@ -470,8 +471,8 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         let earliest_s = reached.left_parent_s;
         let latest_s = fminf(leave_s - duration_s, until_s);
         ws.forbid_departures(cfg, &leg, flight.segment_m, (earliest_s, latest_s));
-        // Not before the way was found to be free: intervals that are merged for want of room may
-        // swallow that time.
+        // Not before the departure that the search found free: forbidden intervals that were merged
+        // for want of room may cover that time.
         let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
         way.push((reached.node, left_s + duration_s, leave_s))
             .map_err(|_| ScheduleError::PiecesFull)?;
@@ -481,7 +482,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         }
         at = reached.parent;
     }
-    // The remaining time is the departure from the pad.
+    // `leave_s` of the first state's leg is the take-off.
     flight.depart_s = leave_s;
     flight.path = Path::new();
     let mut before = None;

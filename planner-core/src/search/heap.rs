@@ -1,20 +1,20 @@
-//! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries
+//! An indexed 4-ary min-heap of node indices. Each node is in the heap at most once, so `N` entries
 //! always suffice.
 
-/// Mark of a node that the search has not reached yet.
+/// Value in [`Heap::places`] of a node that the search has not reached.
 const UNSEEN: u16 = 0;
-/// Mark of a node that has left the heap: its distance is final.
+/// Value in [`Heap::places`] of a node that was popped: its distance is final.
 pub(crate) const SETTLED: u16 = u16::MAX;
 
-/// Children of a node of the heap.
+/// Children of each heap entry.
 const HEAP_ARITY: usize = 4;
 
 pub(crate) struct Heap<const N: usize> {
     len: usize,
-    /// Cost in the upper bits (non-negative f32, ordered as its bits), node in the lower sixteen:
-    /// one comparison orders by cost, then by node.
+    /// Cost in the upper bits (a non-negative f32, whose bits order like its value), node in the
+    /// lower sixteen: one comparison orders by cost, then by node.
     entries: [u64; N],
-    /// Index into `entries` plus one, [`UNSEEN`] or [`SETTLED`].
+    /// For each node its index in `entries` plus one, or [`UNSEEN`] or [`SETTLED`].
     places: [u16; N],
 }
 
@@ -26,7 +26,7 @@ fn node_of(entry: u64) -> usize {
     (entry & 0xffff) as usize
 }
 
-/// Index of the least entry. A full set is compared pairwise: selects, where branches would be
+/// Index of the least entry. Four entries are compared pairwise by selects: branches would be
 /// mispredicted.
 #[inline(always)]
 fn least_of(entries: &[u64]) -> usize {
@@ -47,7 +47,7 @@ impl<const N: usize> Heap<N> {
         Self { len: 0, entries: [0; N], places: [UNSEEN; N] }
     }
 
-    /// Empties it for nodes below `nodes`.
+    /// Empties the heap, and marks the nodes below `nodes` as not reached.
     pub(crate) fn clear(&mut self, nodes: usize) {
         self.len = 0;
         self.places[..nodes].fill(UNSEEN);
@@ -58,7 +58,8 @@ impl<const N: usize> Heap<N> {
         self.places[usize::from(node)]
     }
 
-    /// Puts a node in, or lowers its cost if it is in. `cost` is finite and not negative.
+    /// Inserts a node, or lowers its cost if it is in the heap. `cost` must be finite and not
+    /// negative.
     #[inline]
     pub(crate) fn push(&mut self, node: u16, cost: f32) {
         let mut at = match self.places[usize::from(node)] {
@@ -80,7 +81,7 @@ impl<const N: usize> Heap<N> {
         self.set_entry(at, entry);
     }
 
-    /// Takes out the node of least cost and settles it.
+    /// Removes and returns the node of least cost, and marks it as settled.
     #[inline]
     pub(crate) fn pop(&mut self) -> Option<u16> {
         let top = *self.entries[..self.len].first()?;
@@ -93,7 +94,8 @@ impl<const N: usize> Heap<N> {
         Some(node_of(top) as u16)
     }
 
-    /// Gives every node in it a new cost. O(length).
+    /// Gives every node in the heap the cost that `cost` returns, and restores the order.
+    /// O(length).
     pub(crate) fn reorder(&mut self, cost: impl Fn(u16) -> f32) {
         for at in (0..self.len).rev() {
             let node = node_of(self.entries[at]) as u16;

@@ -1,13 +1,13 @@
 //! Distances from a segment to the obstacles of a map, in f32.
 //!
-//! All here is in cells relative to the grid's corner. The distance from a segment to a cube is the
-//! least of a convex, piecewise quadratic function of the place along the segment; its derivative
-//! is piecewise linear with breaks where the segment crosses one of the six face planes, so its
-//! zero is found by bisection over at most six breaks and one division: no iteration to
-//! convergence.
+//! All lengths here are in cells, coordinates relative to the grid's minimum corner. The distance
+//! from a segment to a cube is the minimum of a convex, piecewise quadratic function of the place
+//! along the segment. Its derivative is piecewise linear with breaks where the segment crosses one
+//! of the six face planes, so its zero is found by bisection over at most six breaks and one
+//! division: nothing iterates to convergence.
 //!
-//! Rounding: coordinates of up to n cells carry n · 2⁻²³, the distance a few times that; at 256
-//! cells and 0.25 m under 0.1 mm.
+//! Rounding: coordinates of up to n cells err by n · 2⁻²³, the distance by a few times that;
+//! at 256 cells of 0.25 m by less than 0.1 mm.
 
 use core::ops::ControlFlow;
 
@@ -23,11 +23,11 @@ const CELL_RADIUS: f32 = 0.866_025_5;
 /// Half the diagonal of a brick, in cells.
 const BRICK_RADIUS: f32 = 4.0 * CELL_RADIUS;
 
-/// A segment in cells.
+/// A segment from `a` to `a + d`, in cells.
 struct Segment {
     a: Point,
     d: Point,
-    /// 1 / |d|², 0 for a point.
+    /// 1 / |d|², or 0 where |d|² is no normal f32: then the segment is taken for the point `a`.
     inv_square: f32,
 }
 
@@ -36,20 +36,20 @@ impl Segment {
         let cells = |p: &Point| (p - grid.shape().min) / grid.shape().resolution_m;
         let (a, d) = (cells(a), cells(b) - cells(a));
         let square = d.norm_squared();
-        // Below the smallest normal number the segment is a point as far as f32 can tell.
+        // A squared length below the smallest normal f32 has no reciprocal.
         Self { a, d, inv_square: if square > f32::MIN_POSITIVE { 1.0 / square } else { 0.0 } }
     }
 
-    /// Squared distance to a point.
+    /// Squared distance from the segment to a point, in cells².
     fn distance_sq_to_point(&self, p: &Point) -> f32 {
         let to = p - self.a;
         let t = (to.dot(&self.d) * self.inv_square).clamp(0.0, 1.0);
         (to - self.d * t).norm_squared()
     }
 
-    /// Squared distance to the closed cell whose minimum corner is `low`.
+    /// Squared distance from the segment to the closed cell with minimum corner `low`, in cells².
     fn distance_sq_to_cell(&self, low: &Point) -> f32 {
-        // Relative to the cell's centre: |x| ≤ 0.5 is inside.
+        // Coordinates relative to the cell's centre: |x| ≤ 0.5 is inside.
         let start = self.a - low - Point::new(0.5, 0.5, 0.5);
         let excess = |t: f32| {
             let p = start + self.d * t;
@@ -80,11 +80,12 @@ impl Segment {
                 }
             }
         }
-        // rate_from < 0 ≤ rate_to, and linear between.
+        // rate_from < 0 ≤ rate_to, and the rate is linear between the two places.
         excess(from + (to - from) * (rate_from / (rate_from - rate_to))).norm_squared()
     }
 
-    /// Distance to the nearest face of the grid, negative outside.
+    /// Distance from the segment to the nearest face of the grid, in cells; negative if an end is
+    /// outside.
     fn distance_to_faces(&self, dims: [u32; 3]) -> f32 {
         let end = self.a + self.d;
         (0..3)
@@ -94,9 +95,11 @@ impl Segment {
             .fold(f32::INFINITY, f32::min)
     }
 
-    /// Calls `visit` with each word that may hold an obstacle within `reach` cells, its other cells
-    /// cleared as far as bounding boxes of the swept volume tell, and the minimum corner of its
-    /// brick. `visit` may lower the reach. Of the share `known` of the segment nothing is in reach.
+    /// Calls `visit` with each word that may hold an obstacle within `reach` cells of the segment,
+    /// and with the minimum corner of the word's brick. Cells outside the bounding boxes of the
+    /// swept volume are cleared in that word. `visit` returns the reach for the words that follow,
+    /// which may be lower. The caller knows that nothing is within reach of the first share `known`
+    /// of the segment, which is skipped.
     fn visit_near_words(
         &self,
         grid: &VoxelGrid<'_>,
@@ -109,13 +112,13 @@ impl Segment {
         let [axis_v, axis_w] = [[1, 2], [0, 2], [0, 1]][axis_u];
         let [bx, by, _] = shape.bricks().map(|n| n as usize);
         let strides = [1, bx, bx * by];
-        // Along the longest axis no other coordinate changes faster.
+        // Per unit of the longest axis every other coordinate changes by at most 1.
         let slope = if self.d[axis_u] == 0.0 { Point::zeros() } else { self.d / self.d[axis_u] };
         let (begin, end) =
             (self.a[axis_u] + self.d[axis_u] * known, self.a[axis_u] + self.d[axis_u]);
         let (least, most) = if begin < end { (begin, end) } else { (end, begin) };
-        // A thousandth of a cell and the rounding of large coordinates more than the reach, so that
-        // no cell is lost.
+        // Cells are searched to a thousandth of a cell, and the rounding of large coordinates,
+        // beyond the reach, so that rounding loses no cell.
         let largest = self.a.amax() + self.d.amax();
         let slack = 1e-3 + largest * (8.0 * f32::EPSILON);
         let Some((first, last)) = cell_range(least, most, reach + slack, shape.dims[axis_u]) else {
@@ -123,7 +126,7 @@ impl Segment {
         };
         for brick_u in first >> 2..=last >> 2 {
             let low = (brick_u * 4) as f32;
-            // The part of the segment within reach of this layer of bricks.
+            // The part of the segment within reach of this layer of bricks, along the longest axis.
             let from = clamp_to(low - reach, least, most) - self.a[axis_u];
             let to = clamp_to(low + 4.0 + reach, least, most) - self.a[axis_u];
             let span = |axis: usize| {
@@ -164,25 +167,27 @@ impl Segment {
     }
 }
 
-/// First and last cell of an axis within `reach` of the stretch between two coordinates, or `None`
-/// beyond the grid.
+/// First and last cell along an axis within `reach` of the interval between two coordinates, in
+/// cells; `None` if all such cells are beyond the grid.
 fn cell_range(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
     let (low, high) =
         if from < to { (from - reach, to + reach) } else { (to - reach, from + reach) };
-    // A cast rounds towards zero: down, but for negative numbers, which are not in the grid.
+    // A cast to integer rounds towards zero: down, except for negative numbers, which are outside
+    // the grid.
     let first = (low as i32).max(0);
     let last = (high as i32).min(dim as i32 - 1);
     (high >= 0.0 && first <= last).then_some((first, last))
 }
 
-/// Lanes of brick `brick` among the cells `first..=last`, which it must meet.
+/// Mask of the lanes of brick `brick` that are among the cells `first..=last`. Range and brick must
+/// overlap.
 fn lanes(first: i32, last: i32, brick: i32) -> u32 {
     let low = (first - brick * 4).max(0);
     let high = (last - brick * 4).min(3);
     (0b1111 << low) & (0b1111 >> (3 - high))
 }
 
-/// The minimum corners of the occupied cells of a word.
+/// The minimum corners of the occupied cells of a word, whose brick has the minimum corner `brick`.
 fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
     core::iter::from_fn(move || {
         if word == 0 {
@@ -194,10 +199,11 @@ fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point>
     })
 }
 
-/// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive
-/// and finite. The caller has checked that the ends are finite and near the grid, and where the
-/// clearance is less than `MIN_MISSED_CELLS` that nothing is touched. Of the share `known` of the
-/// segment from `a` the answer is known already, by far more than rounding.
+/// Whether the segment from `a` to `b` is strictly farther than `clearance_m` (positive, finite)
+/// from every obstacle. The caller has checked that the ends are finite and near the grid and, if
+/// the clearance is less than `MIN_MISSED_CELLS`, that the segment touches nothing. The first share
+/// `known` of the segment is skipped: the caller knows that it is farther, by much more than
+/// rounding.
 pub(crate) fn is_farther_than(
     grid: &VoxelGrid<'_>,
     a: &Point,
@@ -211,8 +217,8 @@ pub(crate) fn is_farther_than(
         return false;
     }
     let square = reach * reach;
-    // Beyond the sphere around a cell nothing of it is in reach; inside the sphere within it
-    // something is.
+    // If the cell's centre is farther than `never`, no part of the cell is in reach; if it is
+    // nearer than `always`, some part is.
     let (never, always) = (reach + CELL_RADIUS, reach + 0.5);
     let (never, always) = (never * never * (1.0 + 1e-5), always * always * (1.0 - 1e-5));
     segment
@@ -230,12 +236,12 @@ pub(crate) fn is_farther_than(
         .is_continue()
 }
 
-/// Euclidean distance from the segment to the nearest obstacle, metres, at most `max_m`; 0 where it
-/// touches one, where an end is not finite or more than [`crate::voxel::MAX_DIM`] cells beyond the
-/// grid, and where `max_m` is NaN or not positive.
+/// Euclidean distance from the segment to the nearest obstacle, metres, at most `max_m`. 0 if it
+/// touches one, if an end is not finite or more than [`crate::voxel::MAX_DIM`] cells beyond the
+/// grid, and if `max_m` is NaN or not positive.
 ///
-/// The reach is doubled from one cell up to `max_m`, so that a segment near a wall costs little:
-/// work grows with the cube of what is returned, not of `max_m`.
+/// The search radius is doubled from one cell up to `max_m`, so that a segment near a wall costs
+/// little: the work grows with the cube of the returned distance, not of `max_m`.
 pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32) -> f32 {
     let shape = grid.shape();
     let (Some(from), Some(to)) = (snap(shape, a), snap(shape, b)) else {
@@ -249,12 +255,12 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     if grid.outside() == Outside::Blocked {
         limit = limit.min(segment.distance_to_faces(shape.dims)).max(0.0);
     }
-    // No obstacle is farther than the grid is long.
+    // No obstacle is farther from a point of the grid than the grid is long.
     let longest = (shape.dims.iter().max().copied().unwrap_or(0) * 4) as f32;
     let mut reach = 1.0_f32;
     loop {
         let tried = reach.min(limit);
-        // Beyond the sphere around a cell nothing of it is nearer.
+        // If the cell's centre is farther than this, no part of the cell is nearer than `reach`.
         let around = |reach: f32| (reach + CELL_RADIUS) * (reach + CELL_RADIUS) * (1.0 + 1e-5);
         let (mut nearest, mut bound) = (tried * tried, around(tried));
         let mut found = false;
@@ -280,8 +286,8 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     }
 }
 
-/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 as in
-/// [`segment_clearance`].
+/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 in the cases
+/// of [`segment_clearance`].
 pub fn point_clearance(grid: &VoxelGrid<'_>, p: &Point, max_m: f32) -> f32 {
     segment_clearance(grid, p, p, max_m)
 }

@@ -1,6 +1,6 @@
-//! Cells of a brick by their place along one axis.
+//! Masks of the cells of a brick by their index (0 to 3, the lane) along one axis.
 
-/// The cells of a brick whose lane along `axis` is among `lanes`.
+/// Mask of the cells of a brick whose index along `axis` is a set bit of `lanes` (bits 0 to 3).
 #[inline(always)]
 pub(crate) fn lane_mask(axis: usize, lanes: u32) -> u64 {
     const LANE_MASKS: [[u64; 16]; 3] = lane_masks();

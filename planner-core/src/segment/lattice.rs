@@ -1,24 +1,25 @@
-//! The lattice that ends of a segment are snapped to, so that what follows is integer arithmetic.
+//! The lattice to which the ends of a segment are snapped, so that the exact check runs in
+//! integers.
 
 use crate::Point;
 use crate::voxel::{GridShape, MAX_DIM};
 
 /// Fraction bits of a snapped coordinate: its unit is 2⁻¹⁴ cell.
 pub const FRACTION_BITS: u32 = 14;
-/// Side of a cell, in units of a snapped coordinate.
+/// Edge length of a cell, in units of a snapped coordinate.
 pub(super) const ONE_CELL: i32 = 1 << FRACTION_BITS;
 
-/// The greatest coordinate, in units of 2⁻¹⁴ cell, that [`snap`] gives.
+/// The greatest coordinate that [`snap`] returns, in units of 2⁻¹⁴ cell.
 pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
 
-/// A point in units of 2⁻¹⁴ cell from the grid's minimum corner.
+/// A point in units of 2⁻¹⁴ cell, relative to the grid's minimum corner.
 pub type Snapped = [i32; 3];
 
-/// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells
-/// beyond the grid.
+/// `p` rounded to the lattice of 2⁻¹⁴ cell, or `None` if it is not finite or more than [`MAX_DIM`]
+/// cells beyond the grid.
 #[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
-    /// Largest coordinate that is snapped, in cells.
+    /// [`snap`] accepts coordinates from −1 to 2 times this number, in cells.
     const MAX_COORDINATE: f32 = MAX_DIM as f32;
     let mut out = [0; 3];
     for axis in 0..3 {
@@ -32,9 +33,9 @@ pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     Some(out)
 }
 
-/// How far, in cells along each axis, [`snap`] may move a point that lies within `cells` cells of
-/// the grid's minimum corner: half a lattice step, and half an ulp for each of the subtraction and
-/// the division.
+/// Most cells along each axis by which [`snap`] may move a point that lies within `cells` cells of
+/// the grid's minimum corner: half a lattice unit, and half an ulp each for the subtraction and the
+/// division.
 pub fn snap_error_cells(cells: f32) -> f32 {
     0.5 / ONE_CELL as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
 }

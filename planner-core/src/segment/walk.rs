@@ -1,18 +1,18 @@
-//! The exact check: a walk along the longest axis over the bricks that a segment may touch, in
-//! integers.
+//! The exact check: an integer walk along the segment's longest axis over the bricks that it may
+//! touch.
 
 use super::lanes::lane_mask;
 use super::lattice::{FRACTION_BITS, MAX_SNAPPED, ONE_CELL, Snapped};
 use crate::voxel::{Outside, VoxelGrid};
 
-/// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle.
-/// Exact; an end beyond [`MAX_SNAPPED`] counts as touching.
+/// Whether the segment touches an occupied closed cell, or space outside the grid where that is an
+/// obstacle. Exact; also true if an end is beyond [`MAX_SNAPPED`].
 pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -> bool {
     snapped_rest_touches(grid, a, b, 0.0)
 }
 
-/// As [`snapped_segment_touches`] for a segment whose first part, the share `known` of it from `a`,
-/// is known to touch nothing.
+/// As [`snapped_segment_touches`], but the caller knows that the first part of the segment, the
+/// share `known` from `a`, touches nothing, and that part is skipped.
 #[inline]
 pub(crate) fn snapped_rest_touches(
     grid: &VoxelGrid<'_>,
@@ -41,26 +41,26 @@ pub(crate) fn snapped_rest_touches(
     }
 }
 
-/// The walk along the longest axis `U`; `V` and `W` are the other two.
+/// A walk along the segment's longest axis `U`; `V` and `W` are the other two axes.
 struct Walk<'g, const U: usize, const V: usize, const W: usize> {
     words: &'g [u64],
     a: Snapped,
     b: Snapped,
-    /// Begin and end of the walk along `U`.
+    /// First and last coordinate of the walk along `U`, lattice units.
     start: i32,
     end: i32,
-    /// Cells along each axis.
+    /// Number of cells along each axis.
     dims: [i32; 3],
-    /// Words from one brick to the next along each axis.
+    /// Number of words between neighbouring bricks along each axis.
     strides: [i32; 3],
-    /// Change of each coordinate over one lattice unit of `U`, times 2³⁰.
+    /// Change of each coordinate per lattice unit along `U`, times 2³⁰.
     slopes: [i64; 3],
-    /// Greatest error of a coordinate at a place along `U`, in lattice units.
+    /// Greatest error of [`Walk::coordinate_at`], lattice units.
     slack: i32,
 }
 
-/// The cells of one axis that a stretch of the segment may touch, clipped to the grid; empty if
-/// `first > last`.
+/// Range of cells along one axis that a part of the segment may touch, clipped to the grid; empty
+/// if `first > last`.
 #[derive(Clone, Copy)]
 struct Span {
     first: i32,
@@ -77,7 +77,8 @@ impl Span {
         }
     }
 
-    /// The cells of this span in brick `brick`, as a mask of its four lanes. They must meet.
+    /// The cells of this range in brick `brick`, as a mask of its four lanes. Range and brick must
+    /// overlap.
     #[inline(always)]
     fn lanes(self, brick: i32) -> u32 {
         let first = (self.first - brick * 4).max(0) as u32;
@@ -85,7 +86,7 @@ impl Span {
         (0b1111 << first) & (0b1111 >> (3 - last))
     }
 
-    /// As [`Self::lanes`], none if they do not meet.
+    /// As [`Self::lanes`], but 0 if range and brick do not overlap.
     #[inline(always)]
     fn lanes_if_met(self, brick: i32) -> u32 {
         let first = (self.first - brick * 4).clamp(0, 4) as u32;
@@ -98,17 +99,18 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     #[inline(always)]
     fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
         let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        // A thousandth and a cell less than known, against the rounding of `known` and of this
-        // product.
+        // Skips a thousandth and one cell less than the share that is known, against the rounding
+        // of `known` and of this product.
         let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE_CELL).max(0);
-        // Along U upwards, so that the walk has one direction.
+        // Ends are swapped where needed, so that the walk always goes up along U.
         let ((a, b), (start, end)) = if d[U] < 0 {
             ((*b, *a), (b[U], a[U] - skip))
         } else {
             ((*a, *b), (a[U] + skip, b[U]))
         };
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
-        // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate by 2⁻²² of the length, and two units.
+        // The slope is at most 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate
+        // errs by 2⁻²² of the length, and two lattice units.
         let per_u = if d[U] == 0 { 0.0 } else { (1 << 30) as f32 / d[U] as f32 };
         Self {
             words: grid.words(),
@@ -123,7 +125,7 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         }
     }
 
-    /// The coordinate on `axis` where the segment is at `u`, within `slack`.
+    /// The segment's coordinate on `axis` where its coordinate on `U` is `u`, within `slack`.
     #[inline(always)]
     fn coordinate_at(&self, axis: usize, u: i32) -> i32 {
         let run = i64::from(u - self.a[U]);
@@ -132,7 +134,7 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
 
     #[inline(always)]
     fn touches_obstacle(&self) -> bool {
-        // A cell is closed: an end on its face touches the one before too.
+        // Cells are closed: an end on a cell's lower face touches the cell before it too.
         let whole = Span::new(self.start, self.end, 1, self.dims[U]);
         if whole.first > whole.last {
             return false;
@@ -165,7 +167,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         false
     }
 
-    /// Looks at the occupied cells `near` of a brick, one layer along `U` at a time.
+    /// Whether the segment touches one of the occupied cells `near` of a brick, tested by layers
+    /// along `U`.
     #[inline(always)]
     fn brick_touches(&self, near: u64, brick_u: i32, brick_v: i32, brick_w: i32) -> bool {
         let floor = brick_u * (4 * ONE_CELL);
@@ -201,11 +204,11 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     }
 }
 
-/// Whether a segment meets a closed cell: the six separating axes, in integers. Coordinates stay
-/// below 1.5 · 2³⁰, so the two products and their difference below 2⁶³.
+/// Whether the segment from `a` to `b` meets a closed cell: the six separating axes, in integers.
+/// Coordinates stay below 1.5 · 2³⁰, so the two products and their difference stay below 2⁶³.
 #[inline(always)]
 fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
-    /// Half a cell, in units of a snapped coordinate.
+    /// Half the edge of a cell, in units of a snapped coordinate.
     const HALF_CELL: i64 = (ONE_CELL / 2) as i64;
     let mut d = [0_i64; 3];
     let mut to_center = [0_i64; 3];
