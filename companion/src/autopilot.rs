@@ -1,4 +1,5 @@
-//! The autopilot: which it is and its numbers, what it reports, and what is requested of it.
+//! The autopilot: its kind (PX4 or ArduPilot) with that kind's numbers, its telemetry, and the
+//! requests sent to it.
 
 pub mod ardupilot;
 pub(crate) mod handshake;

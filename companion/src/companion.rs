@@ -31,30 +31,32 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
-/// Period of setpoints: 20 Hz, twice the least rate that PX4 needs in practice.
+/// Period of setpoints and of control steps in flight: 20 Hz, twice the least rate that PX4 needs
+/// in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
-/// Least time between two reports of a setpoint that is held, or of an EKF origin that is not used.
+/// Least time between two warnings that a setpoint is held, or that a far EKF origin is not used.
 const REPORT_EVERY: Duration = Duration::from_secs(5);
-/// Period of a step of the mission table on the ground.
+/// Period of steps in the states that stream no setpoints: before take-off and after landing.
 const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
-/// Period of the roster message of a coverage mission.
+/// Period at which a vehicle of a coverage mission sends its roster message to the swarm.
 const ROSTER_EVERY: Duration = Duration::from_millis(500);
-/// Period of the roster message while a division is under way.
+/// Period at which a vehicle sends its roster message to the swarm while a division is under way.
 const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
 /// Period of HEARTBEAT.
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
-/// Range of the time without setpoints after which Guided stops (`GUID_TIMEOUT`), seconds: within
-/// it, the time in which cruise speed flies the margin. ArduCopter's own 3 s would fly the last
-/// velocity on through walls while a link stalls; the shortest are four setpoints.
+/// Range of ArduCopter's `GUID_TIMEOUT`, the time without setpoints after which Guided mode stops
+/// the vehicle, seconds. Within the range it is the time in which cruise speed covers the safety
+/// margin to walls. ArduCopter's own 3 s would fly the last velocity on through walls while a link
+/// stalls; the shortest is four setpoints.
 const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
-/// Maximum number of rows of the mission table that one step takes. More would mean that the table
-/// has a cycle.
+/// Maximum number of transitions of the mission table that one step makes. More would mean that the
+/// table has a cycle.
 const MAX_ROWS_PER_STEP: usize = 4;
-/// Most events that wait for the shell.
+/// Maximum number of events that wait for the shell; when they are full a further event is dropped.
 const MAX_EVENTS: usize = 16;
 
-/// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its
-/// plan.
+/// The companion of one UAV: at most `V` vehicles in the swarm, and at most `W` waypoints and `G`
+/// gates in its own plan.
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
@@ -72,7 +74,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// A companion that has heard nothing yet.
+    /// A companion that has received nothing yet.
     ///
     /// # Errors
     /// As [`Config::checked`].
@@ -80,8 +82,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         config.checked().map(Self::from_checked)
     }
 
-    /// As `new`, for settings that were checked, made where the companion stays: on a board there
-    /// is no room for a copy on the stack.
+    /// Makes a companion from checked settings, directly at `place`: a board's stack has no room
+    /// for a copy.
     #[inline(never)]
     pub fn init_in_place(place: &mut MaybeUninit<Self>, settings: CheckedConfig<V>) -> &mut Self {
         place.write(Self::from_checked(settings))
@@ -116,27 +118,29 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// State of the mission.
+    /// Current state of the mission table.
     pub fn state(&self) -> State {
         self.mission.state()
     }
 
-    /// Whether setpoints are to go out, one each 50 ms.
+    /// Whether the mission is in a state that streams setpoints to the autopilot, one each 50 ms.
     pub fn streams_setpoints(&self) -> bool {
         self.mission.state().streams_setpoints()
     }
 
-    /// The autopilot as last heard.
+    /// Telemetry of this vehicle's autopilot, from its last messages.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry
     }
 
-    /// Which autopilot flies the vehicle; PX4 while none was heard.
+    /// The autopilot that flies the vehicle, PX4 or ArduPilot; PX4 until a HEARTBEAT has been
+    /// received.
     pub(crate) fn kind(&self) -> AutopilotKind {
         self.telemetry.kind()
     }
 
-    /// System id of the vehicle waited for; 0 when free.
+    /// System id of the neighbour that the safety filter stops for, else of the one that the advice
+    /// waits for at a gate or a predicted contact; 0 for none.
     pub fn waiting_for(&self) -> u8 {
         match self.guidance.filter.blocker() {
             0 => self.guidance.advice.waiting_for,
@@ -149,8 +153,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.filter.activation_count()
     }
 
-    /// The vehicle that the safety filter stops for at this moment, as each step asks it; 0 for
-    /// none. Nothing changes by the call; the filter's cost is counted so.
+    /// System id of the neighbour that the safety filter stops for at `now`, computed as in each
+    /// step; 0 for none. The call leaves the state as it was: benches count the filter's
+    /// instructions by it.
     pub fn query_filter(&mut self, now: Instant) -> u8 {
         let scene = GuidanceInputs::new(
             self.mission.plan(),
@@ -166,19 +171,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.smoother.is_in_urgent_stop()
     }
 
-    /// Progress along the own path, metres.
+    /// Arc length that this vehicle has covered along its own path, metres; in the climb the height
+    /// still to climb, negative.
     pub fn progress_m(&self) -> f32 {
-        // The length of a detour comes on top of the place where the vehicle left the plan.
+        // On a detour the progress along the detour is added to the place where the vehicle left
+        // its plan.
         let left_at_m = if self.detours.is_on_detour() { self.detours.left_at_m() } else { 0.0 };
         self.guidance.progress_m(self.mission.state(), &self.guidance_inputs()) + left_at_m.max(0.0)
     }
 
-    /// Greatest values of the setpoints since the start.
+    /// Greatest speed, acceleration and jerk of the setpoints since the start.
     pub fn setpoint_stats(&self) -> SetpointStats {
         self.guidance.smoother.stats
     }
 
-    /// Counters of a link's framer.
+    /// Counters of frames and errors of a link's framer.
     pub fn counters(&self, link: Link) -> Counters {
         self.links.counters(link)
     }
@@ -188,7 +195,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.links.dropped_messages(link)
     }
 
-    /// Takes bytes of a link in, all received by `now`.
+    /// Processes bytes that a link received up to `now`.
     pub fn handle_bytes(&mut self, link: Link, now: Instant, bytes: &[u8]) {
         self.now = now;
         let mut input = bytes;
@@ -201,11 +208,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Lets time pass: to be called when [`Self::poll_timeout`] is due.
+    /// Runs the control step and makes the periodic messages that are due at `now`: to be called
+    /// when [`Self::poll_timeout`] is due.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.now = now;
         for link in [Link::Autopilot, Link::Swarm] {
-            // Frees what a partial frame held back.
+            // Without new bytes the framer gives up a partial frame that is too old, and yields the
+            // frames behind it.
             self.handle_bytes(link, now, &[]);
         }
         if self.timers.is_due(Timer::Step, now) {
@@ -232,7 +241,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles the planner's answer. An answer that was not requested is ignored.
+    /// Handles the planner's answer to a request of kind `wanted`. An answer that was not requested
+    /// is ignored.
     pub fn handle_plan(
         &mut self,
         now: Instant,
@@ -256,12 +266,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.run_mission_table();
     }
 
-    /// The next event.
+    /// Removes and returns the oldest event for the shell.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
 
-    /// When [`Self::handle_timeout`] is due.
+    /// The time at which [`Self::handle_timeout`] is to be called next.
     pub fn poll_timeout(&self) -> Option<Instant> {
         Some(self.timers.next_due())
     }
@@ -275,7 +285,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         )
     }
 
-    /// The situation that requests to the autopilot follow from.
+    /// State, climb, landing column and time limits, from which the requests to the autopilot are
+    /// made.
     fn request_context(&self) -> RequestContext {
         let in_state = self.mission.time_in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
@@ -294,7 +305,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Requests the streams, and on the ground the limits.
+    /// Starts requesting the telemetry streams; on the ground, disarmed, also the autopilot's
+    /// limits, and returns to their defaults until these are read.
     fn request_streams(&mut self) {
         let situation = self.request_context();
         if self.requests.start_on_connect(

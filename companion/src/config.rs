@@ -1,5 +1,5 @@
-//! What a companion is given before it starts: its id, the vehicles that fly with it, and how fast
-//! and how close.
+//! Settings of a companion, fixed before it starts: its id, the roster, speeds, sizes and
+//! distances.
 
 mod check;
 
@@ -10,83 +10,87 @@ use planner_core::frames::Geodetic;
 
 use crate::margins;
 
-/// Most ground stations a mission names.
+/// Maximum number of ground stations that a mission names.
 pub const GROUND_STATIONS: usize = 4;
-/// The ground stations of a mission that names none: the id that QGroundControl, MAVProxy and
-/// pymavlink use.
+/// System ids of the ground stations of a mission that names none: 255, which QGroundControl,
+/// MAVProxy and pymavlink use.
 pub const USUAL_GROUND_STATIONS: [u8; GROUND_STATIONS] = [255, 0, 0, 0];
 
 /// Default safety distance between the centres of two vehicles, metres: two airframes of 0.3 m
 /// radius, and 0.9 m of air.
 pub const SAFETY_DISTANCE_M: f32 = 1.5;
 
-/// One vehicle of the mission.
+/// One vehicle of the mission: its id, and where its path begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RosterEntry {
     /// MAVLink system id, 1…255.
     pub system_id: u8,
-    /// First point of its path, ENU metres; its height is the altitude climbed to.
+    /// First point of its path, ENU metres: above its pad, at the altitude to which it climbs.
     pub start: Point,
 }
 
-/// Settings of one companion. `V` vehicles at most.
+/// Settings of one companion, for a roster of at most `V` vehicles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config<const V: usize> {
     /// MAVLink system id of the vehicle, shared by autopilot and companion.
     pub system_id: u8,
     /// Every vehicle of the mission, this one included, sorted by system id.
     pub roster: Vec<RosterEntry, V>,
-    /// Origin of the mission frame.
+    /// Origin of the mission frame (ENU), geodetic.
     pub origin: Geodetic,
-    /// CRC-32 of the mission file; neighbours with another one fly another mission.
+    /// CRC-32 of the mission file; a neighbour that reports another CRC flies another mission.
     pub mission_crc: u32,
-    /// Nominal speed along the path, m/s.
+    /// Nominal speed of this vehicle along its path, m/s.
     pub cruise_mps: f32,
-    /// Speed of the climb, m/s.
+    /// Speed of this vehicle's climb from its pad, m/s.
     pub climb_mps: f32,
-    /// Speed of the descent, m/s.
+    /// Speed of this vehicle's guided descent, m/s.
     pub descend_mps: f32,
-    /// Acceleration and braking, m/s².
+    /// Maximum acceleration and deceleration along the path, m/s².
     pub accel_mps2: f32,
-    /// Radius of the vehicle, metres.
+    /// Radius of this vehicle's hull, metres.
     pub radius_m: f32,
-    /// Radius and safety margin, metres: the clearance every edge was tested at.
+    /// Radius plus safety margin to walls, metres: the clearance for which every edge of the
+    /// roadmap was checked.
     pub required_clearance_m: f32,
     /// Smallest distance between two vehicles' centres, metres.
     pub safety_distance_m: f32,
-    /// How vehicles keep apart.
+    /// Method by which advice keeps vehicles apart.
     pub method: Method,
-    /// The least error of the position estimate that is reckoned with, by which the operator
-    /// vouches for the receiver, metres.
+    /// Least error of the position estimate that is assumed, whatever accuracy the autopilot
+    /// reports, metres (`FLK_EST_M`): the operator vouches by it for the receiver.
     pub estimate_m: f32,
-    /// Range of the swarm's radio for sure, metres: a vehicle that falls silent further away than
-    /// most of that is out of range. With [`REACHES_ALL_M`] the radio reaches every vehicle, so any
-    /// silence is a failure.
+    /// Range within which the swarm's radio surely works, metres (`FLK_RADIO_M`). A neighbour that
+    /// falls silent beyond 0.7 of that is taken to be out of range, not failed. With
+    /// [`REACHES_ALL_M`] the radio reaches every vehicle, so any silence is a failure.
     pub radio_range_m: f32,
-    /// A vehicle further than this from its start, horizontally, does not take off, metres.
+    /// Greatest horizontal distance between this vehicle and its pad with which it takes off,
+    /// metres.
     pub start_tolerance_m: f32,
-    /// Battery charge below which it lands where no neighbour is below, and below half of which it
-    /// lands anywhere, percent; 0 never.
+    /// Battery charge, percent: below it this vehicle lands where no neighbour is below, and below
+    /// half of it anywhere; 0 turns both off.
     pub battery_low_percent: i8,
-    /// Rate at which position and intent go to the swarm, Hz.
+    /// Rate at which this vehicle sends its position and its intent to the swarm, Hz.
     pub swarm_hz: u8,
-    /// Minimum and maximum corner of the volume it may be in, ENU metres.
+    /// Geofence: minimum and maximum corner of the box that this vehicle may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
-    /// Whether its mission is an area, which is divided again where a vehicle is lost: how long a
-    /// lost vehicle may take until it is down, seconds.
+    /// `Some` for a coverage mission, whose area is divided again after the loss of a vehicle: the
+    /// longest time that a lost vehicle takes to come down, seconds.
     pub division: Option<f32>,
-    /// The ground of an area that is not level: between pads nobody knows more.
+    /// Height range of the ground below a coverage mission whose ground is not level.
     pub ground: Option<Ground>,
-    /// Whether a new start leaves out what of an area is photographed already.
+    /// Whether a coverage mission that starts again leaves out the waypoints that are photographed
+    /// already.
     pub resumes: bool,
-    /// System ids whose commands, parameters and files count; 0 is no id.
+    /// System ids of the senders whose commands, parameter changes and file transfers are accepted;
+    /// 0 fills an unused entry.
     pub ground_stations: [u8; GROUND_STATIONS],
 }
 
-/// Radio range that reaches every vehicle, metres.
+/// Value of `radio_range_m` for a radio that reaches every vehicle, metres.
 pub const REACHES_ALL_M: f32 = 10_000.0;
 
-/// Settings that can be flown, and where the vehicle's own path starts.
+/// Settings that passed [`Config::check`], and the first point of the vehicle's own path.
 #[derive(Clone, Debug)]
 pub struct CheckedConfig<const V: usize> {
     pub(crate) config: Config<V>,
@@ -104,25 +108,25 @@ pub enum ConfigError {
     NotPositive,
     /// The mission origin is not a place on earth.
     Origin,
-    /// The geofence is no box.
+    /// A corner of the geofence is not finite, or the minimum is greater than the maximum.
     Geofence,
     /// The vehicle with this system id starts outside the geofence.
     StartOutside(u8),
-    /// The planner's setting of this name that follows from the numbers above is not what it may
-    /// be.
+    /// A setting of the planner that is derived from these numbers is out of its range; its name.
     Setting(&'static str),
 }
 
-/// Whether a place is inside a box; its faces are.
+/// Whether a place is inside a box or on one of its faces.
 pub(crate) fn box_contains((low, high): &(Point, Point), place: &Point) -> bool {
     (0..3).all(|axis| (low[axis]..=high[axis]).contains(&place[axis]))
 }
 
 impl<const V: usize> Config<V> {
-    /// The values of a small indoor vehicle; the roster holds only itself.
+    /// Default settings, those of a small indoor vehicle; the roster holds only this vehicle.
     pub fn new(system_id: u8, start: Point, origin: Geodetic) -> Self {
         let mut roster = Vec::new();
-        // A roster without room for its own vehicle is refused by `check`.
+        // With `V` = 0 this vehicle does not fit into the roster: `check` then refuses the
+        // settings.
         let _ = roster.push(RosterEntry { system_id, start });
         Self {
             system_id,
@@ -150,36 +154,37 @@ impl<const V: usize> Config<V> {
         }
     }
 
-    /// The entry of this vehicle and its rank by system id.
+    /// The roster entry of this vehicle, and its index in the roster, which is sorted by system id.
     pub fn own_roster_entry(&self) -> Option<(u16, &RosterEntry)> {
         let at = self.roster.iter().position(|e| e.system_id == self.system_id)?;
         Some((at as u16, &self.roster[at]))
     }
 }
 
-/// Ground that is not level.
+/// Heights of ground that is not level, below a coverage mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
-    /// Pictures are taken at least so high above the field, metres.
+    /// Least height above the ground from which pictures are taken, metres.
     pub height_m: f32,
-    /// Greatest height of the estimate above that, metres.
+    /// Greatest height of paths above `height_m`, metres: they lie between `height_m` and
+    /// `height_m` + `tolerance_m` above the ground.
     pub tolerance_m: f32,
-    /// The lowest ground, metres up in the mission frame.
+    /// Height of the lowest ground, ENU up in the mission frame, metres.
     pub low_m: f32,
-    /// The highest.
+    /// Height of the highest ground, ENU up in the mission frame, metres.
     pub high_m: f32,
 }
 
-/// Reason why there is no plan.
+/// Reason why the shell's planner computed no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFailure {
     /// The roadmap is absent or damaged.
     NoRoadmap,
     /// No route leads to the goal.
     Unreachable,
-    /// No departure keeps clear of the other vehicles.
+    /// No departure time keeps this vehicle clear of the other vehicles' flights.
     Blocked,
-    /// No answer came in time.
+    /// The planner did not answer in time.
     Late,
     /// The plan is larger than this board's memory.
     Capacity,

@@ -1,10 +1,10 @@
-//! What passes between the companion and its shell beside bytes.
+//! Events from the companion to its shell: everything that passes between the two beside bytes.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use crate::mission::State;
 
-/// One of the two ports.
+/// One of the two communication links of a companion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
     /// The serial port to the flight controller.
@@ -16,17 +16,19 @@ pub enum Link {
 /// The plan that the shell is to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanKind {
-    /// The mission's plan.
+    /// The plan of the whole mission, for the flight from the pad.
     Mission,
-    /// A detour, or aside: [`crate::Companion::detour_request`] says from where and around what.
+    /// A detour around an obstacle, or a path aside: [`crate::Companion::detour_request`] has its
+    /// start, its end and its keep-out zones.
     Detour,
-    /// The mission's plan after losses: [`crate::Companion::losses`] says which.
+    /// The plan that divides the rest of an area after losses: [`crate::Companion::losses`] has the
+    /// vehicles and waypoints.
     Division,
 }
 
 impl PlanKind {
-    /// A vehicle that asks for a detour may be below one that comes down; one without a mission is
-    /// on its pad.
+    /// A detour first: the vehicle that needs it may be below one that descends. The mission's plan
+    /// last: a vehicle without one is on its pad.
     const BY_URGENCY: [Self; 3] = [Self::Detour, Self::Division, Self::Mission];
 
     const fn bit(self) -> u8 {
@@ -34,25 +36,25 @@ impl PlanKind {
     }
 }
 
-/// Plans that the shell has not begun: at most one of each kind, since it reads what to plan when
-/// it begins.
+/// Requests that the shell has not begun to plan: at most one of each kind, since the shell reads
+/// the details only when it begins.
 #[derive(Debug, Default)]
 pub struct PlanRequests {
     waiting: AtomicU8,
 }
 
 impl PlanRequests {
-    /// Without a request.
+    /// Holds no request.
     pub const fn new() -> Self {
         Self { waiting: AtomicU8::new(0) }
     }
 
-    /// Notes that a plan is wanted.
+    /// Adds a request; one of that kind that waits already stays the only one.
     pub fn add(&self, wanted: PlanKind) {
         self.waiting.fetch_or(wanted.bit(), Ordering::Relaxed);
     }
 
-    /// The most urgent plan, which is wanted no longer.
+    /// Removes and returns the most urgent request; `None` when none waits.
     pub fn take(&self) -> Option<PlanKind> {
         PlanKind::BY_URGENCY
             .into_iter()
@@ -63,31 +65,32 @@ impl PlanRequests {
 /// An event for the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// Plan this, and answer with [`crate::Companion::handle_plan`].
+    /// The shell is to compute this plan and to answer with [`crate::Companion::handle_plan`].
     PlanRequested(PlanKind),
-    /// Send what waits, then start the companion again, from the newest roadmap, mission and
-    /// parameters.
+    /// The shell is to send all queued messages, then to start a new companion from the newest
+    /// roadmap, mission and parameters in flash.
     RestartRequested,
-    /// The mission moved on.
+    /// The mission table made a transition.
     StateChanged {
-        /// Before.
+        /// State before the transition.
         from: State,
-        /// After.
+        /// State after the transition.
         to: State,
-        /// The row's text, empty if it has none.
+        /// STATUSTEXT of the table's row, empty if it has none.
         text: &'static str,
-        /// Whether the row is a warning: the mission leaves its usual course.
+        /// Whether the row's text is a warning: the mission leaves its usual course.
         warning: bool,
     },
-    /// It is back on its path over a field, and leaves out so many waypoints that it flew around:
-    /// the next start flies them.
+    /// This vehicle is back on its path over an area after a detour. Waypoints that the detour
+    /// passed by are not photographed; the next start of the mission flies them.
     FlownAround {
-        /// Number of waypoints.
+        /// Number of waypoints that are left.
         left: u32,
     },
-    /// The mission waits for a vehicle that has not started.
+    /// This vehicle has waited for long for a vehicle that was not started; repeated while it
+    /// waits.
     WaitsForStart {
-        /// The command's MAVLink system id.
+        /// MAVLink system id of the vehicle that was not started.
         id: u8,
     },
 }

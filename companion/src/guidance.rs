@@ -1,11 +1,11 @@
-//! Guidance makes the setpoint: from the path, the neighbours and the autopilot's position it makes
-//! the raw point of each state, and its smoother makes the setpoint of the raw point.
+//! Guidance makes the setpoints: from path, neighbours and the autopilot's position it moves a raw
+//! point, by the state, and its smoother turns the raw point into a setpoint that can be flown.
 //!
 //! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's
 //! start, the path, the descent. The phase is guidance's own state. A pause, a lost position or a
 //! pilot interrupts it; afterwards it continues where it was. A stop slows the smoother's clock, so
-//! the raw point stays where it is. Once the setpoint stands, the raw point is taken back to it,
-//! and continuing begins with a straight way back to where the phase was left.
+//! the raw point stays where it is. Once the setpoint stands, the raw point is set back to it, and
+//! the flight continues by a straight leg to where the phase was left.
 
 mod brakes;
 pub(crate) mod evade;
@@ -52,139 +52,139 @@ pub use self::scene::GuidanceInputs;
 pub use self::setpoint::Setpoint;
 pub use self::smoother::SetpointStats;
 
-/// The end of a climb or of a path is reached within this distance, metres.
+/// Distance from the end of a climb or a path within which it counts as reached, metres.
 const ARRIVED_M: f32 = 0.35;
-/// A vehicle near its reference reports its progress at most this far short of the reference,
-/// metres: 0.05 m less than gates allow (`PROGRESS_ERROR_M`), since a vehicle stops a little short
-/// of a gate.
+/// A vehicle within [`ARRIVED_M`] of its reference reports its progress at most this far short of
+/// the reference, metres: 0.05 m less than gates allow (`PROGRESS_ERROR_M`), since a vehicle stops
+/// a little short of a gate.
 const REPORTED_SHORT_M: f32 = planner_core::flight::PROGRESS_ERROR_M - 0.05;
-/// A vehicle slower than this stands at the end of the path, m/s.
+/// Speed below which the vehicle stands at the end of its path, m/s.
 const AT_REST_MPS: f32 = 0.5;
-/// A setpoint slower than this stands, m/s.
+/// Speed below which the setpoint stands, m/s.
 const STANDING_SETPOINT_MPS: f32 = 0.05;
-/// A climb is done within this distance of its top, metres.
+/// A climb is done within this vertical distance of its top, metres.
 const CLIMBED_M: f32 = 0.12;
-/// A guided descent is done within this distance of its lower end, metres.
+/// A guided descent is done less than this high above its lower end, metres.
 const DESCENDED_M: f32 = 0.2;
-/// Time after which a guided descent that has reached its end hands over to the autopilot's
-/// landing, wherever the vehicle is.
+/// Time for which the setpoint has stood at the end of a guided descent, after which the
+/// autopilot's landing takes over, wherever the vehicle is.
 const LAND_AFTER: Duration = Duration::from_secs(2);
-/// Time without progress after which the autopilot takes over a landing that guidance leads from
-/// the path.
+/// Time without progress after which the autopilot's landing takes over from one that setpoints
+/// lead down from the path.
 const LEADS_FOR: Duration = Duration::from_secs(4);
-/// Greatest lead of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
+/// Greatest distance of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
-/// Greatest speed of the estimate of a vehicle on its pad, m/s: up to it the setpoint follows the
-/// estimate before the take-off.
+/// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
+/// before the take-off, m/s.
 const MAX_PAD_DRIFT_MPS: f32 = 0.2;
-/// Stretch of the path searched for the nearest point after the pilot, metres to either side.
+/// Path searched to either side for the point nearest to a vehicle back from its pilot, metres.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
-/// Stretch of the path searched after the position was lost, metres to either side: the vehicle
-/// stopped within its braking distance of the reference, so a position further along is not to be
-/// believed.
+/// Path searched, to either side, for the point nearest to a vehicle whose position was lost,
+/// metres: it stopped within its braking distance of the reference, so a position further along the
+/// path is not believed.
 pub const LOST_WINDOW_M: f32 = 2.5;
-/// Stretch of the path searched once the setpoint stands, metres to either side: the raw point may
-/// be a second of flight ahead.
+/// Path searched, to either side, for the point nearest to a setpoint that stands, metres: the raw
+/// point may be a second of flight ahead of it.
 const SETTLE_WINDOW_M: f32 = 3.0;
-/// A nearest point this near the end of the searched stretch lies beyond the stretch, metres.
+/// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
-/// Least movement along the path that counts as progress, metres.
+/// Advance of the reference along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
-/// Distance that the raw point keeps from the geofence, metres: the setpoint may deviate by this
-/// much from the path.
+/// Distance before the geofence at which the raw point stops, metres: the setpoint may deviate by
+/// this much from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
-/// Greatest height over the ground, however wide the margin, at which a guided descent becomes
-/// slow, or at which an autopilot that is not led to the ground takes over the landing, metres.
+/// Greatest height above the ground at which a guided descent becomes slow, or an autopilot that is
+/// not led to the ground begins to land, metres; less where the margin to walls is.
 const MAX_LAND_HANDOVER_M: f32 = 1.2;
-/// Fastest guided descent near the ground, m/s: as slow as ArduCopter lands.
+/// Greatest speed of a guided descent near the ground, m/s: that of ArduCopter's landing.
 const TOUCHDOWN_MPS: f32 = 0.5;
-/// Shortest leg that is flown, metres.
+/// A leg shorter than this counts as flown, metres.
 const MIN_LEG_M: f32 = 1e-3;
 
-/// Advice before the neighbours are evaluated: wait.
+/// Advice until the neighbours were evaluated: stand.
 const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// State of guidance: flight phase, raw point, smoother and safety filter.
 #[derive(Clone, Debug)]
 pub struct Guidance {
     track: TrackConfig,
-    /// Limits of the reference in climb, join and descent.
+    /// Limits of the reference along the legs of climb, join and descent.
     leg_track: TrackConfig,
     deconflict: DeconflictConfig,
-    /// Share of the speed that the estimate allows: 0 stops.
+    /// Share of the speed that the error bound of the position estimate allows; 0 stops.
     pub pace: f32,
     /// The smoother, which makes setpoints of raw points.
     pub smoother: SetpointSmoother,
     phase: Phase,
     tracker: Tracker,
-    /// The straight way of a climb, a join or a descent; none while it is to be made from where the
-    /// setpoint stands.
+    /// The straight leg of a climb, a join or a descent; `None` until the next step makes it, from
+    /// where the setpoint stands.
     leg: Option<Path<2>>,
     leg_tracker: Tracker,
-    /// Which waypoint it flies to, by Algorithm 2.
+    /// The waypoint that the vehicle flies to by Algorithm 2 of the paper.
     waypoints: Algorithm2Waypoints,
-    /// Whether the raw point is where the setpoint stands.
+    /// Whether the raw point was set back to where the setpoint stands.
     raw_point_at_rest: bool,
-    /// The position was unknown: no place was sent.
+    /// Whether the position was lost, so that setpoints carried no place.
     position_unknown: bool,
-    /// The autopilot flew by itself or by its pilot: setpoints followed the vehicle.
+    /// Whether in the last step a pilot or the autopilot flew, and setpoints followed the vehicle.
     autopilot_took_over: bool,
-    /// Time since a place was sent, seconds.
+    /// Time since a setpoint with a place was sent, seconds.
     unsent_s: f32,
-    /// Last advice of the neighbours.
+    /// The advice of the last step: speed scale, distance to the stop, vehicle waited for.
     pub advice: Advice,
-    /// Number of gates, from the first on, that are open for good.
+    /// Number of gates of the plan, from the first on, that have opened; they stay open.
     gates_open: usize,
     on_path: bool,
     lead_m: f32,
-    /// Place of the setpoint along the path, metres.
+    /// Arc length of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
-    /// Place along the path where the vehicle will stop for now, whatever the safety filter does,
-    /// metres.
+    /// Arc length along the path where the vehicle will stop by advice or braking, metres, whether
+    /// or not the safety filter stops it before.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
     pub(crate) filter: SafetyFilter,
-    /// Whether it holds its place for others to pass.
+    /// Whether the vehicle reports that it holds its place, so that others may pass.
     pub(crate) hold: Hold,
-    /// Whether that has changed since the last intent that was sent.
+    /// Whether the hold has begun or ended, so that an intent is to be sent at once.
     pub(crate) hold_changed: bool,
-    /// Whether a descent goes back up its column.
+    /// Whether the leg of the descent leads back up.
     climbing_back: bool,
-    /// Whether it leads a landing down from the path, before the autopilot lands.
+    /// Whether setpoints lead a landing straight down, before the autopilot's landing.
     guides_landing: bool,
-    /// The path leads out of the geofence from here.
+    /// Whether the raw point stops because the path ahead leaves the geofence.
     stopped_at_fence: bool,
     progress_m: f32,
     progress_at: Instant,
-    /// When the vehicle last was at its setpoint or the setpoint went on, and where that was then.
+    /// When the vehicle was last at its setpoint or the setpoint advanced, and its place then.
     followed_at: Instant,
     followed_place: Point,
     reported_m: f32,
-    /// Whether it flies back the way it came.
+    /// Whether the vehicle flies back along its path, to the path's start.
     pub returning: bool,
-    /// What others know of its way.
+    /// The part of its path that the other vehicles have acknowledged.
     known_way: known_way::KnownWay,
     evade_search: EvadeSearch,
-    /// Whether it keeps out from under a vehicle that comes down.
+    /// Whether the vehicle keeps out of the column below a vehicle that descends.
     pub evading: bool,
-    /// Distance ahead at which the vehicle waits for neighbours, metres.
+    /// Distance ahead on the path at which it stops, by advice or to evade, metres.
     wait_distance_m: f32,
-    /// Place along the path beyond which the vehicle does not fly for now, metres.
+    /// Place along the path where it holds for a division, metres; ∞ for none.
     halt_m: f32,
-    /// Place along the path to which the vehicle flies back.
+    /// Place along the path to which it steps back from below a vehicle that descends, metres.
     back_to_m: Option<f32>,
-    /// No place along its path is better.
+    /// Whether no place back along the path is outside the columns of vehicles that descend.
     no_better_place: bool,
-    /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
+    /// Since when the vehicle has been below one that descends, unable to leave along its path.
     trapped_since: Option<Instant>,
-    /// Whether its path leads aside only: it does not land at its end.
+    /// Whether the path ends aside or back on the plan's path, where the vehicle does not land.
     pub ends_aside: bool,
-    /// Height over the ground from which a descent is slow, or an autopilot that is not led to the
-    /// ground lands by itself, metres.
+    /// Height above the ground from which a guided descent is slow, or an autopilot that is not led
+    /// to the ground lands by itself, metres.
     low_height_m: f32,
-    /// The lowest ground between pads, metres; infinite where those say how low.
+    /// Height of the lowest ground between pads, ENU up, metres; ∞ where only the pads' are known.
     lowest_ground_m: f32,
-    /// Acceleration sent last, with what holds the vehicle on the reference.
+    /// Acceleration sent last: the setpoint's, and the correction towards the setpoint.
     sent_acceleration: Point,
 }
 
@@ -243,14 +243,14 @@ impl Guidance {
         }
     }
 
-    /// Sets other limits.
+    /// Computes all limits again, from the settings and the autopilot's limits.
     pub fn set_limits<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
         let Self { track, leg_track, deconflict, .. } = Self::new(config, autopilot);
         (self.track, self.leg_track, self.deconflict) = (track, leg_track, deconflict);
         self.smoother.set_limits(MotionLimits::new(config, autopilot), config.geofence);
     }
 
-    /// Clears the state of an earlier flight.
+    /// Forgets the flight before: phase, leg, path progress, advice and filter. The setpoint stays.
     pub fn reset(&mut self) {
         self.tracker = Tracker::default();
         self.phase = Phase::Hold;
@@ -264,10 +264,10 @@ impl Guidance {
         self.filter.reset();
     }
 
-    /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was
-    /// sent.
+    /// Holds from now on: where the setpoint comes to a stop; at `point` where there is no
+    /// setpoint, or the position was lost.
     pub fn hold_at(&mut self, point: Point) {
-        // A vehicle whose position is known again brakes from its last place.
+        // After a lost position the setpoint begins where the vehicle is.
         let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
         if lost || !self.smoother.has_setpoint() {
             self.smoother.resume_at(point, self.unsent_s);
@@ -275,15 +275,15 @@ impl Guidance {
         }
     }
 
-    /// Holds at the place to which the pilot flew, until the mission resumes; the place of
-    /// interruption is kept.
+    /// Holds where the pilot left the vehicle, until the mission resumes; the place along the path
+    /// where the flight was interrupted is kept.
     pub fn hold_after_pilot(&mut self, point: Point) {
         self.hold_at(point);
         self.forget_leg();
     }
 
-    /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing
-    /// was sent.
+    /// Begins the climb, straight up from the setpoint, or from `position` where there is no
+    /// setpoint.
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
         self.phase = Phase::Climb;
@@ -292,23 +292,23 @@ impl Guidance {
         }
     }
 
-    /// Place of the reference on the path, metres; −∞ before the reference runs.
+    /// Arc length of the reference along the path, metres; −∞ before the path is begun.
     pub fn along_m(&self) -> f32 {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
     }
 
-    /// Whether the setpoint stands, and is not on its way down.
+    /// Whether the setpoint stands, outside a descent.
     pub fn is_standing(&self) -> bool {
         self.is_setpoint_still() && self.phase != Phase::Descent
     }
 
-    /// Whether it stands where its path leaves the geofence.
+    /// Whether the setpoint stands because its path leaves the geofence ahead.
     pub fn is_standing_at_fence(&self) -> bool {
         self.stopped_at_fence && self.is_standing()
     }
 
-    /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one that
-    /// the raw point requires; if not, the smoother held the last setpoint.
+    /// One step of `dt_s` seconds: advice, safety filter, raw points, setpoint. Returns false where
+    /// a raw point was not sound, so that the smoother held instead of following it.
     pub fn step<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -348,7 +348,7 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // The safety filter continues checking the neighbour that stopped the vehicle.
+                // Also while stopped: the filter goes on checking the path up to there.
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }
@@ -370,8 +370,8 @@ impl Guidance {
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
         if known && (taken || taken_before || !self.smoother.has_setpoint()) {
-            // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and
-            // as it moves.
+            // The autopilot does not follow setpoints, or there was none: the setpoint begins at
+            // the vehicle's position, or takes its velocity.
             if taken {
                 self.smoother.follow_vehicle(position, self.unsent_s);
             } else if !self.smoother.has_setpoint() {
@@ -429,8 +429,8 @@ impl Guidance {
         let share = self.lag_share(scene.telemetry, moves, now);
         let mut blocked = false;
         let dt_s = if self.smoother.resumes_from_last() { self.unsent_s } else { dt_s };
-        // The place where the vehicle stops stays the same, however many raw points this step
-        // takes.
+        // The place where advice stops the vehicle stays the same while the raw points of this step
+        // move on.
         let stops_at_m = advised_at_m + advice.stop_within_m;
         self.stopped_at_fence &= !moves;
         for _ in 0..self.smoother.begin_step(ClockPace { speed_share: share, urgent }, dt_s) {
@@ -481,7 +481,7 @@ impl Guidance {
         sound
     }
 
-    /// Ends a step: `sends` says whether its setpoint has a place.
+    /// Ends a step; `sends`: its setpoint carries a place, which is remembered as sent.
     fn finish_step(&mut self, sends: bool) {
         if sends && self.smoother.has_setpoint() {
             self.smoother.mark_sent();
@@ -489,8 +489,8 @@ impl Guidance {
         }
     }
 
-    /// The vehicle that the safety filter stops for at this moment; 0 for none. Nothing changes by
-    /// the call.
+    /// System id of the neighbour that the safety filter stops for now; 0 for none. The filter's
+    /// state stays as it was.
     pub fn query_filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -505,27 +505,27 @@ impl Guidance {
         blocker
     }
 
-    /// Whether waypoints and the end of the path are those of the paper.
+    /// Whether the vehicle flies by Algorithm 2 as the paper prints it, without our tracker.
     fn is_algorithm2(&self) -> bool {
         self.deconflict.method == Method::Algorithm2
     }
 
-    /// Whether it leads the vehicle down.
+    /// Whether the vehicle is in the descent from the end of its path, or of a guided landing.
     pub(crate) fn is_descending(&self) -> bool {
         self.phase == Phase::Descent
     }
 
-    /// Since when it has been below a vehicle that lands, with no way out.
+    /// Since when the vehicle has been below one that descends, unable to leave along its path.
     pub(crate) fn trapped_since(&self) -> Option<Instant> {
         self.trapped_since
     }
 
-    /// The time in a trap counts from now on.
+    /// Restarts the time for which it counts as trapped.
     pub(crate) fn reset_trap_timer(&mut self) {
         self.trapped_since = None;
     }
 
-    /// Time since the reference last moved on.
+    /// When the reference last advanced along the path by 0.25 m.
     pub fn last_progress_at(&self) -> Instant {
         self.progress_at
     }

@@ -1,12 +1,13 @@
 //! The companion of one UAV, sans-IO: bytes and time in, bytes and events out.
 //!
 //! **Contract.** The shell owns links, clock and planner. It calls [`Companion::handle_bytes`] with
-//! what a link received, [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and
-//! [`Companion::handle_plan`] with the answer to [`Event::PlanRequested`]. After *each* `handle_*`
-//! call it drains [`Companion::poll_transmit`] for both links until 0 and [`Companion::poll_event`]
-//! until `None`; with a flash ([`Companion::attach_store`]) also [`Companion::poll_flash`], and
-//! answers each by [`Companion::handle_flash`], whenever it is done. Times never go back. Every
-//! call does bounded work.
+//! the bytes that a link received, [`Companion::handle_timeout`] when [`Companion::poll_timeout`]
+//! is due, and [`Companion::handle_plan`] with the answer to [`Event::PlanRequested`]. After *each*
+//! `handle_*` call it calls [`Companion::poll_transmit`] for both links until it returns 0, and
+//! [`Companion::poll_event`] until it returns `None`. With a flash ([`Companion::attach_store`]) it
+//! also calls [`Companion::poll_flash`] and passes the outcome of each operation to
+//! [`Companion::handle_flash`], whenever the operation is done. Times never go back. Every call
+//! does bounded work.
 //!
 //! ```
 //! use companion::link::frame::MAX_FRAME_LEN;
@@ -36,14 +37,14 @@
 //!
 //! `examples/run_loop.rs` is a whole run loop.
 //!
-//! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link
-//! that is not polled loses old ones instead of queueing them. Commands, acks and texts wait in a
-//! queue of [`link::outbox::QUEUE_DEPTH`]; when it is full the newest is dropped and counted
-//! ([`Companion::dropped_messages`]).
+//! Setpoints, heartbeats, positions and intents are made when the shell polls a link, from the
+//! newest state; for a link that is not polled old ones are dropped, not queued. Commands, acks and
+//! texts wait in a queue of [`link::outbox::QUEUE_DEPTH`] entries; when it is full the newest is
+//! dropped and counted ([`Companion::dropped_messages`]).
 //!
-//! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are
-//! in [`autopilot::px4`] and [`autopilot::ardupilot`]; [`autopilot::AutopilotKind`] chooses between
-//! them by HEARTBEAT.
+//! The mission is the transition table of [`mission`], the same for every autopilot. Mode numbers,
+//! type masks and stream rates of PX4 and ArduPilot are in [`autopilot::px4`] and
+//! [`autopilot::ardupilot`]; [`autopilot::AutopilotKind`] chooses between them by the HEARTBEAT.
 #![no_std]
 #![forbid(unsafe_code)]
 

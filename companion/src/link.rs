@@ -20,11 +20,11 @@ use self::rate_limit::RateLimit;
 use crate::events::Link;
 use crate::time::Instant;
 
-/// Entries of a link's queue that answers leave free for texts, for acks of the own requests, and
-/// for commands.
+/// Free entries of a link's queue below which no answer to a ground station is queued: they are
+/// kept for texts, commands to the autopilot, and acks of its requests.
 const KEPT_FREE: usize = 8;
-/// Further entries that are left free for answers to a ground station: a list of all parameters,
-/// and two more.
+/// Further free entries below which no answer to another sender is queued: room for the answers to
+/// a ground station, a list of all parameters and two more.
 const KEPT_FOR_GROUND: usize = 12;
 const BOTH_LINKS: [Link; 2] = [Link::Autopilot, Link::Swarm];
 
@@ -32,32 +32,33 @@ const BOTH_LINKS: [Link; 2] = [Link::Autopilot, Link::Swarm];
 /// queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OnDemandMessage {
-    /// A setpoint.
+    /// SET_POSITION_TARGET_LOCAL_NED, the setpoint for the autopilot.
     Setpoint,
     /// HEARTBEAT.
     Heartbeat,
     /// AUTOPILOT_VERSION.
     Version,
-    /// GLOBAL_POSITION_INT.
+    /// GLOBAL_POSITION_INT: this vehicle's position, for the swarm.
     Position,
-    /// The intent.
+    /// TUNNEL with this vehicle's intent: progress, flags and the points ahead of it.
     Intent,
-    /// Reports of vehicles that others do not hear, passed on.
+    /// TUNNEL that relays reports of vehicles that others do not hear.
     Relay,
-    /// The roster: the state of all vehicles that a coverage mission agrees on.
+    /// TUNNEL with the roster report of a coverage mission: the state of all vehicles, on which
+    /// they agree.
     Roster,
-    /// The photographed waypoints of the area.
+    /// TUNNEL with the waypoints of the area that are photographed.
     Done,
-    /// The number of photographed waypoints, to be plotted.
+    /// NAMED_VALUE_FLOAT with the number of photographed waypoints, for plots.
     DoneCount,
 }
 
-/// Both links.
+/// Both links, to the autopilot and to the swarm: framers, queues and rate limits.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Links {
     framers: [Framer; 2],
     outboxes: [Outbox; 2],
-    /// Bits of [`OnDemandMessage`].
+    /// For each link, the [`OnDemandMessage`]s that are due: bit n for the n-th variant.
     due: [u16; 2],
     radio: RateLimit,
     sent: SentIntents,
@@ -66,12 +67,13 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// The next frame of the bytes received by `now`.
+    /// Takes bytes off the front of `input`, received by `now`, up to the end of the next frame;
+    /// `None` once they hold no further whole frame.
     pub(crate) fn receive(&mut self, link: Link, now: Instant, input: &mut &[u8]) -> Option<Frame> {
         self.framers[link as usize].next(now, input)
     }
 
-    /// Counters of a link's framer.
+    /// Counters of frames and errors of a link's framer.
     pub(crate) fn counters(&self, link: Link) -> Counters {
         self.framers[link as usize].counters()
     }
@@ -81,7 +83,8 @@ impl Links {
         self.outboxes[link as usize].dropped()
     }
 
-    /// Sets whether the message `what` is to be made at the next poll.
+    /// Sets or clears the due flag of a message: a message that is due is made at the next poll of
+    /// the link.
     pub(crate) fn set_due(&mut self, link: Link, what: OnDemandMessage, due: bool) {
         let bit = 1 << what as u8;
         let bits = &mut self.due[link as usize];
@@ -100,12 +103,12 @@ impl Links {
         self.outboxes[link as usize].push(message);
     }
 
-    /// Sends a person a text by STATUSTEXT on both links, at most 50 bytes.
+    /// Queues a STATUSTEXT, at most 50 bytes, on both links.
     pub(crate) fn send_text(&mut self, warning: bool, text: &'static str) {
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
-    /// As `send_text`, with numbers: each `#` of the text stands for one.
+    /// Queues a STATUSTEXT on both links; each `#` in the text is replaced by one of the numbers.
     pub(crate) fn send_text_with_numbers(
         &mut self,
         warning: bool,
@@ -118,7 +121,8 @@ impl Links {
             .for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
     }
 
-    /// Whether an answer may be queued now; if so, it is counted.
+    /// Whether an answer may be queued now: its rate limit and the link's queue have room. If so,
+    /// one token of the rate limit is spent.
     pub(crate) fn take_answer_token(
         &mut self,
         now: Instant,
@@ -134,7 +138,7 @@ impl Links {
             && self.rates.take_token(now, link, sender, kind)
     }
 
-    /// Queues an answer, unless its rate or the queue is used up.
+    /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
     pub(crate) fn queue_answer(
         &mut self,
         now: Instant,
@@ -148,8 +152,8 @@ impl Links {
         }
     }
 
-    /// Sends on both links a text about a sender's action; each `#` of the text stands for a
-    /// number.
+    /// Queues on both links, as answers with a rate limit, a text about something that a sender
+    /// did; each `#` in it is replaced by one of the numbers.
     pub(crate) fn send_sender_text(
         &mut self,
         now: Instant,
@@ -169,7 +173,8 @@ impl Links {
         }
     }
 
-    /// Sends a text that names the sender of a message.
+    /// Queues a text about something that a sender did, with its system and component id as
+    /// numbers.
     pub(crate) fn log_sender(
         &mut self,
         now: Instant,
@@ -180,66 +185,70 @@ impl Links {
         self.send_sender_text(now, sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
     }
 
-    /// Sends a text that names the sender of a command that took effect.
+    /// Queues a text with the sender of a command that took effect.
     pub(crate) fn log_command(&mut self, now: Instant, sender: SenderKind, command: &Command) {
         self.log_sender(now, sender, command.log_text(), command.from);
     }
 
-    /// The answer that this very command frame got lately, `Some(None)` if none yet; `None` for a
-    /// frame not seen.
+    /// The answer given lately to the same command frame, of which this is a duplicate;
+    /// `Some(None)` if it got none; `None` for a frame that is no duplicate.
     pub(crate) fn previous_answer(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
         self.repeats.previous_answer(frame, now)
     }
 
-    /// Remembers a command frame and its answer.
+    /// Remembers a command frame and its answer, so that a duplicate of it gets the same answer.
     pub(crate) fn remember_answer(&mut self, frame: &Frame, result: Option<u8>, now: Instant) {
         self.repeats.remember(frame, result, now);
     }
 
-    /// Whether the radio's rate limit lets another frame out.
+    /// Whether the radio's token bucket allows another frame beside the state messages. State
+    /// messages are not limited.
     pub(crate) fn may_send_by_radio(&mut self, now: Instant, armed: bool) -> bool {
         self.radio.may_send(now, armed)
     }
 
-    /// Whether half of the radio's rate limit is left.
+    /// Whether more than half of the radio's token bucket is full.
     pub(crate) fn is_radio_bucket_half_full(&self) -> bool {
         self.radio.is_half_full()
     }
 
-    /// Counts bytes sent by radio in addition to the state messages.
+    /// Takes the bytes of a frame other than a state message from the radio's token bucket.
     pub(crate) fn count_radio_bytes(&mut self, bytes: usize) {
         self.radio.count_bytes(bytes);
     }
 
-    /// The header of the next frame of a link.
+    /// The header of the next frame on a link, with the next sequence number.
     pub(crate) fn next_header(&mut self, link: Link, system: u8) -> Header {
         self.outboxes[link as usize].next_header(system)
     }
 
-    /// The header of an intent whose points lead to `ends_m` along the path: its number is
-    /// remembered, so that an echo of it shows how late messages are, and what others know.
+    /// The header of an intent whose points lead to `ends_m` along this vehicle's path. Its
+    /// sequence number and `ends_m` are remembered: an echo of it by a neighbour gives the message
+    /// delay, and the part of the path that the neighbour knows.
     pub(crate) fn intent_header(&mut self, system: u8, ends_m: f32, now: Instant) -> Header {
         let header = self.next_header(Link::Swarm, system);
         self.sent.note_sent(header.sequence, ends_m, now);
         header
     }
 
-    /// Intents sent.
+    /// Number of intents sent since the start.
     pub(crate) fn intents_sent(&self) -> usize {
         self.sent.count()
     }
 
-    /// Time that a message takes one way, seconds, by an echo of an own intent.
+    /// One-way delay of messages, seconds, measured by a neighbour's echo of an own intent; `None`
+    /// where that intent is no longer remembered.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
         self.sent.message_delay_s(echo, now)
     }
 
-    /// What is known of the own intents that arrived.
+    /// The own intents sent last, and which of them are known to have arrived.
     pub(crate) fn sent_intents(&mut self) -> &mut SentIntents {
         &mut self.sent
     }
 
-    /// Writes the first message that waits on a link; 0 if none does.
+    /// Writes the first message of a link's queue to `out` and removes it. Returns its length, 0
+    /// where the queue is empty.
     pub(crate) fn write_queued(&mut self, link: Link, system: u8, out: &mut [u8]) -> usize {
         self.outboxes[link as usize].write_first(system, out)
     }

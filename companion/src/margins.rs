@@ -37,26 +37,28 @@ pub const ACCURACY_FACTOR: f32 = 3.0;
 /// Age from which a reported accuracy counts as unknown.
 pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 
-/// Distance by which two vehicles over an area may be nearer than they believe, metres: the part of
-/// the clearance left to each for its estimate. Both are kept apart by this beside the safety
-/// distance, where no gates separate them.
+/// Distance by which two vehicles over an area may be nearer than their estimates say, metres: for
+/// each of the two, the part of the clearance that is left for its estimate. Where no gates
+/// separate them, this is added to the safety distance.
 pub(crate) fn pair_position_error_m(clearance_m: f32, radius_m: f32) -> f32 {
     2.0 * libm::fmaxf(estimate_margin_m(clearance_m, radius_m, TRACKING_M), 0.0)
 }
 
-/// The part of the clearance that hull and tracking leave for the estimate and for gusts, metres;
-/// negative if nothing.
+/// The part of the clearance that the hull and the tracking error leave for the estimate's error
+/// and for gusts, metres; negative where they leave nothing.
 pub fn estimate_margin_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f32 {
     clearance_m - radius_m - tracking_m
 }
 
-/// Whether a bound is within a margin, with a tolerance for rounding.
+/// Whether a bound of the estimate's error, metres, is at most the margin left for it, with 0.1 mm
+/// for rounding.
 pub fn is_bound_within(bound_m: f32, room_m: f32) -> bool {
     bound_m <= room_m + 1e-4
 }
 
-/// Share of the cruise speed at which the estimate's bound fits beside the tracking error: 1 where
-/// it fits at cruise, 0 where it does not even fit at a crawl.
+/// Share of the cruise speed at which the estimate's error bound, metres, and the tracking error of
+/// that speed fit into the clearance: 1 where they fit at cruise, 0 where they do not even fit at a
+/// crawl.
 pub fn speed_share_for_bound(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
     let (cruise_m, crawl_m) = (
         estimate_margin_m(clearance_m, radius_m, TRACKING_M),
@@ -65,15 +67,16 @@ pub fn speed_share_for_bound(bound_m: f32, clearance_m: f32, radius_m: f32) -> f
     if is_bound_within(bound_m, cruise_m) {
         return 1.0;
     }
-    // NaN and infinity stop it.
+    // A bound that is NaN or infinite stops the vehicle.
     if !is_bound_within(bound_m, crawl_m) {
         return 0.0;
     }
-    // At the end of it the vehicle still moves, so that it comes to where the estimate is better.
+    // With a bound just within the crawl margin the vehicle still flies, at `MIN_SPEED_SHARE`, so
+    // that it may come to where the estimate is better.
     ((crawl_m - bound_m) / (crawl_m - cruise_m)).clamp(MIN_SPEED_SHARE, 1.0)
 }
 
-/// Least share of the cruise speed that still moves the vehicle.
+/// Least share of the cruise speed at which a vehicle is flown; slower it stops.
 const MIN_SPEED_SHARE: f32 = 0.1;
 
 #[cfg(test)]

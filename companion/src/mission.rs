@@ -24,12 +24,14 @@ use self::row::state_mask;
 pub use self::row::{Action, TransitionRow};
 pub use self::state::{InterruptedStates, State, TargetState};
 
-/// Whether some row of `state` waits for `guard`: a command that none waits for is refused.
+/// Whether the table has a row from `state` with this guard. A command whose guard has none there
+/// is refused.
 pub fn has_row_for(state: State, guard: Guard) -> bool {
     TABLE.iter().any(|row| row.guard == guard && row.states & state_mask(&[state]) != 0)
 }
 
-/// The first row that applies.
+/// The first row of the table from `state` whose guard has been met for the row's time; `None`
+/// where the state is kept.
 pub fn first_applicable_row(state: State, inputs: &GuardInputs) -> Option<&'static TransitionRow> {
     let here = state_mask(&[state]);
     TABLE.iter().find(|row| row.states & here != 0 && row.guard.is_met(inputs, row.min_duration))

@@ -1,8 +1,8 @@
-//! The plan that a mission file asks for, on a desk and on a board alike: the desk only lends more
-//! memory.
+//! Computes the plan that a mission file describes, by the same code on the desk and on a board;
+//! the desk lends it more memory.
 //!
-//! Every companion plans the whole swarm from the same file, so all agree; the CRC of the plan is
-//! what they compare.
+//! Every companion plans the whole swarm from the same file, so all get the same plan; they compare
+//! its CRC to be sure.
 
 pub mod coverage;
 
@@ -15,23 +15,23 @@ use planner_core::search::SearchError;
 use crate::config::PlanFailure;
 use crate::storage::mission_file::MissionView;
 
-/// A step of a plan with goals.
+/// A step of the planning of a mission with goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanStep {
-    /// Lengths of the shortest paths from starts to goals.
+    /// Shortest paths from all starts to all goals.
     Search,
-    /// Which vehicle flies to which goal.
+    /// The goal of each vehicle.
     Assignment,
-    /// When the vehicles fly.
+    /// Departure times and the order at shared places.
     Schedule,
 }
 
-/// Plans a mission with goals on its roadmap, for vehicles with room for `gates_most`. `done` is
-/// called after each step: the desk measures their times.
+/// Plans a mission with goals on its roadmap; no vehicle's plan has more than `gates_most` gates.
+/// `done` is called after each step, so that the desk can time it.
 ///
 /// # Errors
-/// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or
-/// goals.
+/// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission with more than `V` vehicles
+/// or goals.
 pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize>(
     mission: &MissionView<'_>,
     roadmap: &RoadmapView<'_>,
@@ -60,7 +60,7 @@ impl From<PlanError> for PlanFailure {
     }
 }
 
-/// The companion's failure for an error of the planner.
+/// The failure that a companion handles, for an error of the planner.
 fn plan_failure(error: &PlanError) -> PlanFailure {
     match error {
         PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => {

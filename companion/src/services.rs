@@ -1,7 +1,8 @@
-//! What ground tools use of a companion beside commands: files, parameters, time, a restart. Served
-//! on either link, to frames addressed to our own system and component, so a ground station may
-//! come by the radio or through the autopilot's routing. Only a ground station of the mission sets
-//! parameters and uses files; what others may request is in `answer_limits`.
+//! The MAVLink services for ground tools, beside commands: FTP, parameters, TIMESYNC,
+//! AUTOPILOT_VERSION. They answer on both links frames addressed to this system and component: a
+//! ground station may come by the radio or through the autopilot's routing. Only a ground station
+//! of the mission sets parameters and transfers files; what other senders may request is in
+//! `answer_limits`.
 
 pub mod ftp;
 pub mod parameters;
@@ -38,68 +39,70 @@ pub(crate) struct ReceivedFrame<'a> {
 }
 
 impl ReceivedFrame<'_> {
-    /// System and component of the sender.
+    /// System id and component id of the sender.
     fn sender_ids(&self) -> (u8, u8) {
         (self.frame.system, self.frame.component)
     }
 
-    /// Queues an answer, unless its rate or the queue is used up.
+    /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
     fn queue_answer(&self, links: &mut Links, kind: AnswerKind, answer: Outgoing) {
         links.queue_answer(self.now, self.link, self.sender, kind, answer);
     }
 }
 
-/// Files and parameters, and the flash that keeps them.
+/// The MAVLink services, with the flash that keeps files and parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Services {
     store: Option<Store>,
-    /// Parameters in use where there is no flash.
+    /// The parameters, where there is no flash to keep them.
     parameters: Parameters,
     ftp: Ftp,
-    /// Cruise, climb and descent of the mission, m/s, which parameters may limit.
+    /// Cruise, climb and descent speed of the mission, m/s; the parameters may lower the speeds in
+    /// use.
     nominal_mps: [f32; 3],
-    /// A parameter was set that is not in use yet.
+    /// Whether a parameter was set since [`Self::apply_parameters`].
     unapplied: bool,
 }
 
 impl Services {
-    /// Without a flash.
+    /// Without a flash: no files, and parameters are lost at a restart.
     pub(crate) fn new<const V: usize>(config: &Config<V>) -> Self {
         let nominal_mps = [config.cruise_mps, config.climb_mps, config.descend_mps];
         let (parameters, ftp) = (Parameters::default(), Ftp::default());
         Self { store: None, parameters, ftp, nominal_mps, unapplied: false }
     }
 
-    /// Keeps files and parameters in a flash from now on.
+    /// Keeps files and parameters in this flash from now on.
     pub(crate) fn attach_store(&mut self, store: Store) {
         self.store = Some(store);
     }
 
-    /// Photographed waypoints of an area that the flash has.
+    /// The photographed waypoints of an area as stored in flash; empty where there are none.
     pub(crate) fn photographed(&self) -> &[u8] {
         self.store.as_ref().map_or(&[], Store::photographed)
     }
 
-    /// Stores them in flash.
+    /// Stores the photographed waypoints in flash.
     pub(crate) fn store_photographed(&mut self, photographed: store::Photographed) {
         if let Some(store) = &mut self.store {
             store.store_photographed(photographed);
         }
     }
 
-    /// Whether a parameter was set that is not in use yet.
+    /// Whether a parameter was set since [`Self::apply_parameters`].
     pub(crate) fn has_unapplied_parameters(&self) -> bool {
         self.unapplied
     }
 
-    /// Applies the parameters to the settings.
+    /// Writes the parameters into the companion's settings, from which they take effect.
     pub(crate) fn apply_parameters<const V: usize>(&mut self, config: &mut Config<V>) {
         self.unapplied = false;
         [config.cruise_mps, config.climb_mps, config.descend_mps] = self.nominal_mps;
         self.parameters().apply(config);
     }
 
-    /// The next request to the flash.
+    /// The next operation for the shell's flash; `None` where there is nothing to do. Sectors are
+    /// erased only if `erasing` allows.
     pub(crate) fn poll_flash(
         &mut self,
         now: Instant,
@@ -114,19 +117,20 @@ impl Services {
         store.poll_request(erasing)
     }
 
-    /// Handles how the flash did it: the bytes read, none for an erasure or a program.
+    /// Handles the outcome of the flash operation: the bytes read, none for an erasure or a
+    /// program.
     pub(crate) fn handle_flash(&mut self, outcome: Result<&[u8], FlashFault>) {
         if let Some(answer) = self.store.as_mut().and_then(|store| store.handle_outcome(outcome)) {
             self.ftp.handle_read_outcome(answer);
         }
     }
 
-    /// The next FTP packet for a link.
+    /// The next FTP reply for a link.
     pub(crate) fn poll_ftp(&mut self, link: Link) -> Option<[u8; ftp::PAYLOAD_LEN]> {
         self.ftp.poll_reply(link as usize)
     }
 
-    /// Handles a frame that is addressed to the services. Returns whether it was.
+    /// Handles a frame of one of the services; returns whether it was one.
     pub(crate) fn handle_frame(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) -> bool {
         let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPANION_COMPONENT));
         if heard.sender_ids() == own {
@@ -135,7 +139,7 @@ impl Services {
         let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
         match heard.frame.message_id {
             ftp::MESSAGE if (p[1], p[2]) == own => {
-                // A request of another sender is not even answered: sessions are scarce.
+                // An FTP request of another sender gets no answer: there are few sessions.
                 if self.store.is_some() && heard.sender == SenderKind::GroundStation {
                     if ftp::changes_files(p) {
                         links.log_sender(
@@ -189,7 +193,7 @@ impl Services {
         }
     }
 
-    /// Sets a parameter; it is in use from the next [`Self::apply_parameters`] on.
+    /// Sets a parameter; it takes effect at the next [`Self::apply_parameters`].
     pub(crate) fn set_parameter_value(
         &mut self,
         index: usize,
@@ -222,7 +226,7 @@ impl Services {
         if result.is_ok() {
             links.log_sender(heard.now, heard.sender, "Parameter set from #/#", heard.sender_ids());
         }
-        // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
+        // Also after a refusal the value in use is sent, for tools that do not know PARAM_ERROR.
         if let Some(index) = found {
             self.send_parameter(heard, index, links);
         }
@@ -247,7 +251,8 @@ fn refuse_parameter(
     heard.queue_answer(links, AnswerKind::Parameter, error);
 }
 
-/// TIMESYNC: bytes 16 and 17 name an addressee, 0 for all.
+/// Answers a TIMESYNC request to this vehicle or to all. Bytes 16 and 17 of its payload are the
+/// target's system and component id, 0 for all.
 fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     let p = heard.frame.padded();
     let to_us =
@@ -263,12 +268,12 @@ fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     }
 }
 
-/// A parameter's name as it travels: a zero ends a shorter one.
+/// A parameter's name in its 16-byte MAVLink field: up to the first zero byte.
 fn parameter_name(field: &[u8]) -> &[u8] {
     field.split(|b| *b == 0).next().unwrap_or_default()
 }
 
-/// AUTOPILOT_VERSION: what it can do, and the version of this crate.
+/// AUTOPILOT_VERSION of the companion: its capabilities, and this crate's version.
 pub(crate) fn autopilot_version(system_id: u8) -> AUTOPILOT_VERSION_DATA {
     let [major, minor, patch] = [
         env!("CARGO_PKG_VERSION_MAJOR"),

@@ -1,4 +1,5 @@
-//! What outlasts a reset: the mission file, parameters and events in flash.
+//! What flash keeps over a reset: roadmaps, the mission file, parameters and photographed
+//! waypoints.
 
 pub mod mission_file;
 pub mod store;

@@ -1,4 +1,5 @@
-//! The other vehicles: what is heard of them, and detours around them.
+//! The other vehicles: what they report over the radio, detours around them, and the division of an
+//! area among them.
 
 pub(crate) mod detour;
 pub mod fleet;

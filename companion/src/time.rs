@@ -1,9 +1,8 @@
-//! Time as an argument: microseconds since an arbitrary start that the shell chooses. No clock is
-//! read here.
+//! Time as an argument: microseconds since the shell's start. No clock is read in this crate.
 
 use core::ops::{Add, Sub};
 
-/// A point in time, microseconds since the shell's own start. Never goes back; 2⁶⁴ µs are 584 000
+/// A point in time, microseconds since the shell's start. It never goes back; 2⁶⁴ µs are 584 000
 /// years.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instant(u64);
@@ -13,25 +12,25 @@ pub struct Instant(u64);
 pub struct Duration(u64);
 
 impl Instant {
-    /// The shell's start.
+    /// The shell's start, 0 µs.
     pub const ZERO: Self = Self(0);
 
-    /// From microseconds.
+    /// From microseconds since the shell's start.
     pub const fn from_micros(micros: u64) -> Self {
         Self(micros)
     }
 
-    /// From milliseconds; saturates.
+    /// From milliseconds since the shell's start; saturates.
     pub const fn from_millis(millis: u64) -> Self {
         Self(millis.saturating_mul(1000))
     }
 
-    /// Microseconds since the start.
+    /// Microseconds since the shell's start.
     pub const fn as_micros(self) -> u64 {
         self.0
     }
 
-    /// Milliseconds since the start, wrapped to the 32 bits of MAVLink's `time_boot_ms`.
+    /// Milliseconds since the shell's start, wrapped to the 32 bits of MAVLink's `time_boot_ms`.
     pub const fn as_boot_ms(self) -> u32 {
         (self.0 / 1000) as u32
     }
@@ -70,7 +69,8 @@ impl Duration {
 
     /// In seconds.
     pub const fn as_secs_f32(self) -> f32 {
-        // A board converts 32 bits in one instruction, 64 bits by software.
+        // A board's FPU converts 32 bits to a float in one instruction; 64 bits need a software
+        // routine.
         let (high, low) = ((self.0 >> 32) as u32, self.0 as u32);
         (high as f32 * 4_294_967_296.0 + low as f32) * 1e-6
     }

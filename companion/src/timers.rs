@@ -1,37 +1,38 @@
-//! The one table of what is due when.
+//! The table of all timers: for each action the time at which it is due.
 //!
-//! Three timers wake the shell ([`Timers::next_due`]): the step of the control loop, heartbeats,
-//! and the swarm's state. The rest are looked at in each step: what they name happens in the first
-//! step at or after their time.
+//! Three timers wake the shell ([`Timers::next_due`]): the control step, the heartbeats, and the
+//! position and intent to the swarm. The others wake nobody: their action runs in the first step at
+//! or after its time.
 
 use crate::time::{Duration, Instant};
 
-/// Periodic and delayed actions.
+/// Periodic actions, and actions that a delay or a rate limit holds back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Timer {
-    /// A step of the control loop.
+    /// A step of the control loop: guidance, mission table, setpoint.
     Step,
-    /// Heartbeats on both links.
+    /// HEARTBEAT on both links.
     Heartbeat,
-    /// Position and intent to the swarm.
+    /// Position and intent of this vehicle, to the swarm.
     Swarm,
-    /// Roster message of a coverage mission, to the swarm.
+    /// Roster report of a coverage mission, to the swarm.
     Roster,
-    /// Photographed waypoints of the area: noted, kept, reported.
+    /// Notes the waypoints photographed so far, stores them in flash and sends their number.
     Done,
-    /// Photographed waypoints of the area, to the swarm.
+    /// Report of the photographed waypoints, to the swarm.
     DoneReport,
-    /// The request that the state repeats: mode, take-off, landing, disarming.
+    /// Next try of the request that the state repeats until it takes effect: mode, take-off,
+    /// landing, disarming.
     Request,
-    /// A request for the EKF origin.
+    /// Next request of the EKF origin from the autopilot.
     Origin,
-    /// Streams may be requested again.
+    /// From then on the telemetry streams may be requested again.
     Streams,
-    /// A request for a limit of the autopilot's.
+    /// Next request of a parameter that limits the autopilot (speed, acceleration, jerk).
     Limit,
-    /// A setpoint that was held may be reported again.
+    /// From then on "Setpoint out of limits" may be sent again.
     HeldReport,
-    /// An EKF origin that is not used may be reported again.
+    /// From then on "EKF origin # km away" may be sent again.
     OriginReport,
 }
 
@@ -39,7 +40,7 @@ const TIMER_COUNT: usize = 12;
 /// Timers that wake the shell.
 const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 
-/// When each is due; at the start all are.
+/// For each timer the time at which it is due; at the start all are due.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timers {
     due_at: [Instant; TIMER_COUNT],
@@ -47,23 +48,23 @@ pub(crate) struct Timers {
 }
 
 impl Timers {
-    /// Due at this time, whatever was set.
+    /// Sets when a timer is due, whatever was set before.
     pub(crate) fn set(&mut self, timer: Timer, at: Instant) {
         self.due_at[timer as usize] = at;
     }
 
-    /// Due at this time, or earlier if it already was.
+    /// Sets when a timer is due, unless it is due earlier already.
     pub(crate) fn set_no_later(&mut self, timer: Timer, at: Instant) {
         let due_at = &mut self.due_at[timer as usize];
         *due_at = (*due_at).min(at);
     }
 
-    /// Whether it is due.
+    /// Whether a timer is due at `now`.
     pub(crate) fn is_due(&self, timer: Timer, now: Instant) -> bool {
         now >= self.due_at[timer as usize]
     }
 
-    /// Whether it is due; if so, it is next due after `every`.
+    /// Whether a timer is due at `now`; if so, it is set to be due again after `every`.
     pub(crate) fn take_due(&mut self, timer: Timer, now: Instant, every: Duration) -> bool {
         let due = self.is_due(timer, now);
         if due {
@@ -72,19 +73,19 @@ impl Timers {
         due
     }
 
-    /// Sets the next due time to `every` after the last one. After a gap the period starts again
-    /// instead of catching up.
+    /// Sets when a periodic timer is due next: `every` after it was due last. After a gap longer
+    /// than `every` the period starts again from `now`, instead of catching up.
     pub(crate) fn schedule_next(&mut self, timer: Timer, now: Instant, every: Duration) {
         let due = self.due_at[timer as usize] + every;
         self.set(timer, if due > now { due } else { now + every });
     }
 
-    /// Time since the step before, seconds; this is the next.
+    /// Time since the last call, seconds; called once a step, it is the step's length.
     pub(crate) fn step_s(&mut self, now: Instant) -> f32 {
         (now - core::mem::replace(&mut self.stepped_at, now)).as_secs_f32()
     }
 
-    /// When the shell is to call again.
+    /// Earliest time at which a timer that wakes the shell is due.
     pub(crate) fn next_due(&self) -> Instant {
         WAKING_TIMERS.iter().fold(self.due_at[Timer::Step as usize], |next, timer| {
             next.min(self.due_at[*timer as usize])

@@ -1,4 +1,4 @@
-//! The shell's flash, and the commands that concern the board.
+//! The flash operations that the shell performs, and the restart command.
 
 use super::Companion;
 use crate::events::Event;
@@ -7,12 +7,13 @@ use crate::mission::State;
 use crate::storage::store::{ErasePermission, FlashFault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
-/// Time after the start at which a board that has heard no autopilot has none that could be armed.
+/// Time since the start after which a companion that has heard no autopilot may erase flash: no
+/// autopilot is connected that could be armed.
 const NO_AUTOPILOT_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Gives it a flash to keep its files and parameters in, and uses those; without one there are
-    /// no files, and parameters are forgotten.
+    /// Attaches a flash that keeps files and parameters, and applies the parameters stored there.
+    /// Without a flash there is no FTP, and parameters are lost at a restart.
     pub fn attach_store(&mut self, store: Store) {
         self.services.attach_store(store);
         let Self { services, mission, config, .. } = self;
@@ -20,28 +21,29 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.apply_parameters();
     }
 
-    /// Puts the parameters to use.
+    /// Applies the parameters to the settings, and the settings to guidance.
     pub(crate) fn apply_parameters(&mut self) {
         self.services.apply_parameters(&mut self.config);
         self.guidance.set_limits(&self.config, self.requests.limits());
     }
 
-    /// What the shell has to do with the flash next; once each, then [`Self::handle_flash`] takes
-    /// the result. Drained like the other `poll_*`, but it may take long: nothing else waits for
-    /// it.
+    /// The next flash operation for the shell; `None` where there is none. Each is returned once;
+    /// its outcome goes to [`Self::handle_flash`]. To be called until `None`, like the other
+    /// `poll_*`. An operation may take long: setpoints do not wait for it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
         let erasing = self.erase_permission();
         self.services.poll_flash(self.now, erasing, &mut self.links)
     }
 
-    /// Handles how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an
+    /// Handles the outcome of the operation from [`Self::poll_flash`]: the bytes read, none for an
     /// erasure or a program.
     pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], FlashFault>) {
         self.now = now;
         self.services.handle_flash(outcome);
     }
 
-    /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
+    /// Sectors are erased only on the ground, disarmed, and not while a plan is computed on the
+    /// roadmap.
     pub(crate) fn erase_permission(&self) -> ErasePermission {
         let idle = matches!(
             self.mission.state(),
@@ -61,7 +63,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// PREFLIGHT_REBOOT_SHUTDOWN: this companion restarts, unless the vehicle is armed.
+    /// PREFLIGHT_REBOOT_SHUTDOWN: requests a restart of this companion from the shell, unless the
+    /// vehicle is armed.
     pub(crate) fn handle_restart_command(&mut self, command: &Command) -> u8 {
         let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
         if !asked {
@@ -70,7 +73,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.telemetry.armed {
             return TEMPORARILY_REJECTED;
         }
-        // Full only if the shell does not drain: then it is asked again.
+        // The queue is full only if the shell does not drain the events: then the sender repeats
+        // the command.
         match self.events.push_back(Event::RestartRequested) {
             Ok(()) => ACCEPTED,
             Err(_) => TEMPORARILY_REJECTED,

@@ -1,5 +1,5 @@
-//! A coverage mission whose vehicles are lost: what this one says of itself, where it holds, and
-//! what it asks the shell for.
+//! The division of a coverage mission's area after a loss: what this vehicle reports of itself,
+//! where it holds, and the plan that it requests from the shell.
 
 use planner_core::flight::{Task, VehiclePlan};
 use planner_core::{Length, Point};
@@ -13,18 +13,19 @@ use crate::swarm::detour::flown::RejoinPlace;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, OwnReport};
 use crate::time::Duration;
 
-/// Margin added to the stopping distance when a vehicle commits itself to a hold, metres.
+/// Margin beyond the stopping distance at which a vehicle promises to hold at the earliest, metres.
 const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
-/// A vehicle within this distance of the place where it promised to hold has reached it, metres.
+/// A vehicle within this distance before the place where it promised to hold has reached it,
+/// metres.
 const AT_HOLD_M: f32 = 0.2;
-/// Silence of another vehicle after which a vehicle waits above its own pad: the silent vehicle's
-/// share may yet be given to it.
+/// Silence of another vehicle after which this one, at the end of its path, waits above its pad
+/// instead of descending: it may get a part of the silent vehicle's waypoints.
 pub(super) const MISSED_AFTER: Duration = Duration::from_secs(3);
-/// Time under a pilot's control after which a vehicle has left the mission.
+/// Time under a pilot's control after which a vehicle counts as having left the mission.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
-/// Reported in place of a plan CRC where the rest of the area cannot be divided.
+/// Stands for the plan's CRC where the planner cannot divide the rest of the area.
 const UNDIVIDED: u32 = u32::MAX;
-/// Time after which a shell that has not answered is asked again.
+/// Time after which an unanswered request for a division is sent to the shell again.
 const REQUEST_RETRY: Duration = Duration::from_secs(30);
 
 fn to_decimetres(along_m: f32) -> Option<u16> {
@@ -33,13 +34,14 @@ fn to_decimetres(along_m: f32) -> Option<u16> {
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// The losses of the division that the shell is asked for by [`PlanKind::Division`], division
-    /// by division: the lots of all vehicles by rank.
+    /// The input of the plan requested by [`PlanKind::Division`]: for each division so far, in
+    /// order, the input of every vehicle by rank.
     pub fn losses(&self) -> impl Iterator<Item = &[DivisionInput]> {
         self.neighbours.fleet().into_iter().flat_map(Fleet::losses)
     }
 
-    /// Updates which vehicles still fly, and what of the area is to be divided again.
+    /// Updates the fleet's state and where this vehicle holds, and requests a division's plan if
+    /// one is to be computed or flown.
     pub(super) fn step_division(&mut self) {
         let now = self.now;
         if self.neighbours.fleet().is_none() {
@@ -49,12 +51,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
         let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
-        // A vehicle that has left the mission is on its way to the ground.
+        // Only a vehicle that still takes part waits above its pad.
         let waits =
             fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing(now, MISSED_AFTER));
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
-            // The end of a way around is not its pad.
+            // On a detour the end of the path is not above the pad.
             None if waits && !around && self.guidance.along_m() <= home_m + AT_HOLD_M => home_m,
             None => f32::INFINITY,
         };
@@ -63,12 +65,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let fingerprint = fleet.division_hash();
         self.guidance.set_halt_m(halt_m);
         if wants && self.mission.should_request_division(fingerprint, now, REQUEST_RETRY) {
-            // Full only if the shell does not drain; then it is asked again.
+            // The queue is full only if the shell does not drain; then the request is repeated
+            // after `REQUEST_RETRY`.
             let _ = self.events.push_back(Event::PlanRequested(PlanKind::Division));
         }
     }
 
-    /// State of this vehicle as it reports it to the fleet.
+    /// This vehicle's report of itself to the fleet.
     fn own_fleet_report(&self) -> OwnReport {
         use State::*;
         let state = self.mission.state();
@@ -77,7 +80,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_on_detour()
             || self.detours.is_homeward()
             || self.detours.has_left_plan();
-        // Around something, and back: its part stays its own.
+        // On a detour that leads back to its path it keeps its part of the area.
         let beside = self.detours.is_beside_plan();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
@@ -88,8 +91,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let along_m = self.guidance.progress_m(state, &self.guidance_inputs());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
-        // A vehicle that holds, or waits, may have come a little further than where its descent
-        // begins.
+        // A vehicle that holds above its pad may have overshot the start of its descent a little.
         let descends = self.guidance.along_m() > self.last_descent_start_m() + AT_HOLD_M;
         let nearly_down = flies && descends && self.division_hold_m().is_none();
         let standing = match ends || nearly_down {
@@ -108,13 +110,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 0
             },
             commitment_dm: if on_pad { Some(0) } else { self.commitment_dm().filter(|_| flies) },
-            // Beside its path it waits for its own plan, to fly on to where it promised to hold.
+            // Beside its path it does not hold: it first flies its own plan to where it promised to
+            // hold.
             holds: on_pad || (state == Dividing && !beside),
             wants_division: flies && self.wants_division(),
         }
     }
 
-    /// Whether all are to divide what is left, since its path ends soon, and before its route.
+    /// Whether all are to divide what is left, because this vehicle's path ends soon and its route
+    /// goes on.
     fn wants_division(&self) -> bool {
         let Some(plan) = self.mission.plan() else { return false };
         let Task::Photograph(photographs) = &plan.task else { return false };
@@ -123,14 +127,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
-    /// Whether it has not been started: it may take part as a vehicle that is new.
+    /// Whether this vehicle is on its pad and was not started: it may take part as a new vehicle.
     pub(super) fn is_not_started(&self) -> bool {
         use State::*;
         matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
     }
 
-    /// Whether the vehicle would resume its part after it has reported that it leaves: the others
-    /// may have divided that part by then.
+    /// Whether this vehicle resumes, or could resume, its part after it reported that it leaves:
+    /// the others may have divided that part by then, so it must not.
     fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
@@ -141,7 +145,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && self.neighbours.fleet().is_some_and(Fleet::has_reported_leaving)
     }
 
-    /// Whether it flies home, back, or aside, to land there.
+    /// Whether this vehicle flies home, back along its path, or aside, and lands at the end.
     fn is_landing_off_plan(&self) -> bool {
         let home = self.guidance.returning || self.detours.is_homeward();
         home || (self.guidance.ends_aside && !self.detours.is_beside_plan())
@@ -149,20 +153,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.seeks_landing()
     }
 
-    /// Whether others have divided its part, or count it as lost, while it would fly it.
+    /// Whether this vehicle must not fly its part any more: the others have divided that part, or
+    /// count it as lost.
     pub(super) fn is_excluded(&self) -> bool {
         let excluded = self.neighbours.fleet().is_some_and(Fleet::is_excluded);
         (excluded && !self.is_landing_off_plan()) || self.resumes_too_late()
     }
 
-    /// Place where this vehicle's last descent begins, metres along its path: above its pad.
+    /// Place along its path where its last descent begins, above its pad, metres.
     fn last_descent_start_m(&self) -> f32 {
         let waypoints = self.mission.plan().map_or(&[][..], |plan| plan.path.waypoints());
         waypoints.iter().nth_back(1).map_or(f32::NEG_INFINITY, |home| home.along_m)
     }
 
-    /// Place where this vehicle would hold if it committed itself now: at the last picture that it
-    /// takes soon, no further than its gates are open and no nearer than it can stop.
+    /// Place where this vehicle would hold if it promised now, decimetres along its path: at the
+    /// last picture within `COMMITMENT_S` of flight, no further than its gates are open and no
+    /// nearer than it can stop. `None` where it cannot promise, or has promised.
     fn commitment_dm(&self) -> Option<u16> {
         use State::*;
         let fleet = self.neighbours.fleet()?;
@@ -176,7 +182,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let plan = self.mission.plan()?;
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
-        // A vehicle whose path is blocked comes no further.
+        // A vehicle whose path is blocked promises to hold where it is.
         let promise_s =
             if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
@@ -188,11 +194,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         to_decimetres(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
     }
 
-    /// Place where this vehicle is to hold for a division, metres along its path: while the
-    /// division is under way, and until the new path of this vehicle has come.
+    /// Place where this vehicle is to hold for a division, metres along its path: from its promise
+    /// until it gets its plan of that division. `None` where it does not hold.
     pub(super) fn division_hold_m(&self) -> Option<f32> {
-        // The fleet does not know yet what this vehicle was commanded since the last step. A
-        // promise is a place of its own path.
+        // A promise is a place along its own path, and binds no vehicle that is off that path. The
+        // fleet learns of a command only in the next step.
         let elsewhere = self.is_landing_off_plan() || self.detours.is_beside_plan();
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
         let behind = fleet.division_count() > self.mission.division_count();
@@ -200,14 +206,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         held_dm.or(fleet.commitment_dm()).map(|dm| f32::from(dm) / 10.0)
     }
 
-    /// Whether it stands at that place.
+    /// Whether this vehicle stands where it is to hold for a division.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m().is_some_and(|at_m| {
             self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.is_standing()
         })
     }
 
-    /// Whether no division is under way or to be flown.
+    /// Whether no division is under way, and this vehicle flies by the last binding one.
     pub(super) fn is_undivided(&self) -> bool {
         self.neighbours.fleet().is_none_or(|fleet| {
             let flown = fleet.division_count() == self.mission.division_count()
@@ -216,7 +222,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         })
     }
 
-    /// Whether it stands where the plan after the last division begins.
+    /// Whether this vehicle stands where its plan of the last division begins: on its pad, or where
+    /// it held.
     fn is_at_division_start(&self) -> bool {
         match self.mission.state() {
             State::Ready | State::Scheduled => true,
@@ -225,7 +232,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Continues along its own path beyond the obstacle.
+    /// Takes up its own plan again beyond the obstacle that it flew around.
     fn resume_own_plan(&mut self, plan: &VehiclePlan<W, G>) {
         let Some(RejoinPlace { along_m: back_m, position }) = self.detours.rejoin() else {
             return;
@@ -243,7 +250,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     "Flown around: # waypoints are left",
                     [left, 0],
                 );
-                // Full only if the shell does not drain.
+                // The queue is full only if the shell does not drain the events; then this one is
+                // lost.
                 let _ = self.events.push_back(Event::FlownAround { left });
             }
             self.neighbours.forget_avoided();
@@ -252,7 +260,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.detours.end_field_detour(meets);
     }
 
-    /// Handles the plan that the shell computed for the division.
+    /// Handles the shell's answer to the request for a division's plan.
     pub(super) fn handle_division_plan(
         &mut self,
         outcome: Result<&VehiclePlan<W, G>, PlanFailure>,
@@ -264,9 +272,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let (division, along_m) = (fleet.division_count(), f32::from(fleet.held_at_dm()) / 10.0);
         match outcome {
-            // A shell that is late is asked again.
+            // After a late answer the request is repeated.
             Err(PlanFailure::Late) => {}
-            // All come to the same: each keeps its part, and what the lost one left is left out.
+            // All vehicles fail alike: each keeps its part, and the waypoints of the lost vehicle
+            // are left.
             Err(_) if fleet.needs_division() => {
                 fleet.take_plan_crc(UNDIVIDED);
                 self.links.send_text(true, "What is left cannot be divided");
@@ -294,7 +303,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 if self.mission.accept_division(plan, &place, division, in_air) {
                     self.neighbours.forget_plan();
                     self.detours.forget_plan();
-                    // From now on places are those along the new path.
+                    // From now on places are measured along the new path.
                     match in_air {
                         true => self.guidance.begin_path(self.now),
                         false => self.guidance.reset(),

@@ -1,4 +1,4 @@
-//! What becomes of a frame that came in.
+//! Handles received frames: commands, services, the autopilot's telemetry, other companions.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -23,7 +23,7 @@ use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Returns whether the mission table has to be evaluated.
+    /// Handles a received frame. Returns whether the mission table has to be evaluated now.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
         let own = self.config.system_id;
         let sender =
@@ -94,9 +94,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if change == TelemetryChange::OriginLost {
                     self.timers.set(Timer::Origin, self.now);
-                    // The autopilot may have been restarted and have lost the streams that were
-                    // requested. Positions that jump again and again are no reason to flood the
-                    // link.
+                    // After a restart of the autopilot its telemetry streams have to be requested
+                    // again. The timer keeps a position that jumps again and again from flooding
+                    // the link.
                     if self.timers.is_due(Timer::Streams, self.now) {
                         self.request_streams();
                     }
@@ -121,7 +121,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         {
             return;
         }
-        // The frame's sequence number counts only if the frame decodes.
+        // Only a frame that decodes updates the sender's sequence number.
         if frame.message_id == TUNNEL_DATA::ID {
             if let Some(relay) = Relay::decode(frame.padded(), id) {
                 let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
@@ -174,7 +174,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Rejects a command from a sender without authority.
+    /// Denies a command from a sender that is no ground station of the mission.
     pub(super) fn reject_command(&mut self, link: Link, sender: SenderKind, command: &Command) {
         if command.to_us {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
@@ -191,8 +191,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         );
     }
 
-    /// Returns the answer; none is due to a broadcast, nor to a command that is another
-    /// component's.
+    /// Handles a command and returns its MAV_RESULT; `None`, no COMMAND_ACK, for a broadcast or a
+    /// command to another component.
     pub(super) fn handle_command(
         &mut self,
         link: Link,
@@ -216,7 +216,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             {
                 self.handle_restart_command(command)
             }
-            // A command to all components is for another one.
+            // An unknown command to all components is meant for another one.
             None if !command.to_component => return None,
             None => UNSUPPORTED,
         };

@@ -1,4 +1,4 @@
-//! What the guards of the mission table look at, from the state of the companion.
+//! Computes the inputs of the mission table's guards from the state of the companion.
 
 use planner_core::{Length, Point};
 
@@ -11,30 +11,33 @@ use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::Duration;
 
-/// Distance of a landing from where it was commanded: the stopping distance from cruise, metres.
+/// Greatest horizontal distance from the place where landing was commanded in flight to the
+/// touchdown, metres: the stopping distance from cruise.
 const LANDING_DRIFT_M: f32 = 1.0;
-/// Distance of a landing from where it was commanded for a vehicle that stood still, metres.
+/// Greatest horizontal distance from the place where landing was commanded to the touchdown, for a
+/// vehicle that stood still then, metres.
 const STANDING_DRIFT_M: f32 = 0.3;
-/// Greatest height difference between estimate and pad with which a vehicle takes off, metres: real
-/// estimates on the ground were seen up to 1.1 m off.
+/// Greatest difference between the estimated height on the pad and the pad's height in the plan
+/// with which a vehicle takes off, metres: real estimates on the ground were up to 1.1 m off.
 const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
-/// Silence a second before the lease ends: the row `NeighboursSilent` stops a vehicle a second
-/// after this.
+/// Time without its lease renewed, after which silence counts over an area: 1 s before the lease
+/// ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
-/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may sway around a
-/// setpoint that stands: in gusts it sways further there than between walls it may.
+/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may be off a setpoint
+/// that stands before it lands: gusts push it further there than walls would allow indoors.
 const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
-/// Greatest distance from its setpoint of a vehicle that sways, metres.
+/// Greatest distance from its setpoint at which that additional time applies, metres.
 const MAX_SWAY_M: f32 = 2.0;
-/// A gate nearer ahead than this leaves no path to fly on, metres.
+/// A closed gate nearer ahead than this stops an unheard vehicle: it has no path to fly on, metres.
 const MIN_GATE_AHEAD_M: f32 = 0.2;
-/// Longest time that a climb takes beyond its height at 1 m/s, seconds.
+/// Longest time of a climb beyond 1 s for each metre of height, seconds: idling motors, and the
+/// stop at the top.
 const MAX_CLIMB_BEGINS_S: f32 = 8.0;
-/// Greatest vertical speed of a vehicle that rests on the ground, m/s.
+/// Vertical speed above which a vehicle does not rest on the ground, m/s.
 const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// A snapshot.
+    /// The values of all guards' inputs now.
     pub(crate) fn guard_inputs(&self) -> GuardInputs {
         let (t, now, view) = (&self.telemetry, self.now, self.detour_view());
         let scene = &view.scene;
@@ -44,7 +47,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
                 !offboard && t.custom_mode != self.mission.mode_before()
             }
-            // Disarming after a landing the autopilot chooses a mode of its own.
+            // Disarming after a landing, the autopilot may change to another mode by itself.
             State::Land | State::LandingHeld | State::Disarm => {
                 !offboard && t.custom_mode != kind.land_mode() && t.armed
             }
@@ -69,7 +72,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let sways = self.config.division.is_some() && self.guidance.lead_m(t) < MAX_SWAY_M;
         let sways_for = if sways { MAX_SWAY_OVER_AREA } else { Duration::default() };
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
-        // What something holds gets nowhere else.
+        // A vehicle that something holds cannot fly home or aside: it can only land.
         let can_leave = unfollowed_for < UNFOLLOWED_MOST;
         GuardInputs {
             in_state: self.mission.time_in_state(now),
@@ -78,8 +81,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             jumped: t.is_settling(now),
             stalled_for: match self.mission.state() {
                 State::Follow => now - self.guidance.last_progress_at(),
-                // The vehicle may have stood for a gate long before. Where it can fly home it does
-                // not land for that.
+                // Where the vehicle can still fly home, its standstill at a gate before the block
+                // does not count.
                 State::Blocked if over_field && sought_home.is_none() => {
                     self.detours.blocked_for(now)
                 }
@@ -90,8 +93,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             unfollowed_for,
             blocked_for: self.detours.blocked_for(now),
-            // On its way back, or aside to land, it is already on its way to the ground: it does
-            // not stop for want of being heard.
+            // A vehicle that flies back, or aside to land, does not stop because no other vehicle
+            // hears it: it is about to land anyway.
             neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
                 fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER)
             } else {
@@ -172,13 +175,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.neighbours.is_path_clear_since(self.mission.entered_at())
                 && (self.is_linked() || self.neighbours.are_all_at_rest()),
             climb_done: self.mission.state() == State::Climb && self.guidance.is_climb_done(scene),
-            // The ground may be higher than where its pad is said to be.
+            // The ground may be higher than the plan says: a reported landing ends the descent.
             path_done: follow
                 && (self.guidance.is_path_done(scene, now)
                     || (self.guidance.is_descending() && on_ground)),
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
-                // These interrupted states do not depend on a place on the path.
+                // Resuming a take-off or a landing does not depend on a place along the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
                 (_, State::PilotReturned) => self.guidance.is_near_path(scene, REJOIN_WINDOW_M),
                 (_, State::PositionLost) => self.guidance.is_near_path(scene, LOST_WINDOW_M),
@@ -219,21 +222,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Time for which the descent to its pad, or the way there, has been barred.
+    /// Time for which other vehicles have barred the descent to its pad, or the path there.
     fn pad_blocked_for(&self) -> Duration {
         let follow = self.mission.state() == State::Follow;
         let homeward = self.guidance.returning || self.detours.is_homeward();
         let descends = self.guidance.is_descending();
         match follow && (homeward || (descends && self.config.division.is_some())) {
             true if homeward && descends => self.guidance.filter.hindered_for(self.now),
-            // At the end of its path over an area there is no other way to its pad either.
+            // The end of its path over an area is above its pad: there is no other way down to
+            // that.
             true => self.guidance.filter.blocked_for_good_for(self.now),
             false => Duration::default(),
         }
     }
 
-    /// Whether others are heard and hear it: in a coverage mission a majority of those that take
-    /// part.
+    /// Whether this vehicle lately heard others and they heard it (within 1 s); in a coverage
+    /// mission, whether a majority of those that take part reported that they hear it.
     fn is_linked(&self) -> bool {
         match self.neighbours.fleet() {
             Some(fleet) => fleet.unheard_for(self.now) < HEARTBEAT_EVERY,
@@ -241,7 +245,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it may continue its plan although no other vehicle hears it.
+    /// Whether a vehicle in this state may continue its plan while no other vehicle hears it: only
+    /// where the radio's range is known.
     pub(super) fn may_fly_unheard(&self) -> bool {
         let follows = matches!(
             self.mission.state(),
@@ -254,7 +259,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         ranged && follows && !left && !self.guidance.returning && self.mission.plan().is_some()
     }
 
-    /// Whether it flies on its plan unheard: its next gate is open, or none is left.
+    /// Whether this vehicle continues its plan with all others out of range: its next gate is open,
+    /// or none is left.
     fn is_flying_unheard(&self) -> bool {
         let length_m = self.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let clear_m = self.guidance.gates_open_up_to_m(&self.detour_view().scene);
@@ -263,9 +269,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && (clear_m > self.guidance.along_m() + MIN_GATE_AHEAD_M || clear_m >= length_m)
     }
 
-    /// Place on its plan up to which this vehicle flies while it is unheard, metres along its path,
-    /// and the seconds by which its gates and its climb delay it beyond a flight at the assumed
-    /// speed from `progress_m`; −1e6 where it does not fly on.
+    /// Place along its path up to which this vehicle flies while it is unheard, metres, and the
+    /// seconds by which its gates and its climb delay it, compared with a flight from `progress_m`
+    /// at 0.4 of the nominal speed; (−1e6, 0) where it does not fly on.
     pub(super) fn unheard_reach_m(&self, progress_m: f32) -> (f32, u8) {
         match self.may_fly_unheard() {
             true => {
@@ -276,8 +282,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     progress_m,
                     self.now,
                 );
-                // The motors idle at first, and the vehicle comes to rest at the top. A metre a
-                // second is slow.
+                // Idling motors before, and the stop at the top after it, on top of a climb at 1
+                // m/s, which is slow.
                 let climb_s = if progress_m < 0.0 {
                     MAX_CLIMB_BEGINS_S + libm::ceilf(-progress_m)
                 } else {
@@ -289,8 +295,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it comes down whatever is below: with a battery that is nearly empty, or no place
-    /// known to hold.
+    /// Whether this vehicle lands whatever is below: the battery is nearly empty, or its position
+    /// is unknown or in another frame, so that it cannot hold.
     pub(crate) fn must_land(&self) -> bool {
         let t = &self.telemetry;
         t.charge_below(self.config.battery_low_percent / 2)

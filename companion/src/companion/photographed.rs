@@ -1,5 +1,5 @@
-//! What of the area is photographed: noted in flight, kept in flash, exchanged, and left out by the
-//! next plan.
+//! The photographed waypoints of an area: noted in flight, stored in flash, exchanged between
+//! vehicles, and left out by the next start's plan.
 
 use mavlink::dialects::ardupilotmega::NAMED_VALUE_FLOAT_DATA;
 use planner_core::flight::WaypointRange;
@@ -12,35 +12,39 @@ use crate::mission::State;
 use crate::time::Duration;
 use crate::timers::Timer;
 
-/// Period at which photographed waypoints are noted and their number is sent.
+/// Period at which the photographed waypoints are noted, stored and counted.
 const NOTE_EVERY: Duration = Duration::from_millis(1000);
-/// Time within which others on the ground report what they know: they report each second, and half
-/// of the messages are lost.
+/// Time within which each vehicle on the ground has heard the reports of the others: they come each
+/// second, and half of the messages may be lost.
 const OTHERS_REPORT_WITHIN: Duration = Duration::from_secs(5);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Waypoints of the area that the plan asked for by [`crate::events::PlanKind::Mission`] leaves
-    /// out, those asked for later too.
+    /// Waypoints of the area that the plan requested by [`crate::events::PlanKind::Mission`] leaves
+    /// out, because earlier flights photographed them. Plans of divisions in the same flight leave
+    /// them out too.
     pub fn excluded_waypoints(&self) -> &[WaypointRange] {
         self.mission.photographed().waypoints_left_out()
     }
 
-    /// Whether the mission is an area.
+    /// Whether the mission photographs an area.
     fn is_area_mission(&self) -> bool {
         self.neighbours.fleet().is_some()
     }
 
-    /// Whether it stands on its pad before its start, and is to plan the same as others that do.
+    /// Whether this vehicle stands on its pad before its take-off, where it has to compute the same
+    /// plan as the others.
     fn plans_with_others(&self) -> bool {
         self.is_not_started() || self.mission.state() == State::Scheduled
     }
 
-    /// Whether it has left its pad, so that more may come.
+    /// Whether this vehicle has taken off and not finished, so that it may photograph further
+    /// waypoints.
     fn has_left_pad(&self) -> bool {
         !self.plans_with_others() && !matches!(self.mission.state(), State::Done | State::Aborted)
     }
 
-    /// Notes what it has photographed, where it is on its plan.
+    /// Notes, stores and reports the photographed waypoints; those of the own path only while it is
+    /// on its plan.
     pub(super) fn update_photographed(&mut self, off_plan: bool) {
         if !self.is_area_mission() || !self.timers.take_due(Timer::Done, self.now, NOTE_EVERY) {
             return;
@@ -63,7 +67,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The report of photographed waypoints to other vehicles.
+    /// This vehicle's report of the photographed waypoints to the others.
     pub(super) fn done_report(&mut self) -> DoneReport {
         let (waits, flies) = (self.plans_with_others(), self.has_left_pad());
         let report = self.mission.photographed_mut().report(waits, flies);
@@ -74,7 +78,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles a report of photographed waypoints from another vehicle.
+    /// Handles another vehicle's report of photographed waypoints.
     pub(super) fn handle_done_report(&mut self, report: &DoneReport) {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
@@ -84,8 +88,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The number of waypoints that this vehicle knows to be photographed, as a value to be
-    /// plotted.
+    /// NAMED_VALUE_FLOAT with the number of waypoints that this vehicle knows to be photographed.
     pub(super) fn done_count_message(&self) -> NAMED_VALUE_FLOAT_DATA {
         NAMED_VALUE_FLOAT_DATA {
             time_boot_ms: self.now.as_boot_ms(),
@@ -94,16 +97,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it has stood ready for as long as others take to say what they know, and all that
-    /// are heard have its plan.
+    /// Whether this vehicle's plan agrees with the others': it has stood ready for as long as their
+    /// reports take, and no vehicle was heard with another plan. True where the mission is no area.
     pub(super) fn plans_as_others(&self) -> bool {
         !self.is_area_mission()
             || (self.mission.time_in_state(self.now) >= OTHERS_REPORT_WITHIN
                 && !self.hears_another_plan())
     }
 
-    /// Whether a vehicle that follows another plan of this mission was heard lately: their gates do
-    /// not fit.
+    /// Whether a vehicle was heard lately that follows another plan of this mission: the gates of
+    /// two plans do not fit each other.
     pub(super) fn hears_another_plan(&self) -> bool {
         self.is_area_mission() && self.neighbours.hears_another_plan(self.now)
     }

@@ -1,4 +1,4 @@
-//! Ways around: what is requested of the shell, and what becomes of its answer.
+//! Detours: requests them from the shell, and handles the shell's answers.
 
 use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::flight::VehiclePlan;
@@ -13,12 +13,12 @@ use crate::swarm::detour::asking::RetryOutlook;
 use crate::swarm::detour::flown::{DetourPurpose, RejoinPlace, RejoinPlaces};
 use crate::swarm::view::DetourView;
 
-/// A detour ends at most this far from the place where the vehicle is to come back to its path,
-/// metres.
+/// Greatest distance between the end of a detour and the place where the vehicle is to come back to
+/// its path, metres: a detour that ends further away is refused.
 const MAX_REJOIN_ERROR_M: f32 = 0.2;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// The view that decisions about detours follow from.
+    /// References to the companion's parts by which decisions about detours are made.
     pub(crate) fn detour_view(&self) -> DetourView<'_, V, W, G> {
         DetourView {
             now: self.now,
@@ -31,7 +31,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Remembers, on entering a state, where it was before its position jumped.
+    /// Remembers the position from before a jump, if the new state `to` is one that a jump leads
+    /// to.
     pub(super) fn save_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
@@ -41,7 +42,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         detours.save_place_before_jump(to, &view);
     }
 
-    /// Scans for obstacles on the path, and checks whether the others stand.
+    /// Continues the scan of the path for obstacles, and checks whether the other vehicles stand.
     pub(super) fn scan_for_obstacles(&mut self) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
@@ -53,28 +54,30 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Requests a detour, or a path aside, from the shell.
+    /// Requests a path from the shell: a detour, aside, home or back, by its purpose.
     pub(super) fn request_detour(&mut self, aim: DetourPurpose) {
         self.detours.note_request(aim);
         self.guidance.reset_trap_timer();
         self.mission.forget_failure();
-        // Full only if the shell does not drain; then the detour is late.
+        // The queue is full only if the shell does not drain the events; then the request is made
+        // again.
         let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
     }
 
-    /// Requests a path aside, from under a vehicle that comes down; over a field another one leads
-    /// back to its path from there.
+    /// Requests a path aside, out of the column under a vehicle that descends. Over an area a
+    /// second path leads back from there.
     pub(super) fn request_detour_aside(&mut self, from: State) {
-        // On its way back, or to a place to land at, it was to land already.
+        // A vehicle that flies back, or to a landing place aside, seeks another landing place.
         if self.guidance.returning || self.detours.lands_at_end() {
             return self.request_detour(DetourPurpose::Landing);
         }
         self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
     }
 
-    /// Where it comes back to its path over a field: where it left that before, or holds for a
-    /// division, or stands; and beyond what blocks the path, if there is such a place and it did
-    /// not promise to hold before.
+    /// Over an area, the places where a vehicle that goes aside comes back to its path: where it
+    /// left that before, or holds for a division, or stands; and, unless it promised to hold
+    /// before, the first free place beyond what blocks the path. `None` for a vehicle that does not
+    /// come back.
     fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlaces> {
         if !self.detours.keeps_to_plan_over_field(&self.detour_view()) {
             return None;
@@ -90,8 +93,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(RejoinPlaces { own, beyond: beyond.unwrap_or(own) })
     }
 
-    /// The first place of its path over a field beyond what blocks that.
-    // Its body in both callers would take half a kilobyte of flash.
+    /// The first free place along its path over an area beyond what blocks the path.
+    // Inlined into both callers it would take half a kilobyte of flash.
     #[inline(never)]
     fn place_beyond_block(&self) -> Option<RejoinPlace> {
         self.detours.rejoin_m(&self.detour_view()).and_then(|at_m| self.place_on_path(at_m))
@@ -103,7 +106,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(RejoinPlace { along_m, position })
     }
 
-    /// Requests a detour around the obstacle on its path over a field, and back to the path.
+    /// Requests a detour around the obstacle on its path over an area, which leads back to the
+    /// path.
     pub(super) fn request_detour_back_to_path(&mut self) {
         let rejoin = match self.detours.is_beside_plan() {
             true => self.detours.rejoin_from_aside(&self.detour_view()),
@@ -118,17 +122,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The detour that [`PlanKind::Detour`] requests of the shell; `None` if none is requested, or
-    /// none can be planned. `tell` is given all keep-out zones. The next answer counts for this
-    /// request: one that comes before the shell has read a request was to an older one, and is
-    /// ignored.
+    /// The detour that [`PlanKind::Detour`] requests from the shell; `None` if none is requested,
+    /// or none can be planned. `tell` is called with each keep-out zone. The next answer counts for
+    /// this request: an answer before the shell has read a request belongs to an older request and
+    /// is ignored.
     pub fn detour_request(&mut self, tell: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
         self.detours.note_request_read();
         if replans { self.detours.detour_request(&self.detour_view(), tell) } else { None }
     }
 
-    /// Begins the requested detour.
+    /// Switches to the detour that the shell has planned, or refuses it where it starts or ends
+    /// elsewhere.
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
@@ -144,29 +149,30 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.switch_to_detour(detour, progress_m, ground_m);
         self.detours.begin_detour(purpose, progress_m, self.now, self.guidance.last_progress_at());
         self.neighbours.mark_avoided(self.now);
-        // Whatever comes next, it is on this path: on the ground it is not on any.
+        // In the air the vehicle follows the detour from its start. On the pad the climb comes
+        // first.
         if self.mission.state() == State::Replanning {
             self.guidance.begin_path(self.now);
             self.guidance.ends_aside = self.detours.ends_aside();
         }
     }
 
-    /// The purpose of a detour that has come and ends at `ends`; `None` if it may not be flown by
-    /// now.
+    /// The purpose for which a detour that ends at `ends` may be flown; `None` if it ends elsewhere
+    /// than requested, or promises made since forbid it.
     fn checked_purpose(
         &self,
         purpose: DetourPurpose,
         ends: Option<Point>,
     ) -> Option<DetourPurpose> {
-        // A promise made meanwhile is along the vehicle's own path.
+        // Where the vehicle promised since then to hold for a division, along its own path.
         let promised_m = self.division_hold_m();
         match purpose {
             DetourPurpose::Back(back) => {
-                // An answer may be late, and be for another request.
+                // A late answer may belong to another request, and end elsewhere.
                 let leads_back = (ends? - back.position).length() < MAX_REJOIN_ERROR_M;
                 (leads_back && promised_m.is_none()).then_some(purpose)
             }
-            // From aside it comes back no further than there.
+            // From aside it comes back to its path no further than where it promised to hold.
             DetourPurpose::Aside(Some(places)) => {
                 let allowed =
                     |place: &RejoinPlace| promised_m.is_none_or(|at_m| place.along_m <= at_m);
@@ -181,7 +187,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The requested detour does not exist.
+    /// Handles that the shell has found no detour: decides whether and when another search makes
+    /// sense.
     pub(super) fn handle_detour_failure(&mut self, failure: PlanFailure) {
         self.mission.set_failure(failure);
         let outlook = if self.neighbours.any_comes_down_unheard(self.now) {

@@ -1,4 +1,4 @@
-//! The step that is due, and what the rows of the table have done.
+//! The control step, and the actions of the mission table's rows.
 
 use super::{Companion, IDLE_STEP_EVERY, MAX_ROWS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
 use crate::autopilot::requests::DISARM_EVERY;
@@ -14,7 +14,8 @@ use crate::swarm::detour::flown::DetourPurpose;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// One step of the control loop: reference, mission table, and requests to the autopilot.
+    /// One step of the control loop: guidance, division, scan of the path, mission table, requests
+    /// to the autopilot.
     pub(super) fn step(&mut self) {
         let now = self.now;
         if self.services.has_unapplied_parameters()
@@ -56,7 +57,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.timers.schedule_next(Timer::Step, now, every);
     }
 
-    /// Sends the task's commands that are due at this place.
+    /// Sends the commands of the task (pictures, camera) that are due at the vehicle's place.
     fn step_task(&mut self) {
         let state = self.mission.state();
         let off_plan =
@@ -64,7 +65,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.update_photographed(off_plan);
         let along = PathProgress {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
-            // A vehicle that brakes along its path takes the pictures that it passes.
+            // A vehicle that brakes along its path still takes the pictures that it passes.
             place: match state.holds_place() {
                 true if self.detours.is_beside_plan() && !self.guidance.returning => {
                     PathRelation::Beside
@@ -76,8 +77,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.step_task(along, self.now, &mut self.links);
     }
 
-    /// Notes whether something keeps it on its pad: a vehicle in its column, or what is on its
-    /// path.
+    /// Notes whether a vehicle that is due to depart is kept on its pad by another vehicle in the
+    /// column above the pad, or by a blocked path.
     fn note_barred_start(&mut self) {
         let due = self.mission.departure_due(self.now) && self.guidance.advice.stop_within_m > 0.05;
         let waits =
@@ -86,7 +87,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.note_start_barred(barred, self.now);
     }
 
-    /// Reports a vehicle that has not started while this one waits for it.
+    /// Reports, by text and event, a vehicle that this one waits for and that was not started.
     fn report_unstarted_vehicle(&mut self) {
         let flies =
             matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
@@ -98,16 +99,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 "Waiting for vehicle #: it has not started",
                 [u32::from(id), 0],
             );
-            // Full only if the shell does not drain.
+            // The queue is full only if the shell does not drain the events.
             let _ = self.events.push_back(Event::WaitsForStart { id });
         }
     }
 
-    /// Compares the estimate's bound with what the margin leaves, and sets the pace.
+    /// Sets the share of the speed at which the error bound of the position estimate fits into the
+    /// margin to walls, and reports a change.
     pub(super) fn check_estimate_error(&mut self) {
         let (now, config) = (self.now, &self.config);
         let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
-        // The best that a receiver can do was weighed when the margin was chosen.
+        // A bound as good as the best receiver's refuses nothing: the operator chose the margin.
         let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_M {
             true => 1.0,
             false => margins::speed_share_for_bound(
@@ -122,7 +124,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if kind(before) == kind(pace) || !self.mission.state().streams_setpoints() {
             return;
         }
-        // Whole centimetres, rounded up; more than a hundred metres is not known.
+        // In whole centimetres, rounded up; a bound above 100 m stands for an unknown accuracy.
         let cm = libm::ceilf(libm::fminf(bound_m, 100.0) * 100.0) as u32;
         let room_m = margins::estimate_margin_m(
             config.required_clearance_m,
@@ -151,13 +153,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
-        // A landing that sought a place goes on as one, whatever interrupts the search.
+        // A vehicle that sought a landing place resumes, after an interruption, as a landing.
         let lands =
             self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
         let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, lands, now);
         self.requests.state_changed(from, to);
         self.run_action(from, to, row);
-        // Whatever interrupts a search ends it.
+        // Leaving a replanning state ends the search for a detour.
         if matches!(from, State::Replanning | State::PadReplanning) {
             self.detours.end_search();
         }
@@ -170,10 +172,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if let Some(text) = self.mission.interruption_text(from, to) {
             self.links.send_text(false, text);
         }
-        // Full only if the shell does not drain: then the newest is lost.
+        // The queue is full only if the shell does not drain: then this event is lost.
         let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
         let _ = self.events.push_back(changed);
-        // The step that the new state needs is due now.
+        // Where setpoints begin to stream, the next step is due at once.
         if to.streams_setpoints() && !from.streams_setpoints() {
             self.timers.set(Timer::Step, now);
         }
@@ -253,8 +255,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
-        // Whom no other vehicle hears is kept clear where it may lie: it comes down as straight as
-        // it can be led. A landing that waited continues as it began.
+        // Others keep clear of where an unheard vehicle may lie, so it is led straight down. A
+        // landing that was held continues as it began, led or by the autopilot.
         if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
             return self.guidance.begin_guided_landing(self.now);
         }
@@ -264,12 +266,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | Disarm => {
                 self.guidance.begin_braking();
             }
-            // Off the path, or not known to be on it: the reference may be beyond a wall.
+            // Off the path the reference may be behind a wall, so it holds where the vehicle is.
             _ => self.guidance.hold_at(position),
         }
     }
 
-    /// Resumes the state that was interrupted.
+    /// Resumes, in guidance, the state `to` that was interrupted.
     pub(super) fn resume_interrupted_state(&mut self, from: State, to: State) {
         let (now, position) = (self.now, self.telemetry.position);
         match to {
@@ -282,7 +284,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     self.guidance.resume_flight(plan, climbs, &position, now);
                 }
                 if to == State::Blocked {
-                    // Until the next scan has checked the path.
+                    // Counts as blocked until the next scan has checked the path.
                     self.detours.assume_blocked();
                 }
                 if !matches!(to, State::Climb | State::Follow) {

@@ -1,4 +1,4 @@
-//! Frames out: what is made fresh when a link is polled.
+//! Frames sent: chooses, and makes from the newest state, the next frame when a link is polled.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -19,15 +19,16 @@ use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
 
-/// Time for which a vehicle flies on its part of an area after it was last heard, seconds: the
-/// lease, the age of what renews it, a message's delay, and half of the longest stop.
+/// Longest time for which a vehicle over an area flies on along its part after it was last heard,
+/// seconds: its lease of 20 s, 1.8 s for the age of the report that renewed it, 2 s of message
+/// delay, and half of the longest stop.
 const UNHEARD_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
-/// Bit of a setpoint's type mask: its heading is ignored.
+/// Bit of `type_mask` in SET_POSITION_TARGET_LOCAL_NED: the yaw is ignored.
 const MASK_YAW_IGNORED: u16 = 0x400;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than
-    /// [`frame::MAX_FRAME_LEN`].
+    /// Writes the next frame for a link to `out`. Returns its length; 0 when there is none, or
+    /// `out` is shorter than [`frame::MAX_FRAME_LEN`].
     pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
         if out.len() < frame::MAX_FRAME_LEN {
             return 0;
@@ -108,8 +109,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         length
     }
 
-    /// Relays vehicles that neighbours do not hear, while the rate limit has enough for answers
-    /// too.
+    /// Writes a message that relays the progress of vehicles that some neighbour does not hear,
+    /// while more than half of the radio's token bucket is left for answers. Returns its length, 0
+    /// for none.
     fn relay_neighbours(&mut self, out: &mut [u8]) -> usize {
         if !self.links.is_radio_bucket_half_full()
             || !self.links.take_due(Link::Swarm, OnDemandMessage::Relay)
@@ -128,7 +130,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
-    /// Writes an answer that was requested, or a message that waits to be sent.
+    /// Writes AUTOPILOT_VERSION if requested, else the link's first queued message, else an FTP
+    /// reply; 0 for none.
     fn transmit_answer(&mut self, link: Link, out: &mut [u8]) -> usize {
         let system = self.config.system_id;
         if self.links.take_due(link, OnDemandMessage::Version) {
@@ -148,12 +151,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         frame::encode_raw(header, id, extra, &payload, out)
     }
 
-    /// Sends a person a text by STATUSTEXT on both links, at most 50 bytes.
+    /// Queues a STATUSTEXT, at most 50 bytes, on both links.
     pub fn send_text(&mut self, warning: bool, text: &'static str) {
         self.links.send_text(warning, text);
     }
 
-    /// As `send_text`, with numbers: each `#` of the text stands for one.
+    /// Queues a STATUSTEXT on both links; each `#` in the text is replaced by one of the numbers.
     pub fn send_text_with_numbers(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
         self.links.send_text_with_numbers(warning, text, numbers);
     }
@@ -193,7 +196,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             afx: acceleration.x,
             afy: acceleration.y,
             afz: acceleration.z,
-            // Clockwise from north.
+            // ENU heading (counter-clockwise from east) to MAVLink's yaw (clockwise from north).
             yaw: heading.map_or(0.0, |heading| core::f32::consts::FRAC_PI_2 - heading),
             type_mask: PositionTargetTypemask::from_bits_truncate(match heading {
                 Some(_) => mask & !MASK_YAW_IGNORED,
@@ -232,7 +235,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let place = frames::enu_to_geodetic(&self.config.origin, &reported.position);
         let cm = frames::swap_enu_ned(&reported.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
-            // When the position was known, so that a copy is known as one.
+            // The time at which the position was measured, so that receivers recognise a repeated
+            // one.
             time_boot_ms: reported.at.as_boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
@@ -268,8 +272,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Dividing
                     | Paused
             )
-            // One that waits unheard for its gates to open follows the plan, whenever it was heard
-            // last.
+            // In `Alone` a vehicle that may fly on unheard waits for its gates, so it still follows
+            // the plan.
             || self.mission.state() == Alone && self.may_fly_unheard()
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
                 && self.guidance.is_at_goal(&self.guidance_inputs());
@@ -315,13 +319,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Adds, over an area, the points that it flies along beyond those if no other vehicle hears it
-    /// any more: as far as its lease takes it, or to the end where it has left and needs none.
+    /// Appends, over an area, the corners of the path beyond the points ahead, along which this
+    /// vehicle flies if no other vehicle hears it: as far as its lease takes it, or to the end
+    /// where it has left the mission and needs no lease.
     fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         let flies = self.mission.state().flies_on_lease();
         let descends = self.guidance.along_m() >= 0.0 && self.guidance.is_descending();
         let Some(plan) = self.mission.plan().filter(|_| flies && !descends) else { return };
-        // Full after eight: further is not reported.
+        // With `MAX_POINTS` points the list is full: later corners are not reported.
         let mut add = |point: Point| _ = points.push(point);
         let (path, on_path) = (&plan.path, self.guidance.along_m() >= 0.0);
         let from_m = if on_path { self.guidance.setpoint_m } else { 0.0 };
@@ -337,8 +342,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         path.point_at(most_m).filter(|_| most_m > stops_m).into_iter().for_each(add);
     }
 
-    /// Place along its path beyond which it does not fly unheard over an area, metres; none
-    /// elsewhere.
+    /// Place along this vehicle's path, metres, up to which it flies over an area while no other
+    /// vehicle hears it; `None` in a mission without an area.
     fn unheard_limit_m(&self) -> Option<f32> {
         let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
         let lease_m = UNHEARD_S * self.config.cruise_mps;
@@ -347,19 +352,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(most_m.min(plan.path.length_m()))
     }
 
-    /// Place along its path to which the points lead that it reports, metres.
+    /// Place along this vehicle's path where the points of its intent end, metres.
     fn reported_ends_m(&self) -> f32 {
         let from_m = self.guidance.setpoint_m;
         let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_on();
         let Some(plan) = self.mission.plan().filter(|_| flies) else { return from_m };
-        // With the setpoint as many as there is room for.
+        // The setpoint and these waypoints are as many points as an intent holds.
         let last =
             plan.path.waypoints().iter().filter(|w| w.along_m > from_m).nth(intent::MAX_POINTS - 2);
         self.guidance.stops_at_m.max(from_m).min(last.map_or(f32::INFINITY, |last| last.along_m))
     }
 
-    /// The points that it flies along next, as far as it will go for now, and whether it may come
-    /// down from where it is.
+    /// Points along which this vehicle flies next, from its setpoint to where it will stop for now;
+    /// and whether it may come down from where it is (it climbs, descends, lands, or does not
+    /// stream setpoints).
     fn points_ahead(&self) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
         use State::*;
         let mut points = heapless::Vec::new();
@@ -369,7 +375,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => here,
         };
         let mut add = |point: Point| {
-            // Full after eight: the rest is further than it can fly before it is heard again.
+            // With `MAX_POINTS` points the list is full: the rest is further than it flies before
+            // its next intent.
             let _ = points.push(point);
         };
         let Some(plan) = self.mission.plan() else { return (points, true) };
@@ -377,7 +384,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (first, last) = (path.point_at(0.0), path.point_at(path.length_m()));
         let mut column = true;
         match self.mission.state() {
-            // On the pad too: it may lift off before it is heard again.
+            // On the pad too: it may have lifted off before its next intent is heard.
             Scheduled | PadReplanning | Streaming | Engaging | Arming | TakeOff | Climb => {
                 add(setpoint);
                 first.into_iter().for_each(add);

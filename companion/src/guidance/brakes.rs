@@ -1,4 +1,5 @@
-//! Where the reference stops on its path, and when it steps back from there.
+//! Where the reference stops on its path, and when it steps back from below a vehicle that
+//! descends.
 
 use planner_core::deconflict::Advice;
 use planner_core::flight::Path;
@@ -9,37 +10,38 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
-/// Distance ahead within which a stop is a place to wait at, metres.
+/// A stop nearer ahead than this is the place where the vehicle will wait, metres.
 const WAIT_WITHIN_M: f32 = 8.0;
-/// Age within which a report that a vehicle hears us shows that it is linked.
+/// Age below which a report that others hear this vehicle shows that it is linked.
 const LINKED_WITHIN: Duration = Duration::from_millis(800);
 /// Drift in gusts of a vehicle that its autopilot lands from a standstill, with some reserve,
 /// metres.
 const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
 
-/// Distance beyond the way that others know of for which a vehicle does not fly back, metres.
+/// A vehicle this little beyond the part of its path that others know does not fly back, metres.
 const BEYOND_KNOWN_M: f32 = 0.3;
 
-/// Setpoint faster than this gets away from below a vehicle that comes down, m/s.
+/// A setpoint faster than this is leaving the column below a vehicle that descends, m/s.
 const ESCAPES_MPS: f32 = 0.5;
 
 impl Guidance {
-    /// An intent of `sent_at` has arrived, whose points lead to `ends_m` along the path.
+    /// Notes that another vehicle has acknowledged the intent sent at `sent_at`, whose points lead
+    /// to `ends_m` along the path.
     pub(crate) fn note_reported_way(&mut self, sent_at: Instant, ends_m: f32) {
         if sent_at > self.known_way.since {
             self.known_way.to_m = ends_m;
         }
     }
 
-    /// Stops the setpoint where it is: the state that follows does not go.
+    /// Ends an evasion, so that the setpoint stops where it is: the next state does not fly on.
     pub fn begin_braking(&mut self) {
         self.evade_search.reset();
     }
 
-    /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a
-    /// place ahead is flown on to. One that is alone steps back from above one that lies below, to
-    /// land beside it, but not beyond where others last heard it to be: they look for it from there
-    /// on.
+    /// Seeks a place to step back to, out from below a vehicle that descends; a place ahead is
+    /// flown to. A vehicle in `Alone` steps back from above one that may lie below, to land beside
+    /// it, and to the end of the part of its path that others know, never beyond where they last
+    /// heard it.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,
@@ -55,7 +57,7 @@ impl Guidance {
                 along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let (alone, follows) = (state == State::Alone, state == State::Follow);
-        // On its way down it continues, and on its way aside.
+        // A vehicle in its descent, or on its way aside, flies on.
         let waits = state.holds_place()
             && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_aside && follows);
@@ -91,15 +93,16 @@ impl Guidance {
         self.no_better_place = nowhere;
     }
 
-    /// Place along its path up to which others look for it once it is `alone`, metres. Gates that
-    /// opened since may have led it further than it could tell. Over an area, and where the range
-    /// is known, they expect it further on.
+    /// Place along its path up to which others expect an `alone` vehicle, metres: gates that opened
+    /// since may have led it beyond what it could report. ∞ for any other vehicle, over an area,
+    /// and with a known radio range, where they expect it further on.
     fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
         let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
         if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
     }
 
-    /// After the raw points of a step; `blocked` if one of them could not go back.
+    /// Notes whether the vehicle is trapped below one that descends: no place is better, or the way
+    /// back is barred. `blocked`: a raw point of this step could not go back.
     pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {
         let barred = blocked || (self.filter.scans_backwards() && self.filter.is_stopped());
         if self.no_better_place || (self.back_to_m.is_some() && barred) {

@@ -1,16 +1,16 @@
-//! Out from under a vehicle that comes down: one that waits below it flies back along its path
-//! until it is beside the column.
+//! Leaving the column below a vehicle that descends: a vehicle that waits there flies back along
+//! its path until it is beside the column.
 //!
-//! A vehicle that left the plan and is still in the air will land, by its autopilot and without
-//! looking. Nobody waits within [`EVADE_MARGIN_M`] beyond the safety distance of the column it may
-//! come down in (`neighbours.rs`): a place to wait that is there is exchanged for the nearest one
-//! before it on the path; a vehicle that holds its place waits where it stands. Back is where this
-//! vehicle came from, so the way is free of walls; a vehicle behind is not come nearer to than
-//! [`FOLLOWER_STRAY_M`] beyond the safety distance.
+//! A vehicle that left the plan and is still in the air is landed by its autopilot, which does not
+//! look. No vehicle waits within [`EVADE_MARGIN_M`] beyond the safety distance of the column in
+//! which that one may come down (`neighbours.rs`). A vehicle that is to wait at a place in there
+//! waits at the nearest free place before it on its path; one that holds its place there flies back
+//! from where it stands. It came that way, so the way is free of walls. It comes no nearer to a
+//! vehicle behind it than [`FOLLOWER_STRAY_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several
 //! steps: one for the column of one neighbour, a dozen among the most columns there can be; in
-//! theory six for each place, if each is held by a column of its own.
+//! theory six for each place, if each place is inside a column of its own.
 
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOutZone;
@@ -20,54 +20,57 @@ use planner_core::{Length, Point};
 
 use crate::swarm::sweep::IncrementalScan;
 
-/// Drift of the vehicle that descends and sway of the one below, together, metres.
+/// Drift of the vehicle that descends and sway of the one below, together, metres: kept beyond the
+/// safety distance.
 pub const EVADE_MARGIN_M: f32 = 0.6;
-/// Stray of two vehicles from their paths, together, metres.
+/// Deviation of two vehicles from their paths, together, metres: kept beyond the safety distance
+/// from a vehicle behind.
 const FOLLOWER_STRAY_M: f32 = 0.6;
 /// Spacing of the places along the path that are compared, metres.
 const PLACE_STEP_M: f32 = 0.25;
-/// Most places along the path that one search compares.
+/// Maximum number of places along the path that one search compares.
 const MAX_PLACES: u16 = 48;
-/// Greatest cost of a search in one step: neighbours, columns, and [`PLACE_COST`] for each place.
+/// Greatest cost of a search in one step: 1 for each neighbour and for each column, and
+/// [`PLACE_COST`] for each place.
 const MAX_SEARCH_COST: u16 = 96;
 const PLACE_COST: u16 = 4;
-/// Fastest on a straight leg, m/s.
+/// Greatest speed back along a straight leg, m/s.
 const MAX_LEG_MPS: f32 = 1.5;
-/// Fastest through the ends of a leg, m/s: at this speed the vehicle deviates from a right angle by
-/// 0.47 m.
+/// Greatest speed back through a waypoint, m/s: at this speed the vehicle deviates from a right
+/// angle by 0.47 m.
 const MAX_CORNER_MPS: f32 = 0.6;
-/// Acceleration of a vehicle that evades, m/s².
+/// Acceleration back along the path, m/s².
 const EVADE_MPS2: f32 = 1.0;
-/// Braking of a vehicle that flies on, m/s².
+/// Deceleration of a vehicle that still flies forward, before it turns back, m/s².
 const BRAKING_MPS2: f32 = 1.5;
 
-/// Target of an evasion.
+/// Result of the search for a waiting place outside all landing columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum EvadeTarget {
-    /// The place where the vehicle waits in any case.
+    /// The place where the vehicle would wait anyway is outside all columns.
     #[default]
     Here,
-    /// Metres along the path.
+    /// The nearest place back along the path that is, as arc length in metres.
     Back(f32),
-    /// No place within reach is better.
+    /// No place within 12 m back along the path is outside all columns.
     Nowhere,
 }
 
-/// Search for the nearest waiting place that is outside all landing columns.
+/// Search for the nearest waiting place that is outside all landing columns, over several steps.
 #[derive(Clone, Debug, Default)]
 pub struct EvadeSearch {
     sweep: IncrementalScan,
-    /// Place along the path where the evading began, metres, and the number of places from there
-    /// back that are held.
+    /// Place along the path where the search began, metres, and the number of places from there
+    /// back that were found inside a column.
     from_m: Option<f32>,
     columns_found: u16,
-    /// Result of the last search.
+    /// Result of the last search that has finished.
     pub found: EvadeTarget,
 }
 
 impl EvadeSearch {
-    /// Searches on, back from `wait_m` along the path; `tell` gives the columns of a neighbour, of
-    /// so many.
+    /// Continues the search, back along the path from `wait_m`, where the vehicle would wait.
+    /// `tell` calls back with each column of the neighbour of an index below `neighbours`.
     pub fn continue_search<const W: usize>(
         &mut self,
         path: &Path<W>,
@@ -75,8 +78,8 @@ impl EvadeSearch {
         neighbours: usize,
         tell: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
     ) {
-        // A vehicle that steps back while it searches waits ever further back; one that waits
-        // further ahead asks again.
+        // While the vehicle steps back, `wait_m` falls and the search goes on. Where `wait_m`
+        // grows, the search begins there.
         let from_m =
             self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
                 self.columns_found = 0;
@@ -87,7 +90,7 @@ impl EvadeSearch {
         let mut budget = MAX_SEARCH_COST;
         let found = loop {
             let along_m = from_m - f32::from(self.columns_found) * PLACE_STEP_M;
-            // The last one is the start of the path.
+            // The last place compared is the start of the path.
             let on_path = self.columns_found == 0 || along_m > -PLACE_STEP_M;
             let along_m = along_m.max(0.0);
             let place = path.point_at(along_m).filter(|_| on_path);
@@ -108,13 +111,15 @@ impl EvadeSearch {
         (self.found, self.from_m) = (found, None);
     }
 
-    /// Forgets what was found.
+    /// Forgets the result, and a search under way.
     pub fn reset(&mut self) {
         (self.found, self.from_m) = (EvadeTarget::Here, None);
     }
 }
 
-/// One step of `dt_s` back towards `to_m`; `None` if another vehicle is behind.
+/// One step of `dt_s` seconds back along the path towards `to_m`, after braking where the reference
+/// still moves forward. Returns the new raw point; `None`, without a step, if a neighbour is
+/// behind.
 pub fn step_back<const W: usize>(
     path: &Path<W>,
     tracker: &mut Tracker,
@@ -126,7 +131,7 @@ pub fn step_back<const W: usize>(
     let here = path.point_at(tracker.along_m)?;
     let back = path.point_at(tracker.along_m - PLACE_STEP_M)?;
     if tracker.speed_mps > 0.0 {
-        // The vehicle flies on, and brakes first.
+        // The reference still moves forward: it brakes first.
         tracker.speed_mps = (tracker.speed_mps - BRAKING_MPS2 * dt_s).max(0.0);
         tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
         return point_at(path, tracker);
@@ -145,7 +150,7 @@ pub fn step_back<const W: usize>(
     let allowed = |end: f32, left_m: f32| fpu::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
     let ahead =
         allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
-    // The tracker's speed is that of flying on; back is below zero.
+    // `speed_mps` is positive forward along the path, and negative on the way back.
     let speed = ahead.min(MAX_LEG_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);

@@ -1,11 +1,10 @@
-//! The geofence of the smoother: a box that no setpoint leaves, and that the follower does not run
-//! into.
+//! The geofence of the smoother: a box that no setpoint leaves, and that the follower keeps inside.
 //!
-//! A point keeps inside without a jerk if it can always still stop: in each axis the distance that
-//! a stop takes, by a part of the vehicle's acceleration and jerk, is no longer than what is left
-//! to the wall. A step that would break this is replaced, in that axis, by the nearest one that
-//! does not ([`Fence::limit_jerk`]). The part is such that all three axes can brake at once: 1/√3
-//! of the jerk for each, 1/√2 of the acceleration across; the stop is planned with a little less,
+//! A point keeps inside smoothly if it can always still stop: in each axis the distance that a stop
+//! takes, by a part of the vehicle's acceleration and jerk, is no longer than what is left to the
+//! wall. A step that would break this is replaced, in that axis, by the nearest one that does not
+//! ([`Fence::limit_jerk`]). The part is such that all three axes can brake at once: 1/√3 of the
+//! jerk for each, 1/√2 of the horizontal acceleration; the stop is planned with a little less,
 //! which pays for steps of finite length.
 //!
 //! ENU metres, seconds. Constant work.
@@ -17,18 +16,19 @@ use planner_core::Point;
 use super::limits::MotionLimits;
 use super::motion::{Motion, clamp_length};
 
-/// Distance that a setpoint keeps inside the fence, metres: the autopilot's frame rounds the
+/// Distance by which setpoints keep inside the fence, metres: the autopilot's frame rounds a
 /// setpoint by up to 1.4 mm, 30 km from its origin.
 const FRAME_ROUNDING_M: f32 = 2e-3;
 /// Distance before the fence at which the follower turns, metres: steps of finite length overshoot
 /// by millimetres.
 const TURN_BEFORE_FENCE_M: f32 = 0.02;
-/// Part of the jerk that an axis may take to brake, and that its stops are planned with.
+/// Share of the jerk limit with which an axis may brake, and share with which its stops are
+/// planned.
 const JERK_SHARES: [f32; 2] = [0.577, 0.48];
-/// Part of the acceleration that an axis may take to brake, and that its stops are planned with,
-/// across and upwards.
+/// Share of the acceleration limit with which an axis may brake, and share with which its stops are
+/// planned: horizontally, then vertically.
 const ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
-/// Halvings of the interval between a step that is safe and one that is not.
+/// Number of bisection steps between a jerk that is safe and one that is not.
 const STEP_HALVINGS: usize = 8;
 
 /// A box that setpoints do not leave.
@@ -46,13 +46,14 @@ struct BrakingLimits {
 }
 
 impl Fence {
-    /// Inside the mission's box; in the middle of one that is thinner than what is rounded.
+    /// The mission's box, made smaller by what the autopilot's frame rounds, or by a quarter of its
+    /// size where it is thinner than that.
     pub(super) fn new((low, high): (Point, Point)) -> Self {
         let slack = (high - low).map(|size| fminf(FRAME_ROUNDING_M, 0.25 * size));
         Self { low: low + slack, high: high - slack }
     }
 
-    /// The nearest place inside.
+    /// The place inside the fence that is nearest to `place`.
     pub(super) fn nearest_inside(&self, mut place: Point) -> Point {
         for axis in 0..3 {
             place[axis] = fmaxf(fminf(place[axis], self.high[axis]), self.low[axis]);
@@ -60,7 +61,8 @@ impl Fence {
         place
     }
 
-    /// The velocity from which the motion can still stop inside, as near as may be to its own.
+    /// The velocity, as near as possible to the motion's own, from which it can stop inside the
+    /// fence.
     pub(super) fn limit_velocity(&self, motion: &Motion, limits: &MotionLimits) -> Point {
         let mut velocity = motion.velocity;
         for axis in 0..3 {
@@ -74,8 +76,8 @@ impl Fence {
         velocity
     }
 
-    /// The jerk nearest to the one that is wanted, of no more than `most_mps3`, after whose step
-    /// the motion can still stop.
+    /// The jerk nearest to `wanted`, of no more than `most_mps3`, after which the motion at the end
+    /// of the step can still stop inside the fence.
     pub(super) fn limit_jerk(
         &self,
         motion: &Motion,
@@ -106,8 +108,8 @@ impl Fence {
                     continue;
                 }
                 (brakes[axis], changed) = (true, true);
-                // Away from the wall that it comes to, up to the acceleration that braking may
-                // take.
+                // Away from the wall that it comes to: the acceleration that braking may take, if
+                // one step reaches it.
                 let (ahead, pace, push) = next(jerk[axis]);
                 let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
                 let part = JERK_SHARES[0] * most_mps3;
@@ -138,8 +140,8 @@ impl Fence {
         jerk
     }
 
-    /// Bounds of an axis of a motion that is at `place`: a motion behind a wall's last centimetres
-    /// moves no nearer to the wall.
+    /// Bounds of an axis for a motion at `place`: the fence less 2 cm. A motion that is beyond them
+    /// comes no nearer to the fence.
     fn axis_walls(&self, axis: usize, place: f32, brake: BrakingLimits) -> Walls {
         let (low, high) = (self.low[axis], self.high[axis]);
         let before_m = fminf(TURN_BEFORE_FENCE_M, 0.25 * (high - low));
@@ -147,7 +149,7 @@ impl Fence {
     }
 }
 
-/// Places where a motion along an axis may stop.
+/// Interval of an axis in which a motion has to stop, and its braking.
 struct Walls {
     low: f32,
     high: f32,
@@ -165,7 +167,7 @@ impl Walls {
     }
 }
 
-/// Braking that an axis plans its stops with.
+/// Acceleration and jerk with which the stops of an axis are planned.
 fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
     BrakingLimits {
         accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.max_accel_mps2[axis / 2],
@@ -173,7 +175,7 @@ fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
     }
 }
 
-/// The number nearest to `wanted` that is safe, between it and `safe`.
+/// The number nearest to `wanted` for which `is_safe` holds, by bisection between it and `safe`.
 fn nearest_safe(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     let (mut good, mut bad) = (safe, wanted);
     for _ in 0..STEP_HALVINGS {
@@ -187,8 +189,8 @@ fn nearest_safe(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     good
 }
 
-/// The axes that do not have to brake share the jerk and horizontal acceleration that the braking
-/// axes leave.
+/// Limits the jerk of the axes that do not have to brake to what the braking axes leave of the jerk
+/// and of the horizontal acceleration.
 fn distribute_remaining_jerk(
     jerk: &mut Point,
     brakes: [bool; 3],
@@ -210,7 +212,7 @@ fn distribute_remaining_jerk(
         let room = sqrtf(fmaxf(across * across - taken * taken, 0.0));
         let next = accel[beside] + others[beside] * dt_s;
         let next = fmaxf(fminf(next, room), -room);
-        // Braking comes before the wanted acceleration upwards.
+        // The vertical axis gets what the horizontal ones leave of the jerk.
         let most = left(&braking);
         others[beside] = fmaxf(fminf((next - accel[beside]) / dt_s, most), -most);
         let most = sqrtf(fmaxf(most * most - others[beside] * others[beside], 0.0));
@@ -219,12 +221,13 @@ fn distribute_remaining_jerk(
     *jerk = braking + others;
 }
 
-/// Stopping distance towards a wall, metres, from this speed and acceleration: the acceleration
+/// Distance of a stop towards a wall, metres, from this speed and acceleration: the acceleration
 /// falls to −a at the greatest jerk, stays there, and returns to 0 as the speed does.
 fn stopping_distance_m(speed: f32, accel: f32, brake: BrakingLimits) -> f32 {
     let BrakingLimits { accel_mps2: most, jerk_mps3: jerk } = brake;
     let accel = fmaxf(accel, -most);
-    // Speed that is left if the acceleration is only taken back.
+    // If bringing the acceleration back to 0 already stops the motion, no further braking is
+    // needed.
     if speed + accel * fabsf(accel) / (2.0 * jerk) <= 0.0 {
         if speed <= 0.0 {
             return 0.0;

@@ -1,14 +1,15 @@
-//! The safety filter: the last word on every motion, whatever was planned, commanded or reported.
+//! The safety filter: it stops any motion that may bring two vehicles together, whatever was
+//! planned, commanded or reported.
 //!
-//! In each step it compares what the vehicle can no longer take back with where each neighbour can
-//! be ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It continues once
-//! the next metre of its way is free. The vehicle that yields also waits until 3 s of the way of
-//! the other one are free, or that one stands. In a descent it flies back up its own column. The
-//! filter knows no gates, no progress and no advice: it only asks the gates which vehicle goes
-//! first where both have stopped.
+//! In each step it compares the places that this vehicle can no longer avoid with those where each
+//! neighbour can be ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It
+//! continues once the next metre of its path is free. Of two vehicles, the one that yields also
+//! waits until 3 s of the other one's points are free, or that one stands. In a descent it flies
+//! back up its own column. The filter trusts no gates, progress or advice: gates only decide which
+//! of two vehicles goes first that have both stopped.
 //!
-//! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than four of those
-//! is a stop.
+//! ENU metres. Cost: a bound for each neighbour, reachable sets for those within it; more than four
+//! of those stop the vehicle.
 
 mod conflict;
 mod look;
@@ -19,28 +20,32 @@ use crate::time::{Duration, Instant};
 const RESUME_CLEAR_M: f32 = 1.0;
 /// Time for which the path ahead has to be free before a stopped vehicle continues.
 const RESUME_CLEAR_FOR: Duration = Duration::from_millis(300);
-/// Depth of the ground between pad and goal below the lower of both, metres: less than a storey.
+/// Greatest depth of the ground between pad and goal below the lower of both, metres: less than a
+/// storey.
 const GROUND_BELOW_PAD_M: f32 = 2.0;
-/// Longest standstill for a vehicle that the roster does not name; after it this vehicle continues
-/// slowly.
+/// Longest stop for a stranger, a vehicle that the roster does not name; after it this vehicle
+/// continues slowly.
 const MAX_STOP_FOR_STRANGER: Duration = Duration::from_secs(10);
 /// Share of its speed at which a vehicle continues after [`MAX_STOP_FOR_STRANGER`].
 const PAST_STRANGER_SHARE: f32 = 0.15;
-/// Fastest setpoint that may reverse along the path, m/s.
+/// Greatest speed of the setpoint at which the reference, not the setpoint, decides whether the
+/// vehicle flies back along its path, m/s.
 const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
-/// Greatest distance between setpoint and reference at which the setpoint may reverse, metres.
+/// A setpoint that is further than this behind the reference still flies forward along the path,
+/// metres.
 const MAX_TURNING_SETPOINT_M: f32 = 0.03;
-/// A stop ahead nearer than this is a standstill, metres: a little more than the distance that
-/// advice looks ahead.
+/// A vehicle nearer than this to its advised stop stands before it, metres: a little more than the
+/// distance that advice looks ahead.
 const STANDSTILL_WITHIN_M: f32 = 0.6;
-/// Time for which whatever kept the vehicle from continuing still does.
+/// Time since the filter last hindered the vehicle within which the hindrance still counts as
+/// present.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
-/// Time of unhindered flight after which a vehicle was not kept from continuing.
+/// Time without a hindrance after which a later one counts as a new hindrance.
 const FREE_AFTER: Duration = Duration::from_secs(5);
-/// A vehicle that yields in its descent climbs back up its column after it has stood for this long.
+/// A vehicle that yields in its descent climbs back up its column after standing for this long.
 const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 
-/// A neighbour whose reachable set intersects that of the vehicle.
+/// A neighbour that may come nearer to this vehicle than the distance that is kept.
 struct FilterConflict {
     id: u8,
     yields: bool,
@@ -48,50 +53,51 @@ struct FilterConflict {
     rests: bool,
 }
 
-/// Result of the filter's check.
+/// State of the safety filter after the last step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SafetyFilter {
-    /// Since when it keeps the vehicle stopped.
+    /// Since when the filter has kept the vehicle stopped.
     stopped_since: Option<Instant>,
-    /// Since when the way has been free again.
+    /// Since when, in this stop, the path ahead has been free.
     clear_since: Option<Instant>,
-    /// MAVLink system id of the vehicle that it stops for; 0 for none.
+    /// MAVLink system id of the neighbour that the filter stops for; 0 for none.
     blocker: u8,
-    /// Whether this vehicle is the one that yields.
+    /// Whether this vehicle yields to the neighbour that the filter stops for.
     yields: bool,
-    /// Whether the other one rests for good, or is lost.
+    /// Whether the neighbour that the filter stops for is on the ground, or lost.
     blocker_rests: bool,
     blocker_is_stranger: bool,
-    /// Whether the sets met in the last step.
+    /// Whether the reachable sets of both conflicted in the last step.
     sets_intersect: bool,
-    /// Whether it checked the path backwards: the vehicle is about to fly back.
+    /// Whether the filter checked the path backwards in the last step: the vehicle flies back or is
+    /// about to.
     scanned_backwards: bool,
-    /// Whether the column between vehicle and ground is free of others.
+    /// Whether no other vehicle may be in the column to the ground, or to the top of the climb.
     column_clear: bool,
     /// Since when `column_clear` has had its value.
     column_since: Option<Instant>,
-    /// Since when a vehicle that stands for good has been in that column.
+    /// Since when a vehicle that is on the ground, or lost, has been in the landing column.
     column_blocked_for_good_since: Option<Instant>,
-    /// Since when a landing has been waiting for the column; short gaps do not end the wait.
+    /// Since when a landing has been waiting for a free column; short gaps do not end the wait.
     landing_held_since: Option<Instant>,
-    /// Since when it has kept the vehicle from continuing, and when it last did; short gaps do not
-    /// count.
+    /// Since when the filter has kept the vehicle from continuing, and when it last did; gaps
+    /// shorter than [`FREE_AFTER`] count as part of it.
     hindered_since: Option<Instant>,
     hindered_at: Instant,
-    /// Whether it was to yield then.
+    /// Whether this vehicle was to yield when it was last hindered.
     hindered_yields: bool,
     /// Number of times that the filter stopped the vehicle.
     activations: u32,
 }
 
-/// Direction in which a vehicle is about to fly.
+/// Direction in which this vehicle flies or is about to fly.
 enum FlightDirection {
     Stands,
-    /// Along the path, or back.
+    /// Along the path, or `back` along it.
     Path {
         back: bool,
     },
-    /// Straight up or down.
+    /// Straight up or down, to the height `to_m`.
     Vertical {
         to_m: f32,
         speed_mps: f32,
@@ -109,40 +115,41 @@ impl SafetyFilter {
     }
 
     /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
-    /// first; zero once the filter has not for `free`.
+    /// first; zero once the last such step is `free` ago.
     pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
         let since =
             self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
         since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which the filter has kept the vehicle from continuing because of a vehicle that
-    /// stands for good.
+    /// Time for which the filter has kept the vehicle from continuing because of a neighbour that
+    /// is on the ground, or lost.
     pub(crate) fn blocked_for_good_for(&self, now: Instant) -> Duration {
         if self.blocker_rests { self.hindered_for(now) } else { Duration::default() }
     }
 
-    /// Time for which the filter has made the vehicle yield.
+    /// Time for which the filter has kept the vehicle from continuing so that another one goes
+    /// first.
     pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
         if self.hindered_yields { self.hindered_for(now) } else { Duration::default() }
     }
 
-    /// Whether it looked back along the path in this step.
+    /// Whether the filter checked the path backwards in this step.
     pub(super) fn scans_backwards(&self) -> bool {
         self.scanned_backwards
     }
 
-    /// Whether it stops the vehicle for one that goes first.
+    /// Whether the filter stops the vehicle for a neighbour that goes first.
     pub(super) fn is_yielding(&self) -> bool {
         self.yields
     }
 
-    /// The vehicle that the filter stops for; 0 for none.
+    /// System id of the neighbour that the filter stops for; 0 for none.
     pub(crate) fn blocker(&self) -> u8 {
         if self.is_stopped() { self.blocker } else { 0 }
     }
 
-    /// The vehicle that it stops for, or stopped for last.
+    /// System id of the neighbour that the filter stops for, or stopped for last.
     pub(crate) fn last_blocker(&self) -> u8 {
         self.blocker
     }
@@ -152,22 +159,22 @@ impl SafetyFilter {
         self.activations
     }
 
-    /// Time for which the column has not been free.
+    /// Time for which another vehicle may have been in the landing column.
     pub(crate) fn column_blocked_for(&self, now: Instant) -> Duration {
         self.column_since.filter(|_| !self.column_clear).map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which a vehicle that rests, or is lost, has been in the column.
+    /// Time for which a vehicle that is on the ground, or lost, has been in the landing column.
     pub(crate) fn column_blocked_for_good_for(&self, now: Instant) -> Duration {
         self.column_blocked_for_good_since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which the column has been free.
+    /// Time for which the landing column has been free.
     pub(crate) fn column_clear_for(&self, now: Instant) -> Duration {
         self.column_since.filter(|_| self.column_clear).map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which a landing has been waiting, with interruptions.
+    /// Time since a landing first had to wait for a free column; short gaps do not end the wait.
     fn landing_held_for(&self, now: Instant) -> Duration {
         self.landing_held_since.map_or(Duration::default(), |at| now - at)
     }
@@ -179,7 +186,7 @@ impl SafetyFilter {
         since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// Whether the column to the ground was free in the last step.
+    /// Whether no other vehicle could be in the landing column in the last step.
     pub(crate) fn column_clear(&self) -> bool {
         self.column_clear
     }
@@ -188,12 +195,13 @@ impl SafetyFilter {
         *self = Self { activations: self.activations, ..Self::default() };
     }
 
-    /// Whether it stops the vehicle now.
+    /// Whether the vehicle is to stop in this step: passing a stranger slowly it stops only while
+    /// the sets conflict.
     pub(super) fn is_stopping(&self, now: Instant) -> bool {
         self.is_stopped() && (self.sets_intersect || !self.passes_stranger(now))
     }
 
-    /// Share of the nominal speed that it leaves.
+    /// Share of the nominal speed at which the vehicle may fly: less past a stranger.
     pub(super) fn speed_scale(&self, now: Instant) -> f32 {
         if self.passes_stranger(now) { PAST_STRANGER_SHARE } else { 1.0 }
     }

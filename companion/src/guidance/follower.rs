@@ -1,4 +1,4 @@
-//! The last stage of the smoother: a point that follows the curve and never exceeds the vehicle's
+//! The last stage of the smoother: a point that follows the curve and never exceeds the limits of
 //! acceleration and jerk.
 //!
 //! The curve is within the limits but for rare moments: corners that come close together, a clock
@@ -26,7 +26,8 @@ use super::motion::{Motion, clamp_length};
 const LOOP_RATE_SHARE: f32 = 0.45;
 
 impl Motion {
-    /// Moves on by `dt_s` towards where the curve is then, and stops before the fence.
+    /// Moves the point by `dt_s` towards `to`, the curve's state at the end of the step, with at
+    /// most `jerk_mps3`, and stops it before the fence.
     pub(super) fn follow(
         &mut self,
         to: &Self,
@@ -36,7 +37,7 @@ impl Motion {
         dt_s: f32,
     ) {
         let (velocity, before) = (self.velocity, self.acceleration);
-        // Place that the follower reaches if it takes on the curve's acceleration.
+        // Place, and speed, at the end of the step if the acceleration goes over to the curve's.
         let place = self.position
             + velocity * dt_s
             + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);

@@ -1,37 +1,37 @@
-//! A vehicle that stands says that it will continue standing, so that others may pass it closely.
+//! A vehicle that stands reports that it will stay there, so that others may pass it closely.
 //!
-//! Of a vehicle that was heard to stand half a second ago others must assume that it has begun to
-//! fly since. Two that stopped for one another would therefore never continue. So a vehicle that
-//! was stopped reports no way ahead of its setpoint, and does not move before the others have heard
-//! of a way again: [`HOLD_REPORT_LIFETIME`] after it last reported none, and the time that its
-//! messages take. The vehicle that yields reports so at once, the other one only when it has stood
-//! for a while ([`FIRST_STANDSTILL`]), so that it goes first.
+//! Of a vehicle heard to stand half a second ago, others must assume that it has begun to fly
+//! since. Two that stopped for each other would never continue. So a stopped vehicle reports no
+//! points ahead of its setpoint. It does not move again until [`HOLD_REPORT_LIFETIME`] and the
+//! delay of its messages have passed since the last such report, by when the others have heard new
+//! points. The vehicle that yields reports its hold at once, the other one only after standing for
+//! [`FIRST_STANDSTILL`], so that it goes first.
 //!
 //! ENU metres.
 
 use crate::time::{Duration, Instant};
 
-/// Time for which a reported hold counts: longer than three reports in a row are lost.
+/// Time for which others rely on a reported hold: longer than three lost reports in a row.
 const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
-/// Standstill after which a vehicle that yields reports that it holds.
+/// Time of standing after which a vehicle that yields reports that it holds.
 const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
-/// Standstill after which a vehicle that goes first reports that it holds: the others have this
-/// long to stand.
+/// Time of standing after which a vehicle that goes first reports that it holds: time for the
+/// others to stop.
 const FIRST_STANDSTILL: Duration = Duration::from_secs(4);
 
-/// Hold state of the vehicle, and when it was reported.
+/// Whether the vehicle reports that it holds, and when it last did.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
     since: Option<Instant>,
     on: bool,
-    /// When that was last sent to others, and how late they hear it.
+    /// When the hold was last sent in an intent, and the delay with which others hear it.
     reported_at: Option<Instant>,
     message_delay: Duration,
 }
 
 impl Hold {
-    /// One step; `stands` for a vehicle that stands and is not to move, `yields` if another one
-    /// goes first. Messages are `late_s` late. Returns whether the vehicle begins or ends to hold.
+    /// One step. `stands`: the vehicle stands and is not to move; `yields`: another one goes first;
+    /// `late_s`: delay of messages, seconds. Returns whether the hold begins or ends.
     pub(super) fn step(&mut self, stands: bool, yields: bool, late_s: f32, now: Instant) -> bool {
         if stands {
             self.message_delay = Duration::from_micros((late_s * 1e6) as u64);
@@ -47,12 +47,12 @@ impl Hold {
         self.on
     }
 
-    /// Notes that the hold was reported.
+    /// Notes that an intent with the hold was sent.
     pub(crate) fn note_reported(&mut self, now: Instant) {
         self.reported_at = Some(now);
     }
 
-    /// Whether other vehicles may still rely on the hold.
+    /// Whether other vehicles may still rely on the hold, so that this one must not move.
     pub(super) fn is_binding(&self, now: Instant) -> bool {
         self.reported_at.is_some_and(|at| now < (at + HOLD_REPORT_LIFETIME) + self.message_delay)
     }

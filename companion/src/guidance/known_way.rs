@@ -1,21 +1,24 @@
-//! What others know of a vehicle's way: it lands where they look for it, though gates may have led
-//! it further.
+//! What other vehicles know of this vehicle's way along its path: once unheard it lands where they
+//! expect it, though gates may have led it further.
 
 use crate::time::Instant;
 
-/// What others know of a vehicle's way, by what they acknowledge, metres along its path.
+/// Part of a vehicle's path that others know by the intents that they acknowledged, metres along
+/// it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct KnownWay {
-    /// Place that they at least heard of; ∞ where they heard of none.
+    /// Place where the others surely heard the vehicle last; ∞ where they heard it nowhere on this
+    /// path.
     pub from_m: f32,
-    /// End of the points of the last intent that is known to have arrived; −∞ where none is.
+    /// Place to which the points of the last acknowledged intent lead; −∞ where none was
+    /// acknowledged.
     pub to_m: f32,
-    /// When the path was begun: earlier intents were of another one.
+    /// When the path was begun: intents sent earlier are of another path.
     pub since: Instant,
 }
 
 impl KnownWay {
-    /// They know nothing of a path that begins now.
+    /// For a path that begins now, of which others know nothing.
     pub const fn of_new_path(now: Instant) -> Self {
         Self { from_m: f32::INFINITY, to_m: f32::NEG_INFINITY, since: now }
     }

@@ -1,4 +1,4 @@
-//! The setpoint waits for a vehicle that lags behind it, and how long it has waited in vain.
+//! The setpoint waits for a vehicle that lags behind it, and measures for how long in vain.
 
 use super::{ARRIVED_M, Guidance};
 use crate::autopilot::telemetry::Telemetry;
@@ -6,27 +6,27 @@ use crate::time::{Duration, Instant};
 use planner_core::Length;
 
 impl Guidance {
-    /// Share of its speed at which the setpoint goes on: none where it is as far ahead of the
-    /// vehicle as it may be. `moves` for a vehicle that is to fly on.
+    /// Share of its speed at which the setpoint advances: 1 up to half of the greatest lead over
+    /// the vehicle, 0 at all of it. `moves`: the vehicle is to fly on.
     pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
         let place = self.smoother.position();
         let lead_m = self.lead_m(telemetry);
         let advance = place - self.followed_place;
-        // The speed of the vehicle says nothing: the wind may carry it away from its setpoint.
+        // The vehicle's own speed does not count: the wind may carry it away from its setpoint.
         if lead_m < ARRIVED_M || advance.norm_squared() > ARRIVED_M * ARRIVED_M {
             (self.followed_at, self.followed_place) = (now, place);
         }
         let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
         match moves {
             true => share.min(self.pace),
-            // Settled it holds; before the take-off it follows the estimate.
+            // At rest the setpoint holds; before the take-off it follows the position estimate.
             false if self.raw_point_at_rest => 1.0,
             false => 0.0,
         }
     }
 
-    /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on
-    /// either: something holds the vehicle, or carries it away.
+    /// Time for which the vehicle has not been at its setpoint, and the setpoint has not advanced
+    /// either: something holds the vehicle, or the wind carries it away.
     pub(crate) fn unfollowed_for(&self, now: Instant) -> Duration {
         now - self.followed_at
     }

@@ -1,4 +1,4 @@
-//! What a vehicle flies: the mission's limits, and the autopilot's where it has lower ones.
+//! Motion limits of a vehicle: the mission's, lowered to the autopilot's where those are lower.
 
 use libm::{fmaxf, fminf};
 use planner_core::deconflict::DeconflictConfig;
@@ -9,36 +9,36 @@ use planner_core::{ConfigError, Point};
 use crate::autopilot::limits::{AutopilotLimits, Limit};
 use crate::config::Config;
 
-/// Greatest jerk of a setpoint, m/s³; autopilots with a lower limit get their own limit.
+/// Greatest jerk of a setpoint, m/s³, unless the autopilot's limit is lower.
 pub const MAX_JERK_MPS3: f32 = 4.0;
-/// Greatest jerk of a setpoint while the safety filter stops a vehicle, m/s³.
+/// Greatest jerk of a setpoint while the safety filter stops the vehicle, m/s³.
 pub const MAX_URGENT_JERK_MPS3: f32 = 8.0;
-/// Greatest acceleration of a setpoint over the nominal one, where the autopilot flies it.
+/// Greatest acceleration of a setpoint as a multiple of the nominal one, unless the autopilot's
+/// limit is lower.
 const MAX_CORNER_ACCEL_SHARE: f32 = 1.5;
 
-/// Longest time over which the smoother smooths, seconds: lower limits of jerk lower the
-/// acceleration.
+/// Longest window of the smoother's moving averages, seconds: where a low limit of jerk would need
+/// a longer one, the acceleration is lowered.
 pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
-/// Time within which an unheard vehicle has stopped, seconds: the vehicle notices after 1.8 s and
-/// brakes.
+/// Time within which an unheard vehicle has stopped, seconds: it notices after 1.8 s, and brakes.
 const UNHEARD_STOPPED_S: f32 = 3.0;
-/// Speed of the join to the path, m/s.
+/// Least limit of the speed on a straight leg (climb, join, descent), m/s.
 pub(crate) const JOIN_MPS: f32 = 1.0;
 
-/// Limits of one vehicle.
+/// Limits of a vehicle's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionLimits {
-    /// Along the path, m/s.
+    /// Greatest speed along the path, m/s.
     pub speed_mps: f32,
-    /// Upwards, m/s.
+    /// Greatest speed upwards, m/s.
     pub climb_mps: f32,
-    /// Downwards, m/s.
+    /// Greatest speed downwards, m/s.
     pub descend_mps: f32,
-    /// Across, m/s².
+    /// Greatest horizontal acceleration of the reference, m/s².
     pub accel_mps2: f32,
-    /// Upwards and downwards, m/s².
+    /// Greatest vertical acceleration of the reference, m/s².
     pub accel_z_mps2: f32,
-    /// Greatest acceleration of a setpoint, across and vertically, m/s²: a corner adds to the
+    /// Greatest acceleration of a setpoint, horizontal and vertical, m/s²: a corner adds to the
     /// braking before it and the acceleration behind it.
     pub max_accel_mps2: [f32; 2],
     /// Greatest jerk of a setpoint, m/s³.
@@ -46,13 +46,13 @@ pub struct MotionLimits {
 }
 
 impl MotionLimits {
-    /// The mission's limits, lowered to what the autopilot flies.
+    /// The mission's limits, lowered to the autopilot's.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let least = |of: &[Limit]| {
             of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)))
         };
         let jerk_mps3 = fminf(MAX_JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
-        // Acceleration that the smoother's longest average smooths to that jerk.
+        // Acceleration whose sudden change the longest average spreads to that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * MAX_SMOOTHING_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
         let (across_mps2, vertical_mps2) =
@@ -69,12 +69,14 @@ impl MotionLimits {
         }
     }
 
-    /// Greatest jerk, m/s³.
+    /// Greatest jerk of a setpoint, m/s³; higher where the safety filter stops the vehicle
+    /// (`urgent`).
     pub(crate) fn jerk(&self, urgent: bool) -> f32 {
         if urgent { fminf(MAX_URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
     }
 
-    /// Greatest acceleration along a direction (a unit vector, or nearly none), m/s².
+    /// Greatest acceleration of the reference along a direction (a unit vector, or nearly zero),
+    /// m/s².
     pub(crate) fn accel_along(&self, direction: &Point) -> f32 {
         let (across, up) = (libm::hypotf(direction.x, direction.y), libm::fabsf(direction.z));
         let least =
@@ -82,7 +84,7 @@ impl MotionLimits {
         fminf(least, fmaxf(self.accel_mps2, self.accel_z_mps2))
     }
 
-    /// The nearest acceleration that may be asked for, m/s².
+    /// The acceleration, limited horizontally and vertically to that of a setpoint, m/s².
     pub(crate) fn clamp_accel(&self, accel: &Point) -> Point {
         let across = libm::hypotf(accel.x, accel.y);
         let [most, most_z] = self.max_accel_mps2;
@@ -91,25 +93,25 @@ impl MotionLimits {
         Point::new(accel.x * share, accel.y * share, z)
     }
 
-    /// No setpoint moves faster, m/s.
+    /// Greatest speed of a setpoint in any direction, m/s.
     pub(crate) fn max_speed_mps(&self) -> f32 {
         fmaxf(self.speed_mps, fmaxf(self.climb_mps, self.descend_mps))
     }
 }
 
-/// Settings that guidance gives to planner-core's calls.
+/// Limits that guidance passes to the calls of planner-core.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Settings {
-    /// Along the path.
+    /// For the reference along the path.
     pub(crate) track: TrackConfig,
-    /// Along the way to it, and in climb and descent.
+    /// For the reference along a straight leg: climb, join or descent.
     pub(crate) leg_track: TrackConfig,
-    /// Settings of advice.
+    /// For advice.
     pub(crate) deconflict: DeconflictConfig,
 }
 
 impl Settings {
-    /// Limits of a vehicle with these settings.
+    /// The limits by the mission's settings and the autopilot's limits.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let limits = MotionLimits::new(config, autopilot);
         let track = TrackConfig {
@@ -136,7 +138,7 @@ impl Settings {
         Self { track, leg_track, deconflict }
     }
 
-    /// Whether planner-core can work with them, those of the safety filter among them.
+    /// Whether planner-core accepts these limits, and the safety filter's that follow from them.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         self.track.check()?;
         self.leg_track.check()?;
@@ -145,7 +147,7 @@ impl Settings {
     }
 }
 
-/// Bounds expected of vehicles that fly as this one does.
+/// Limits within which neighbours are expected to fly and stop: those of this vehicle.
 pub(crate) fn bounds(track: &TrackConfig) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
     MotionBounds { braking, speed_max_mps: track.cruise_mps, silent_s: UNHEARD_STOPPED_S }

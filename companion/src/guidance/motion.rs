@@ -1,4 +1,4 @@
-//! A point that moves.
+//! A moving point, and limits of vectors and numbers.
 
 use libm::fmaxf;
 use planner_core::{Length, Point};
@@ -12,7 +12,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// At rest at a place.
+    /// A point at rest at a place.
     pub(super) fn at_rest(position: Point) -> Self {
         Self { position, velocity: Point::zeros(), acceleration: Point::zeros() }
     }
@@ -24,13 +24,13 @@ impl Motion {
     }
 }
 
-/// A vector no longer than `most`.
+/// The vector, shortened to the length `most` if it is longer.
 pub(super) fn clamp_length(vector: Point, most: f32) -> Point {
     vector * (most / fmaxf(vector.length(), fmaxf(most, 1e-6)))
 }
 
-/// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a
-/// board carries the code that would print them: 25 kB.
+/// The value limited to `low`…`high`. `f32::clamp` panics where a bound is NaN, and a board would
+/// carry 25 kB of code to print it.
 pub(super) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }

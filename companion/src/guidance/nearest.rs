@@ -1,12 +1,13 @@
-//! The nearest point of a path within a window.
+//! The point of a path that is nearest to a place, within a window.
 
 use planner_core::Point;
 use planner_core::flight::Path;
 
-/// A setpoint that stands this near the end of the path has flown the path, metres.
+/// A nearest point this close to the end of the path counts as its end, metres.
 const AT_PATH_END_M: f32 = 0.02;
 
-/// Arc length of the nearest point of the path; its end, if that is as near as counts as there.
+/// Arc length of the path's point nearest to `place`, searched `window_m` around `near_m`, metres;
+/// the path's length where that is less than 0.02 m away.
 pub(super) fn nearest_arc_length_m<const W: usize>(
     path: &Path<W>,
     place: &Point,

@@ -1,5 +1,5 @@
-//! What guidance is ordered: to begin the path, to continue, to turn back, to settle where it
-//! stands.
+//! What the mission orders guidance to do: to begin a path, to resume or reverse it, to be led
+//! down.
 
 use super::known_way::KnownWay;
 use super::nearest::nearest_arc_length_m;
@@ -13,7 +13,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::Tracker;
 
 impl Guidance {
-    /// Continues where the flight was interrupted.
+    /// Lets the reference run along the path from its place there.
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
         self.evade_search.reset();
@@ -22,7 +22,7 @@ impl Guidance {
         self.progress_at = now;
     }
 
-    /// Begins another path, from where the setpoint stands.
+    /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
         self.tracker = Tracker::default();
         self.phase = Phase::Path;
@@ -33,59 +33,59 @@ impl Guidance {
         self.reported_m = f32::NEG_INFINITY;
         self.gates_open = 0;
         self.known_way = KnownWay::of_new_path(now);
-        // A hindrance on the other path does not count on this one.
+        // What hindered the vehicle on the other path does not count on this one.
         self.filter.reset();
         self.start_following(now);
     }
 
-    /// As `begin_path`, from `along_m` metres along the path on.
+    /// Begins another path, at the place `along_m` metres along it; the setpoint stands there.
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);
         self.tracker.along_m = along_m;
         self.progress_m = along_m;
     }
 
-    /// The vehicle flies no further along its path than this for now, metres; ∞ for the whole path.
+    /// Sets the place along the path where the vehicle is to hold, metres; ∞ for none.
     pub(crate) fn set_halt_m(&mut self, along_m: f32) {
         self.halt_m = along_m;
     }
 
-    /// Whether the setpoint is at rest on the raw point. Only then may another path begin, even one
-    /// that starts a little away from it.
+    /// Whether the raw point was set back to where the setpoint stands. Only then may another path
+    /// begin, even one that starts a little away from it.
     pub(crate) fn is_at_rest_on_raw_point(&self) -> bool {
         self.raw_point_at_rest
     }
 
-    /// Whether the setpoint stands, if only on its way down.
+    /// Whether the setpoint stands, in a descent too.
     pub(crate) fn is_setpoint_still(&self) -> bool {
         self.smoother.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
     }
 
-    /// Place along the path where the vehicle could stop now, metres.
+    /// Nearest place along the path at which the vehicle could stop now, metres.
     pub(crate) fn stopping_point_m(&self) -> f32 {
         let braking_m = self.smoother.stopping_distance_m(false);
         self.tracker.along_m.max(self.setpoint_m + braking_m)
     }
 
-    /// Leads a landing straight down from where the setpoint stands, as far as the autopilot is
-    /// led.
+    /// Begins a landing that setpoints lead straight down from where the setpoint stands, to the
+    /// height at which the autopilot's landing takes over.
     pub(crate) fn begin_guided_landing(&mut self, now: Instant) {
         self.begin_braking();
         (self.guides_landing, self.progress_at) = (true, now);
     }
 
-    /// Whether it leads a landing.
+    /// Whether setpoints lead a landing.
     pub(crate) fn is_guiding_landing(&self) -> bool {
         self.guides_landing
     }
 
-    /// The autopilot lands by itself.
+    /// Leaves the landing to the autopilot.
     pub(crate) fn end_guided_landing(&mut self) {
         self.guides_landing = false;
     }
 
-    /// Continues after an interruption, from where the setpoint is, or the vehicle where no place
-    /// was sent: up its climb, down its descent, or by the nearest point of the path.
+    /// Resumes the flight after an interruption, from the setpoint, or from the vehicle where there
+    /// is none: up its climb, down its descent, or from the nearest point of the path on.
     pub fn resume_flight<const W: usize, const G: usize>(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -114,9 +114,9 @@ impl Guidance {
         self.start_following(now);
     }
 
-    /// Replaces the path by the way back to its first point. The clearance of each leg goes with
-    /// it. The raw point may still move on: the new path begins where it can have braked, and it
-    /// begins on it backwards.
+    /// Replaces the path by the way back to its first point, with the clearance of each leg. The
+    /// raw point may still move forward: the new path begins where it can have braked, and the raw
+    /// point at first moves backwards on it.
     pub fn reverse_path<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
@@ -126,7 +126,7 @@ impl Guidance {
         let ahead = path.waypoints().iter().find(|w| w.along_m >= from_m);
         let mut clearance_m = ahead.map_or(0.0, |w| w.clearance_m);
         if let Some(turn) = path.point_at(from_m) {
-            // No more points than the path has: those behind, and this one for at least one ahead.
+            // `path` had as many points: `turn` takes the place of at least one waypoint ahead.
             let _ = back.push(turn, clearance_m);
         }
         for waypoint in path.waypoints().iter().rev().filter(|w| w.along_m < from_m) {
@@ -143,7 +143,8 @@ impl Guidance {
         match phase {
             Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
             Phase::Descent => {
-                // Back up: what is still sunk while it brakes is flown backwards.
+                // Back up the leg of the descent: what the setpoint still sinks while it brakes is
+                // flown backwards on the new leg.
                 if let (Some(leg), false) = (leg, self.raw_point_at_rest) {
                     let mut up = Path::new();
                     let ends = (leg.waypoints().last(), leg.waypoints().first());
@@ -159,7 +160,7 @@ impl Guidance {
         }
     }
 
-    /// Forgets the leg that was flown: the raw point is where the setpoint stands, and the next leg
+    /// Forgets the straight leg: the raw point is where the setpoint stands, and the next leg
     /// begins there.
     pub(super) fn forget_leg(&mut self) {
         self.raw_point_at_rest = true;

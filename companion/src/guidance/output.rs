@@ -1,4 +1,4 @@
-//! The setpoint of the moment.
+//! The setpoint that is sent to the autopilot now.
 
 use planner_core::{Length, Point};
 
@@ -8,7 +8,8 @@ use crate::autopilot::AutopilotKind;
 use crate::mission::{State, task};
 
 impl Guidance {
-    /// The setpoint of this moment.
+    /// The setpoint to be sent in this state: none, a stop where the position is unknown, or a
+    /// place with velocity, acceleration and heading.
     pub fn setpoint<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -27,11 +28,12 @@ impl Guidance {
             });
         }
         if !smoother.has_setpoint() {
-            // The state is newer than the step: the next one begins where the vehicle is.
+            // The state was entered after the last step: the next step begins the setpoint at the
+            // vehicle.
             return Setpoint::None;
         }
-        // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the
-        // setpoint will be.
+        // ArduCopter's Guided mode takes no acceleration: its velocity is that of the setpoint
+        // `lead_s` ahead, but no faster than the setpoint will be.
         let lead_s = scene.telemetry.kind.map_or(0.0, AutopilotKind::velocity_lead_s);
         let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
         let most = smoother.velocity().length().max(smoother.raw_speed_mps());

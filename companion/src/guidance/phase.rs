@@ -1,16 +1,16 @@
-//! Parts of a flight, and how it goes from one to the next, back and on after an interruption.
+//! The phases of a flight.
 
-/// Part of the flight.
+/// Phase of a flight; the phases follow in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// Before the climb.
+    /// Before the climb: the raw point stays where it is.
     Hold,
     /// Straight up to the height of the path's start.
     Climb,
-    /// Straight to where the path continues.
+    /// Straight to the place on the path where the flight continues.
     Join,
     /// Along the path.
     Path,
-    /// Straight down from its end.
+    /// Straight down from the path's end, or in a guided landing.
     Descent,
 }

@@ -1,4 +1,4 @@
-//! How far the vehicle has come along its flight, and which parts of it are flown.
+//! Progress of the vehicle along its flight: climb, path and descent, and which of them are done.
 
 use planner_core::Length;
 use planner_core::flight::{Path, VehiclePlan};
@@ -13,8 +13,9 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// Place along the plan's path up to which an unheard vehicle flies, metres, and the seconds by
-    /// which gates delay it ([`Neighbours::unheard_reach`]).
+    /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
+    /// are open or open after a short wait, metres; and the seconds by which those gates delay it
+    /// ([`Neighbours::unheard_reach`]).
     pub(crate) fn gates_open_up_to_soon_m<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -28,8 +29,8 @@ impl Guidance {
         (libm::fminf(closed_m, plan.path.length_m()), delay_s)
     }
 
-    /// Place along the plan's path up to which every gate is open, metres; −∞ where the vehicle
-    /// does not follow that path.
+    /// Place along the plan's path up to which all gates are open, metres; −∞ for a vehicle that
+    /// flies back or a detour.
     pub(crate) fn gates_open_up_to_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -41,8 +42,9 @@ impl Guidance {
         gate_m.min(plan.path.length_m())
     }
 
-    /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the
-    /// path's length in the descent. It never falls on one path.
+    /// Arc length reported to neighbours, for their gates, metres: before and in the climb minus
+    /// the height still to climb, beyond the path's length in the descent. It never falls on one
+    /// path.
     pub fn progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -62,7 +64,7 @@ impl Guidance {
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
         if matches!(state, State::Disarm | State::Done) && self.has_reached_end(path) {
-            // A metre beyond the ground, so that every gate on this flight opens.
+            // One metre below the ground, so that every gate that waits for this flight opens.
             return length_m + plan.descent_m + 1.0;
         }
         match self.phase {
@@ -80,8 +82,8 @@ impl Guidance {
                     self.tracker.along_m - behind * 0.5,
                     behind,
                 );
-                // Off its reference by less than counts as arrived, it has come as far as gates ask
-                // of one that waits.
+                // Within `ARRIVED_M` of its reference it counts as having come as far as gates ask
+                // of a vehicle that waits there.
                 let at = path.point_at(self.tracker.along_m);
                 let arrived =
                     at.is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_M);
@@ -96,7 +98,7 @@ impl Guidance {
         }
     }
 
-    /// Whether the shared plan's path was flown to its end.
+    /// Whether the vehicle is at the end of its path, if that is not one back or aside.
     pub fn is_at_goal<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -118,7 +120,8 @@ impl Guidance {
         self.on_path && self.tracker.along_m >= path.length_m()
     }
 
-    /// Height of the ground below the vehicle, as far as the plan says, metres.
+    /// Height of the ground below the vehicle as far as the plan says, ENU up, metres: that of the
+    /// pad before the path, that of the goal at its end, and between them the lowest that is known.
     pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
         let end_m =
@@ -139,8 +142,8 @@ impl Guidance {
             && self.is_leg_done()
             && top.is_some_and(|top| {
                 let apart = self.smoother.position() - scene.telemetry.position;
-                // Both setpoint and vehicle at the top: a low climb must not count as done on the
-                // pad.
+                // Setpoint and vehicle have to be at the top both: a low climb must not count as
+                // done while the vehicle is on its pad.
                 (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
                     && self.is_standing()
                     && apart.length() < 2.0 * ARRIVED_M
@@ -148,7 +151,8 @@ impl Guidance {
             })
     }
 
-    /// Whether the path and the guided descent are flown.
+    /// Whether the path and the guided descent are flown, so that the autopilot's landing takes
+    /// over.
     pub fn is_path_done<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -174,7 +178,8 @@ impl Guidance {
                 || self.guided_descent_m(scene, plan.descent_m) == 0.0)
     }
 
-    /// Whether it stands at the end of the path and nobody keeps it from landing.
+    /// Whether the vehicle stands at the end of its path, and advice lets it descend from there to
+    /// the ground.
     pub(super) fn is_free_to_land_at_end<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -192,8 +197,9 @@ impl Guidance {
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 
-    /// Whether the vehicle is within `window_m` of its place along the path, and the straight way
-    /// to the nearest point of the path stays inside the leg's clearance.
+    /// Whether the vehicle is near enough to its place along the path to resume it: the nearest
+    /// point is within `window_m`, and the straight way there stays inside the clearance of the
+    /// path's leg.
     pub fn is_near_path<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -203,7 +209,7 @@ impl Guidance {
         let position = &scene.telemetry.position;
         let along_m = plan.path.project(position, self.tracker.along_m, window_m);
         if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
-            // Over its pad, on the way up.
+            // Above its pad, on the way up.
             let away = position - first.position;
             if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().length() < ARRIVED_M
             {
@@ -223,8 +229,8 @@ impl Guidance {
         }
         let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
         let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
-        // The hull is free where it is, and within the leg's clearance of the nearest point: the
-        // straight way between is if it leaves that ball nowhere else.
+        // The hull fits where it is, and within the clearance around the path's nearest point: with
+        // d² ≤ c² − r² it then fits everywhere on the straight way between both.
         let free_m2 = leg.clearance_m * leg.clearance_m - self.track.radius_m * self.track.radius_m;
         (nearest - position).norm_squared() <= free_m2
     }

@@ -18,7 +18,8 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// The next raw point.
+    /// Advances the raw point by a tick, and the phase where it is done. `blocked` is set if a step
+    /// back from below a vehicle that descends was not possible.
     #[expect(clippy::too_many_arguments, reason = "what a step knows")]
     pub(super) fn next_raw_point<const V: usize, const W: usize, const G: usize>(
         &mut self,
@@ -70,7 +71,7 @@ impl Guidance {
         let Some(target) = target else { return raw };
         if self.leg.is_none() {
             let mut leg = Path::new();
-            // Room for both.
+            // Two points fit.
             let _ = leg.push(raw, f32::INFINITY.min(self.track.lead_max_m));
             let _ = leg.push(target, f32::INFINITY.min(self.track.lead_max_m));
             (self.leg, self.leg_tracker) = (Some(leg), Tracker::default());
@@ -85,7 +86,7 @@ impl Guidance {
             self.progress_at = now;
         }
         if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.is_leg_done()) {
-            // Back up a descent it ends where that began: beside the path yet.
+            // A leg back up a descent may end beside the path: another leg joins it.
             let beside_m = (target - raw).length();
             let joined = beside_m < MIN_LEG_M + JOIN_MPS * TICK_S;
             (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
@@ -93,8 +94,8 @@ impl Guidance {
         reference.map_or(raw, |reference| reference.position)
     }
 
-    /// The next raw point of a stop: it brakes where it flies, as fast flights need more way than
-    /// the curve holds.
+    /// The next raw point of a stop: it brakes along the path or leg, as a stop from high speed is
+    /// longer than what the smoother's curve still holds.
     pub(super) fn next_braked_raw_point<const W: usize>(&mut self, path: &Path<W>) -> Point {
         let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
         let reference = match (self.phase, &self.leg) {
@@ -109,7 +110,7 @@ impl Guidance {
         reference.map_or(self.smoother.raw_point(), |reference| reference.position)
     }
 
-    /// The next raw point on the path, back from below a vehicle that comes down where it has to.
+    /// The next raw point on the path: forward, or back from below a vehicle that descends.
     pub(super) fn next_on_path<const V: usize, const W: usize>(
         &mut self,
         path: &Path<W>,
@@ -122,7 +123,7 @@ impl Guidance {
         if let Some(to_m) = self.back_to_m {
             let safety_m = self.deconflict.safety_distance_m;
             let near = neighbours.states_at(now);
-            // The filter has looked that way since the step before.
+            // Back only if the filter has checked the path backwards, and found it free.
             let free = self.filter.scans_backwards() && !self.filter.is_stopped();
             if !free {
                 advice.stop_within_m = 0.0;
@@ -152,7 +153,7 @@ impl Guidance {
         Some(position)
     }
 
-    /// The next raw point by Algorithm 2: straight to the current waypoint, at the speed advised.
+    /// The next raw point by Algorithm 2: straight to the current waypoint, at the advised speed.
     pub(super) fn next_to_waypoint<const W: usize>(
         &mut self,
         path: &Path<W>,
@@ -166,14 +167,14 @@ impl Guidance {
             None => advice.speed_scale = 0.0,
             Some(target) if self.leg.is_none() || self.waypoints != before => {
                 let mut leg = Path::new();
-                // Room for both.
+                // Two points fit.
                 let _ = leg.push(raw, self.track.lead_max_m);
                 let _ = leg.push(target, self.track.lead_max_m);
                 let course = |leg: &Path<2>| match leg.waypoints() {
                     [from, to] => (to.position - from.position) / (to.along_m - from.along_m),
                     _ => Point::zeros(),
                 };
-                // The leg keeps the part of its speed that leads to the new waypoint.
+                // Of the old leg's speed the part in the direction of the new one is kept.
                 let kept =
                     self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
                 let speed_mps = self.leg_tracker.speed_mps * kept;
@@ -202,15 +203,14 @@ impl Guidance {
         Some(reference.position)
     }
 
-    /// Whether the straight way is flown by the raw point.
+    /// Whether the raw point has reached the end of its straight leg.
     pub(super) fn is_leg_done(&self) -> bool {
         self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
     }
 
-    /// Depth to which the setpoint leads in a descent, metres. At the end of the path and free to
-    /// land it leads straight down, to the ground where the autopilot may be led there, else not
-    /// lower than the margin kept to obstacles: once the autopilot lands by itself the wind may
-    /// carry the vehicle off.
+    /// Depth below the end of the path to which setpoints lead the descent, metres: to the ground
+    /// for PX4, else down to `low_height_m` above it. There the autopilot's landing takes over, in
+    /// which the wind may carry the vehicle off.
     pub(super) fn guided_descent_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -219,7 +219,7 @@ impl Guidance {
         libm::fmaxf(descent_m - self.guided_descent_end_m(scene), 0.0)
     }
 
-    /// Height over the ground at which a guided descent ends, metres.
+    /// Height above the ground at which setpoints end their descent, metres: 0 for PX4.
     fn guided_descent_end_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -227,8 +227,8 @@ impl Guidance {
         if scene.telemetry.kind == Some(AutopilotKind::Px4) { 0.0 } else { self.low_height_m }
     }
 
-    /// Whether guidance leads the landing in this step. It begins once the setpoint stands, and
-    /// ends near the ground, or where it makes no progress.
+    /// Whether setpoints lead the landing down in this step: once the setpoint stands, and no other
+    /// vehicle may be in the column. Leading ends at the lower end, or after 4 s without progress.
     pub(super) fn update_guided_landing<const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -251,8 +251,8 @@ impl Guidance {
         self.guides_landing && self.phase == Phase::Descent && self.filter.column_clear()
     }
 
-    /// The share of the speed at which this leg is flown: below the margin kept to obstacles the
-    /// ground may be, and is touched slowly.
+    /// Share of the leg's speed for a descent: so that it is no faster than [`TOUCHDOWN_MPS`] from
+    /// `low_height_m` above the ground on. In that margin to walls the ground may already be.
     fn descent_scale<const W: usize, const G: usize>(
         &self,
         plan: &VehiclePlan<W, G>,
@@ -269,7 +269,7 @@ impl Guidance {
             TOUCHDOWN_MPS * TOUCHDOWN_MPS
                 + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
         );
-        // The scale is a share of the leg's speed, which the slower of the two limits.
+        // The leg's speed is the lower of these two limits.
         most_mps / libm::fminf(self.leg_track.cruise_mps, self.leg_track.descend_mps)
     }
 }

@@ -1,4 +1,4 @@
-//! What guidance reads of the plan and of the autopilot in a step.
+//! What guidance reads of the plan, the autopilot and the roster in a step.
 
 use planner_core::flight::VehiclePlan;
 
@@ -6,20 +6,20 @@ use crate::autopilot::telemetry::Telemetry;
 
 /// Inputs of guidance beside its own state.
 pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
-    /// The plan, if there is one with a path.
+    /// The path that the vehicle flies, with its gates; `None` without a path.
     pub plan: Option<&'a VehiclePlan<W, G>>,
-    /// The autopilot.
+    /// Telemetry of the vehicle's autopilot.
     pub telemetry: &'a Telemetry,
-    /// Rank in the roster.
+    /// Rank of the vehicle in the roster.
     pub rank: u16,
-    /// MAVLink system id.
+    /// MAVLink system id of the vehicle.
     pub id: u8,
-    /// Whether the path is one of its own around something.
+    /// Whether the path is a detour, not that of the shared plan.
     pub detours: bool,
 }
 
 impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
-    /// The scene of a vehicle of this rank and id; a plan without a path is none.
+    /// Inputs of the vehicle of this rank and id; a plan whose path is empty counts as none.
     pub fn new(
         plan: Option<&'a VehiclePlan<W, G>>,
         telemetry: &'a Telemetry,

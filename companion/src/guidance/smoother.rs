@@ -1,4 +1,4 @@
-//! The setpoint smoother: every setpoint with a position or a velocity is made here.
+//! The setpoint smoother: it makes every setpoint with a position or a velocity.
 //!
 //! Guidance moves a *raw* point within limits of speed and acceleration, one step each [`TICK_S`].
 //! The raw point changes its velocity at once in a corner and its acceleration at once where it
@@ -32,7 +32,7 @@ use super::motion::{Motion, clamp_length, clamp_to};
 
 /// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;
-/// Most raw points taken in one call: a later step moves the setpoint no further.
+/// Maximum number of raw points taken in one step: a later step moves the setpoint no further.
 pub const MAX_TICKS: u8 = 4;
 /// Longest window of each moving average, in ticks of [`TICK_S`].
 const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_S / TICK_S + 0.5) as usize;
@@ -40,7 +40,7 @@ const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_S / TICK_S + 0.5) as usize;
 const MIN_WINDOW_TICKS: usize = 8;
 /// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
 const JERK_RESERVE: f32 = 1.12;
-/// Raw velocities that count for one value of both averages.
+/// Number of raw steps that enter one value of both averages.
 const HISTORY_LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
 /// Share of the jerk left by the curve that the clock takes: the clock's own steps are 50 ms long.
 const CLOCK_JERK_SHARE: f32 = 0.7;
@@ -50,8 +50,8 @@ const PLANNED_JERK_SHARE: f32 = 0.9;
 /// Share of the jerk with which the end of a change of speed is planned: the curve may need the
 /// rest.
 const END_JERK_SHARE: f32 = 0.4;
-/// Share of the jerk with which an acceleration ends: nothing depends on how soon the clock runs at
-/// 1 again.
+/// Share of the jerk with which an acceleration of the clock ends: nothing depends on how soon it
+/// runs at 1 again.
 const RISE_JERK_SHARE: f32 = 0.15;
 /// Least speed of the curve from which the clock's acceleration is computed, m/s.
 const MIN_CURVE_MPS: f32 = 0.2;
@@ -59,52 +59,51 @@ const MIN_CURVE_MPS: f32 = 0.2;
 const STANDSTILL_MPS: f32 = 0.01;
 /// Rate of decay at the end of a stop, 1/s: speed falls by this share of itself each second.
 const STOP_DECAY_PER_S: f32 = 4.0;
-/// Fastest that the setpoint follows a vehicle under other control, m/s: a place that moves faster
-/// is an estimate that jumps.
+/// Greatest speed of a setpoint that follows a vehicle under other control, m/s: a position that
+/// moves faster is an estimate that jumps.
 const MAX_FOLLOWED_MPS: f32 = 15.0;
-/// Longest gap in the setpoints during which the vehicle still does what the last setpoint said,
-/// seconds.
+/// Longest gap between setpoints during which the vehicle still flies by the last one, seconds.
 const MAX_SETPOINT_GAP_S: f32 = 0.3;
-/// Weight of the newest step in the velocity of a followed vehicle: the position is reported in
-/// steps of its own.
+/// Weight of the newest step in the velocity of a followed vehicle: its position is reported in
+/// steps.
 const FOLLOWED_VELOCITY_GAIN: f32 = 0.25;
-/// Greatest speed after following, over the speed at which the vehicle was followed.
+/// Greatest velocity after following a vehicle, as a multiple of the followed velocity.
 const MAX_SPEED_OVER_FOLLOWED: f32 = 1.5;
 /// Distance outside the fence up to which a raw point is moved inside without a report, metres.
 const FENCE_SLACK_M: f32 = 0.01;
-/// Distance by which a step may exceed the speed limit, metres: rounding at a kilometre from the
-/// origin.
+/// Distance by which a raw step may exceed the speed limit, metres: rounding at a kilometre from
+/// the origin.
 const STEP_SLACK_M: f32 = 2e-3;
 
-/// Target speed of the smoother's clock.
+/// Speed at which the smoother's clock is to run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockPace {
-    /// 1 runs, 0 stops.
+    /// 1 runs at full speed, 0 stops.
     pub speed_share: f32,
-    /// Whether the safety filter stops it: braking is as hard as that allows.
+    /// Whether the safety filter stops the vehicle: then the clock brakes with the higher jerk.
     pub urgent: bool,
 }
 
-/// Statistics of the setpoints since the start: greatest values, and the number of times that the
-/// smoother had to hold.
+/// Statistics of the setpoints since the start: greatest values, and number of steps in which the
+/// smoother held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetpointStats {
     /// Setpoints made.
     pub setpoint_count: u32,
-    /// Greatest distance between two setpoints over the time between them, m/s.
+    /// Greatest distance between two setpoints, divided by the time between them, m/s.
     pub speed_mps: f32,
     /// Greatest acceleration, m/s².
     pub accel_mps2: f32,
-    /// Greatest jerk without a stop by the safety filter, m/s³.
+    /// Greatest jerk outside stops by the safety filter, m/s³.
     pub jerk_mps3: f32,
     /// Greatest jerk in a stop by the safety filter, m/s³.
     pub urgent_jerk_mps3: f32,
-    /// Setpoints that were not finite, outside the geofence or too far: the last one was held
-    /// instead.
+    /// Steps whose raw points were not finite, outside the geofence or too far from the last: the
+    /// smoother held instead of following them.
     pub hold_count: u32,
 }
 
-/// The last setpoint, and the curve it moves along.
+/// The setpoint, and the curve along which it moves.
 #[derive(Clone, Debug)]
 pub struct SetpointSmoother {
     limits: MotionLimits,
@@ -112,33 +111,33 @@ pub struct SetpointSmoother {
     average_ticks: usize,
     /// Newest raw point.
     raw: Point,
-    /// Raw steps, a ring; `newest_step` is the newest.
+    /// The last differences between raw points, a ring; `newest_step` is the newest.
     steps: [Point; HISTORY_LEN],
     newest_step: usize,
-    /// Newest average, and its last three steps, oldest first.
+    /// Newest value of the averages, and its last three steps, oldest first.
     average: Point,
     average_steps: [Point; 3],
-    /// Part of the tick that has passed.
+    /// Time since the last tick, as a share of a tick.
     tick_fraction: f32,
-    /// Speed of the clock, and its change each second.
+    /// Speed of the clock, 1 for real time, and its change each second.
     clock_speed: f32,
     clock_acceleration: f32,
-    /// Whether there is a setpoint to continue from.
+    /// Whether there is a setpoint, from which the next one continues.
     has_setpoint: bool,
-    /// The place sent last.
+    /// Place of the setpoint that was sent last; `None` before the first.
     last_sent: Option<Point>,
-    /// Whether it continues after a gap, which the next step makes up for.
+    /// Whether the setpoint continues after a short gap, for which the next step makes up.
     resumes: bool,
-    /// Velocity at which setpoints followed a vehicle that another flies.
+    /// Velocity with which setpoints follow a vehicle that its pilot or autopilot flies.
     followed_velocity: Point,
-    /// Settings of the step that is being made: its length, whether the safety filter stops,
-    /// whether its raw points are sound.
+    /// Of the step under way: its length, whether the safety filter stops, whether all raw points
+    /// were sound.
     dt_s: f32,
     stopping: bool,
     raw_points_valid: bool,
     /// Acceleration of the curve at the last setpoint.
     curve_acceleration: Point,
-    /// The setpoint.
+    /// Place, velocity and acceleration of the setpoint.
     motion: Motion,
     /// Statistics since the companion's start.
     pub stats: SetpointStats,
@@ -171,19 +170,19 @@ impl SetpointSmoother {
         }
     }
 
-    /// Sets other limits; allowed at standstill only.
+    /// Sets the limits; to be called only while the setpoint stands.
     pub(crate) fn set_limits(&mut self, limits: MotionLimits, fence: Option<(Point, Point)>) {
         (self.limits, self.fence, self.average_ticks) =
             (limits, fence.map(Fence::new), ticks_per_average(&limits));
         self.forget_curve();
     }
 
-    /// Whether there is a last setpoint.
+    /// Whether there is a setpoint, from which the next one continues.
     pub(crate) fn has_setpoint(&self) -> bool {
         self.has_setpoint
     }
 
-    /// Ends the setpoint stream: the last setpoint is forgotten.
+    /// Ends the setpoint stream: the next setpoint begins at a place of its own.
     pub(crate) fn stop(&mut self) {
         self.has_setpoint = false;
     }
@@ -203,22 +202,22 @@ impl SetpointSmoother {
         self.motion.acceleration
     }
 
-    /// The raw point: ahead of the setpoint by the content of the averages.
+    /// The raw point: ahead of the setpoint by the steps that the averages still hold.
     pub(crate) fn raw_point(&self) -> Point {
         self.raw
     }
 
-    /// Speed that the raw point had last, m/s: that of the setpoint T later, if the clock runs.
+    /// Speed of the newest raw step, m/s: that of the setpoint T later, if the clock runs on.
     pub(crate) fn raw_speed_mps(&self) -> f32 {
         self.steps[self.newest_step].length() / TICK_S * self.clock_speed
     }
 
-    /// Greatest jerk, m/s³.
+    /// Greatest jerk of a setpoint, m/s³; with `urgent` that of a stop by the safety filter.
     pub(crate) fn jerk_mps3(&self, urgent: bool) -> f32 {
         self.limits.jerk(urgent)
     }
 
-    /// Whether it is in a stop by the safety filter, or ends one.
+    /// Whether the setpoint is in a stop by the safety filter, until it no longer brakes.
     pub(crate) fn is_in_urgent_stop(&self) -> bool {
         self.has_setpoint && self.stopping
     }
@@ -234,8 +233,8 @@ impl SetpointSmoother {
         self.velocity().norm_squared() < STANDSTILL_MPS * STANDSTILL_MPS
     }
 
-    /// Distance that a stop takes from now on, metres: what is flown until the braking has built
-    /// up, and the braking.
+    /// Distance of a stop of the setpoint from now on, metres: until the braking has built up, and
+    /// the braking.
     pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
@@ -254,8 +253,8 @@ impl SetpointSmoother {
             + 0.02
     }
 
-    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it continues as
-    /// it was: the autopilot has done so too.
+    /// Begins setpoints at a place, `unsent_s` after one was sent last. After a gap shorter than
+    /// [`MAX_SETPOINT_GAP_S`] the last setpoint continues instead, as the autopilot has done.
     pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
         if !self.has_setpoint
             && self.last_sent == Some(self.position())
@@ -268,8 +267,8 @@ impl SetpointSmoother {
         }
     }
 
-    /// At rest at a place, no further from what was sent last than a vehicle is followed: an
-    /// estimate that jumps is no motion.
+    /// Begins at rest at a place, no further from the place sent last than a followed vehicle flies
+    /// in `unsent_s`: an estimate that jumps is no motion.
     pub(crate) fn begin_at(&mut self, place: Point, unsent_s: f32) {
         let place = if place.iter().all(|c| c.is_finite()) {
             self.nearest_inside_fence(place)
@@ -284,7 +283,8 @@ impl SetpointSmoother {
         self.forget_curve();
     }
 
-    /// Goes with a vehicle that another flies, `unsent_s` after a place was sent last.
+    /// Sets the setpoint to the place of a vehicle that its pilot or autopilot flies, `unsent_s`
+    /// after a setpoint was sent last, and estimates its velocity.
     pub(crate) fn follow_vehicle(&mut self, place: Point, unsent_s: f32) {
         let (here, was_live, followed) =
             (self.position(), self.has_setpoint, self.followed_velocity);
@@ -295,19 +295,19 @@ impl SetpointSmoother {
         }
     }
 
-    /// Whether the next step continues from the last setpoint sent: its time is that since then.
+    /// Whether the next step makes up for a gap, and is as long as the time since the last sending.
     pub(crate) fn resumes_from_last(&self) -> bool {
         self.resumes
     }
 
-    /// The setpoint is sent.
+    /// Notes that the setpoint was sent.
     pub(crate) fn mark_sent(&mut self) {
         self.last_sent = Some(self.position());
     }
 
-    /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes
-    /// back. A velocity that is not that of its places is not believed, and from what it has it can
-    /// stop inside the fence.
+    /// Gives the setpoint the vehicle's velocity: it brakes from that, and comes back to its place.
+    /// The velocity is limited to 1.5 times that of the followed places, and so that it can stop
+    /// inside the fence.
     pub(crate) fn hold_with_velocity(&mut self, velocity: &Point) {
         let most_mps = fminf(
             self.limits.max_speed_mps(),
@@ -322,8 +322,8 @@ impl SetpointSmoother {
         }
     }
 
-    /// Forgets the curve ahead; from a standstill, or nearly: the follower comes to rest by its own
-    /// limits.
+    /// Restarts the curve at the setpoint, which has to stand, or nearly: the follower brings it to
+    /// rest within its own limits.
     pub(crate) fn forget_curve(&mut self) {
         self.steps = [Point::zeros(); HISTORY_LEN];
         self.average_steps = [Point::zeros(); 3];
@@ -332,18 +332,18 @@ impl SetpointSmoother {
         self.curve_acceleration = Point::zeros();
     }
 
-    /// The nearest place inside the fence.
+    /// The place inside the fence that is nearest to `place`.
     pub(crate) fn nearest_inside_fence(&self, place: Point) -> Point {
         self.fence.as_ref().map_or(place, |fence| fence.nearest_inside(place))
     }
 
-    /// Whether a place may be sent.
+    /// Whether a place is inside the fence, or at most 1 cm outside.
     pub(crate) fn is_place_allowed(&self, place: &Point) -> bool {
         (self.nearest_inside_fence(*place) - place).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M
     }
 
-    /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push_raw_point`] takes them,
-    /// then [`Self::make_setpoint`] makes the setpoint.
+    /// Runs the clock for `dt_s`. Returns the number of raw points that are due:
+    /// [`Self::push_raw_point`] takes each, then [`Self::make_setpoint`] makes the setpoint.
     pub(crate) fn begin_step(&mut self, pace: ClockPace, dt_s: f32) -> u8 {
         if !(self.has_setpoint && dt_s > 0.0) {
             self.dt_s = 0.0;
@@ -352,7 +352,7 @@ impl SetpointSmoother {
         let resumes = core::mem::take(&mut self.resumes);
         self.dt_s =
             fminf(dt_s, if resumes { MAX_SETPOINT_GAP_S } else { f32::from(MAX_TICKS) * TICK_S });
-        // A hard stop that has begun ends as one.
+        // A stop by the safety filter keeps its higher jerk until it no longer brakes.
         let brakes =
             self.clock_acceleration < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
         self.stopping = pace.urgent || (self.stopping && brakes);
@@ -367,12 +367,12 @@ impl SetpointSmoother {
         due
     }
 
-    /// Takes the next raw point. One that is not finite, too far, or outside the fence is not
-    /// followed.
+    /// Takes the next raw point. One outside the fence is moved inside, one too far or not finite
+    /// leaves the raw point where it is; either makes [`Self::make_setpoint`] report it.
     pub(crate) fn push_raw_point(&mut self, next: Point) {
         let step = self.nearest_inside_fence(next) - self.raw;
         let furthest = self.limits.max_speed_mps() * TICK_S + STEP_SLACK_M;
-        // NaN is not near.
+        // False for NaN.
         let near = step.norm_squared() <= furthest * furthest;
         self.raw_points_valid &= near
             && (self.nearest_inside_fence(next) - next).norm_squared()
@@ -380,7 +380,7 @@ impl SetpointSmoother {
         self.push_raw_step(if near { step } else { Point::zeros() });
     }
 
-    /// Makes the setpoint; whether it is the one that was asked for. If not, it holds.
+    /// Makes the setpoint of this step. Returns false where a raw point or the curve was not sound.
     pub(crate) fn make_setpoint(&mut self) -> bool {
         let dt_s = self.dt_s;
         let sound = core::mem::replace(&mut self.raw_points_valid, true);
@@ -418,8 +418,8 @@ impl SetpointSmoother {
         sound
     }
 
-    /// The follower stops before the fence. If rounding of uneven steps still leads out of it, the
-    /// fence comes before smoothness.
+    /// The follower stops before the fence. If rounding of uneven steps still leads outside, the
+    /// setpoint is set back inside at once: the fence comes before smoothness.
     fn hold_inside(&mut self) {
         let place = self.nearest_inside_fence(self.motion.position);
         for axis in 0..3 {
@@ -430,9 +430,9 @@ impl SetpointSmoother {
         self.motion.position = place;
     }
 
-    /// Speed of the clock after `dt_s`: as near to the pace as acceleration and jerk allow. With s
-    /// the curve's speed, f its acceleration along it and σ the clock, the setpoint's speed is s·σ,
-    /// its acceleration f·σ² + s·σ̇, and the clock's part of its jerk 3·f·σ·σ̇ + s·σ̈.
+    /// Sets the clock's speed after `dt_s`: as near to the pace as acceleration and jerk allow.
+    /// With s the curve's speed, f its acceleration along it and σ the clock, the setpoint's speed
+    /// is s·σ, its acceleration f·σ² + s·σ̇, and the clock's part of its jerk 3·f·σ·σ̇ + s·σ̈.
     fn run_clock(&mut self, pace: ClockPace, dt_s: f32) {
         let limits = &self.limits;
         let (_, slope, bend) = self.curve_motion();
@@ -473,7 +473,7 @@ impl SetpointSmoother {
         self.clock_acceleration = if done { 0.0 } else { (next - clock) / dt_s };
     }
 
-    /// Adds a raw step to the averages.
+    /// Adds a raw step, and computes the new value of the averages.
     fn push_raw_step(&mut self, step: Point) {
         self.raw += step;
         self.newest_step =
@@ -499,7 +499,7 @@ impl SetpointSmoother {
         self.average = self.raw - behind;
     }
 
-    /// Place, velocity and acceleration of the curve where the clock is.
+    /// Place, velocity and acceleration of the curve at the clock's place in the tick.
     fn curve_motion(&self) -> (Point, Point, Point) {
         let [e0, e1, e2] = &self.average_steps;
         let (x, y) = (self.tick_fraction, 1.0 - self.tick_fraction);
@@ -514,7 +514,7 @@ impl SetpointSmoother {
     }
 }
 
-/// Ticks of each average: long enough for the autopilot's jerk.
+/// Number of ticks in each average's window: long enough for the limit of jerk.
 fn ticks_per_average(limits: &MotionLimits) -> usize {
     let n =
         libm::ceilf(2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3)

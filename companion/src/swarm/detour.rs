@@ -1,24 +1,24 @@
-//! Living with vehicles that left the plan: which count as out, what blocks the path, and flying
-//! around it.
+//! Flying around what left the plan: which vehicles count as out of the plan, whether their places
+//! block the path, and the turn to fly a detour.
 //!
-//! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it
-//! counts as dead) opens every gate that waits for it, and is an obstacle where it rests. A vehicle
-//! whose path that blocks, or which was out itself and may fly again, stops and waits until all
-//! others are out or stand and wait themselves. Then the one with the lowest system id asks its
-//! shell for a detour around everybody and flies it to its goal. All the while it reports the
-//! progress at which it left the plan: a vehicle that waits for it continues waiting, so it flies
-//! alone. On the ground it is out, and the next may go.
+//! A vehicle that is out of the plan (landed elsewhere, with its pilot for good, or silent for so
+//! long that it counts as dead) opens every gate that waits for it, and is an obstacle where it
+//! rests. A vehicle whose path it blocks, or which was out itself and may fly again, stops and
+//! waits until all others are out, or stand and wait too. Then the blocked one with the lowest
+//! system id requests a detour from its shell and flies it to its goal. Meanwhile it reports the
+//! progress at which it left the plan: vehicles that wait for it go on waiting, so it flies alone.
+//! Once it has landed it is out of the plan, and the next may go.
 //!
-//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the
-//! vehicle reports that its path is blocked and no longer that it waits, for [`TURN_CLAIM`], longer
-//! than a word takes to be heard. It begins only if all others wait then; a vehicle that hears a
-//! lower system id claim waits again.
+//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: for
+//! [`TURN_CLAIM`], longer than messages take, the vehicle reports that its path is blocked and no
+//! longer that it waits. It begins only if all others wait then; a vehicle that hears a lower
+//! system id claim waits again.
 //!
-//! A vehicle that is out is checked along the whole path before its gates open, and from then on
-//! twice a second: [`MAX_STRETCHES_PER_STEP`] of the path a step, so a look among many takes
-//! several steps.
+//! The place of a vehicle that is out is compared with the whole path before its gates open, and
+//! from then on twice a second: [`MAX_STRETCHES_PER_STEP`] stretches of the path a step, so a scan
+//! with many vehicles takes several steps.
 //!
-//! Over a field there is no roadmap and no turn: a stopped vehicle flies around the obstacle and
+//! Over an area there is no roadmap and no turn: a stopped vehicle flies around the obstacle and
 //! back to its path ([`beside`]), or home ([`homeward`]).
 //!
 //! ENU metres.
@@ -45,130 +45,129 @@ use crate::swarm::sweep::IncrementalScan;
 use crate::swarm::view::{DetourView, ReportedPlace};
 use crate::time::{Duration, Instant};
 
-/// Time between two checks whether the path is blocked.
+/// Period of the scans that check whether the path is blocked.
 const BLOCKED_CHECK_EVERY: Duration = Duration::from_millis(500);
-/// Stretches of the path that are checked in one step, each against one keep-out zone; a step
-/// checks the whole path at least once.
+/// Number of comparisons of a stretch of the path with a keep-out zone in one step; at least those
+/// of the whole path with one zone.
 const MAX_STRETCHES_PER_STEP: usize = 160;
-/// Cost of gathering one keep-out zone, as a number of those stretches.
+/// Cost of making one keep-out zone, as a number of such comparisons.
 const ZONE_COST: usize = 12;
 /// Time for which all other vehicles have to stand before a detour begins, seconds: longer than a
-/// gate that opened takes to be seen and obeyed.
+/// vehicle takes to see and obey a gate that opened.
 const ALL_STAND_S: u64 = 3;
-/// Time for which a vehicle claims its turn before it takes the turn.
+/// Time for which a vehicle claims the turn to fly a detour before it takes the turn.
 const TURN_CLAIM: Duration = Duration::from_secs(1);
-/// Time that each blocked vehicle with a lower id has to begin its detour, seconds.
+/// Time by which each blocked vehicle with a lower system id delays this one's claim, seconds.
 const TURN_S: u64 = 2;
-/// Time from a search that found no detour to the next search, seconds.
+/// Further delay of the next claim after each search that found no detour, seconds.
 const DETOUR_RETRY_S: u64 = 10;
-/// If a vehicle waits this long while all others stand, it is in a dead end: the vehicle that it
-/// waits for found no detour.
+/// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
+/// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(30);
-/// Searches without a detour after which a vehicle gives up, or one fewer within
+/// Number of searches without a detour after which a vehicle gives up; one fewer is enough after
 /// [`GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 4;
-/// Time after which one search fewer is enough, seconds.
+/// Time of searching from one place after which one search fewer is enough to give up, seconds.
 const GIVE_UP_AFTER_S: u64 = 60;
-/// Time without progress after which a detour is blocked too.
+/// Time without progress after which a detour counts as blocked, or a stopped vehicle's path.
 const STUCK_AFTER: Duration = Duration::from_secs(20);
-/// Progress after which a vehicle that was blocked is blocked again, not still, metres.
+/// Progress since the last block after which a further block counts as a new one, metres.
 const BLOCKED_AGAIN_M: f32 = 2.0;
-/// Time for which whatever kept the vehicle from continuing still does; once the vehicle counts as
-/// blocked it is [`BLOCKED_HINDERED_WITHIN`]: a neighbour that sways at the edge of the path must
-/// not make the block begin again and again.
+/// Time since the filter last hindered the vehicle within which the hindrance still counts; for a
+/// blocked vehicle it is [`BLOCKED_HINDERED_WITHIN`], so that a neighbour that sways at the edge of
+/// the path does not make the block begin again and again.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
-/// Time without a hindrance after which a blocked vehicle is free.
+/// Time without a hindrance after which a blocked vehicle counts as free.
 const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
-/// Time under a pilot's control after which the pilot keeps the vehicle for good: others fly around
-/// it.
+/// Time under a pilot's control after which the vehicle counts as out of the plan: others fly
+/// around it.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
-/// Time after which an abort is over whose end the autopilot does not report.
+/// Time in `Aborted` after which a vehicle that reports no landing is out of the plan.
 const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
-/// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for
-/// others.
+/// Time after which a vehicle on its pad that no other vehicle hears reports that it waits.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
-/// Distance from the end of a path aside within which a blocked vehicle stands aside, metres.
+/// Distance from the end of a path aside at which a blocked vehicle still is aside, metres.
 const SWAY_ASIDE_M: f32 = 0.5;
-/// Age from which a neighbour's position is vague.
+/// Age of this vehicle's position from which it reports no velocity with it.
 const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
-/// Greatest deviation from the path, metres: a path that much nearer to a keep-out zone is blocked.
+/// Deviation from the path, metres: a zone within the safety distance and this blocks the path.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
-/// Knowledge of the path ahead, and of detours.
+/// What blocks the path ahead, and the detour that is requested or flown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Detours {
     obstacles: Obstacles,
-    /// The path is blocked, or the plan was left.
+    /// Whether the path is blocked, or the plan was left.
     blocked: bool,
-    /// This vehicle was out of the plan once: the others do not count on it any more.
+    /// Whether this vehicle was out of the plan once, or flew a detour that leads not back to it.
     left_plan: bool,
     flown: FlownPath,
-    /// What the shell is asked for, and whether it has read that.
+    /// Purpose of the path requested from the shell, and whether the shell has read the request.
     sought: Option<DetourPurpose>,
     request_read: bool,
-    /// The vehicle's way home over a field.
+    /// Search and flight straight home over an area.
     pub(crate) home: HomewardFlight,
-    /// The vehicle's searches beside its path over a field.
+    /// Searches for a detour over an area that leads back to the plan's path.
     field_searches: FieldSearches,
-    /// Progress on the plan when it was left for a detour, metres.
+    /// Progress along the plan's path at which the vehicle left it for a detour, metres.
     left_at_m: f32,
-    /// The detour asked for has come.
+    /// Whether the requested detour has come and is not flown yet.
     detour_ready: bool,
-    /// Number of detours that were not found since another vehicle last moved.
+    /// Number of failed searches since another vehicle last moved.
     failures: u8,
-    /// The last one was not found although all others lie or rest for good, or for a while from
-    /// here, whichever moved.
+    /// Whether a further search is useless: all others lie or rest for good, or searches from here
+    /// failed for a while.
     no_retry: bool,
-    /// Detours not found from here, whichever moved between; how far along the path that is, and
-    /// since when.
+    /// Number of failed searches from about this place, the place along the path, metres, and the
+    /// time of the first.
     failures_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
-    /// Detours on which it did not move, in a row.
+    /// Number of detours in a row on which the vehicle made no progress.
     detours_without_progress: u8,
-    /// When no way aside was found.
+    /// When a search for a path aside last failed.
     no_way_aside_at: Option<Instant>,
-    /// Place and time of the vehicle before its position jumped.
+    /// Place of the vehicle before its position jumped, and when; `None` without a jump.
     before_jump: Option<(Point, Instant)>,
     quiet_since: Option<Instant>,
-    /// Since when it claims its turn.
+    /// Since when this vehicle claims the turn to fly a detour.
     claimed_since: Option<Instant>,
-    /// When a look was last due, and when the one that continues began.
+    /// When a scan was last due, and when the one under way began.
     scanned_at: Instant,
     scan_began: Option<Instant>,
-    /// Progress of the scan along the path, and the result of the last one.
+    /// Progress of the scan under way, and whether the last one found an obstacle on the path.
     scan: IncrementalScan,
     obstructed: bool,
-    /// Place along the path where the vehicle was blocked, metres, and since when: the vehicle has
-    /// come no further, though its path was clear in between.
+    /// Place along the path where the vehicle was blocked, metres, and since when: it has come no
+    /// further, though its path may have been clear in between.
     blocked_here: Option<(f32, Instant)>,
 }
 
-/// Result of a scan of the path.
+/// Result of a finished scan of the path.
 struct ScanResult {
-    /// When one that found nothing began.
+    /// When the scan began, if it found the path clear.
     clear_at: Option<Instant>,
 }
 
 impl Detours {
-    /// The way ahead is as the plan has it again.
+    /// Forgets what concerns an older path; keeps the reported obstacles and `left_plan`.
     pub(crate) fn forget_plan(&mut self) {
         let obstacles = core::mem::take(&mut self.obstacles);
         *self = Self { left_plan: self.left_plan, obstacles, ..Self::default() };
         self.obstacles.forget_avoided();
     }
 
-    /// A new flight over an area begins: the others count this vehicle as a new one.
+    /// Begins a new flight over an area: the others count this vehicle as a new one.
     pub(crate) fn begin_flight(&mut self) {
         self.left_plan = false;
     }
 
-    /// Treats the path as blocked until the next scan has checked it.
+    /// Makes the path count as blocked until the next scan has checked it.
     pub(crate) fn assume_blocked(&mut self) {
         (self.blocked, self.obstructed) = (true, true);
     }
 
-    /// Takes an obstacle of a command.
+    /// Adds or removes the obstacle of a command; returns the MAV_RESULT.
     pub(crate) fn handle_obstacle_command(
         &mut self,
         command: &Command,
@@ -177,14 +176,14 @@ impl Detours {
     ) -> u8 {
         let result = self.obstacles.handle_command(command, origin, clearance_m);
         if command.param1 <= 0.0 && result == ACCEPTED {
-            // A look that is under way counts them by index.
+            // A scan under way counts obstacles by index: it begins again.
             self.scan.restart();
             self.scan_began = None;
         }
         result
     }
 
-    /// Obstacles that were reported.
+    /// Number of obstacles reported by commands.
     pub(crate) fn obstacle_count(&self) -> usize {
         self.obstacles.count()
     }
@@ -194,18 +193,18 @@ impl Detours {
         self.blocked || self.home.is_seeking()
     }
 
-    /// Time for which the vehicle has come no further because its path was blocked, now and again.
+    /// Time for which the vehicle, blocked now and again, has come no further.
     pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
         self.blocked_here.map_or(Duration::default(), |(_, since)| now - since)
     }
 
-    /// Whether it has left the plan once: the others do not count on it any more.
+    /// Whether this vehicle was out of the plan once, or flew a detour that leads not back to it.
     pub(crate) fn has_left_plan(&self) -> bool {
         self.left_plan
     }
 
-    /// Place where the vehicle could come back to its path over a field, metres, beyond what blocks
-    /// the path.
+    /// First free place along the path over an area beyond what blocks it, metres: there the
+    /// vehicle could come back to its path.
     pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -213,7 +212,8 @@ impl Detours {
         beside::first_rejoin_m(view, self.obstacles.all())
     }
 
-    /// Whether it is on the path of its plan over a field, or beside that to come back to it.
+    /// Whether the vehicle, in the air over an area, is on its plan's path, or beside it on a
+    /// detour that leads back to it.
     pub(crate) fn keeps_to_plan_over_field<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -227,19 +227,18 @@ impl Detours {
             && view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 
-    /// Whether it may fly around what is on its path over a field now: where it has not left that.
+    /// Whether a stopped vehicle over an area may now seek a detour that leads back to its path.
     pub(crate) fn may_detour_over_field<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        // Whatever it stopped for on its way around, it seeks another one.
+        // Beside its path the vehicle seeks another way back, whatever stopped it.
         (self.obstructed || self.is_beside_plan() || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
             && self.keeps_to_plan_over_field(view)
             && self.field_searches.may_seek(view.now)
     }
 
-    /// The vehicle's own plan has come, or will not: the vehicle is on its path again, or has to do
-    /// without.
+    /// Ends a detour over an area: with the own plan, if that `came`, else without a return to it.
     pub(crate) fn end_field_detour(&mut self, came: bool) {
         if came {
             let field_searches = self.field_searches;
@@ -250,17 +249,17 @@ impl Detours {
         }
     }
 
-    /// Whether the requested detour has come.
+    /// Whether the requested detour has come and is not flown yet.
     pub(crate) fn is_ready(&self) -> bool {
         self.detour_ready
     }
 
-    /// Progress on the plan when it was left for a detour, metres.
+    /// Progress along the plan's path at which the vehicle left it for a detour, metres.
     pub(crate) fn left_at_m(&self) -> f32 {
         self.left_at_m
     }
 
-    /// Whether it has left the plan for good, and rests or is a pilot's.
+    /// Whether this vehicle is out of the plan: at rest, not at its goal, or kept by its pilot.
     pub(crate) fn is_out_of_plan<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -276,7 +275,7 @@ impl Detours {
         }
     }
 
-    /// Whether it stands until another vehicle moves: it does not claim the turn to move itself.
+    /// Whether this vehicle stands until another one moves, without claiming the turn to move.
     pub(crate) fn is_waiting<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -305,15 +304,15 @@ impl Detours {
                 view.guidance.filter.is_stopped()
                     && view.telemetry.velocity.length() < MAX_HOVER_MPS
             }
-            // Blocked on its way down it stays there.
+            // A vehicle that is blocked in its descent hovers in it.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
-            // The vehicle continues by itself only once its column is free.
+            // A held landing goes on by itself once its column is free.
             State::LandingHeld => view.telemetry.velocity.length() < MAX_HOVER_MPS,
             _ => false,
         }
     }
 
-    /// The place that the vehicle reports.
+    /// Position and velocity that this vehicle reports to the others, and when they were measured.
     pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> ReportedPlace {
         let t = telemetry;
         let vague = self.before_jump.is_some() || t.position_age(now) > MAX_POSITION_AGE;
@@ -322,8 +321,8 @@ impl Detours {
         ReportedPlace { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
 
-    /// Remembers, on entering a state, where it was before its position jumped: where that jumped
-    /// to may be wrong.
+    /// On entering the state `to`, remembers the place from before a jump of the position, which
+    /// may be wrong since; or forgets it.
     pub(crate) fn save_place_before_jump<const V: usize, const W: usize, const G: usize>(
         &mut self,
         to: State,
@@ -342,7 +341,8 @@ impl Detours {
         }
     }
 
-    /// Scans for obstacles on the path, and checks whether the others stand.
+    /// Continues the scan for obstacles on the path, and decides whether the vehicle is blocked.
+    /// Returns when the scan that ended now began, if it found the path clear.
     pub(crate) fn scan_path<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,
@@ -372,7 +372,7 @@ impl Detours {
         looked.and_then(|looked| looked.clear_at)
     }
 
-    /// Takes the result of a check of the path that has ended.
+    /// Continues the scan under way; `None` while none has ended.
     fn take_scan_result<const V: usize, const W: usize, const G: usize>(
         &mut self,
         on_ground: bool,
@@ -385,8 +385,8 @@ impl Detours {
         Some(ScanResult { clear_at: (!in_the_way).then_some(began) })
     }
 
-    /// Decides whether the vehicle is blocked, since when all have stood, and whether it claims its
-    /// turn.
+    /// Decides whether the vehicle is blocked, since when all others have stood, and whether this
+    /// one claims the turn.
     fn update_blocked<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,
@@ -395,7 +395,7 @@ impl Detours {
         let stuck = self.is_on_detour()
             && view.mission.state() != State::Scheduled
             && now - view.guidance.last_progress_at() > STUCK_AFTER;
-        // Where it stands aside it still makes room.
+        // A vehicle that stands aside may have swayed back a little from the end.
         let stands = matches!(view.mission.state(), State::Blocked | State::Replanning);
         let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
@@ -424,7 +424,7 @@ impl Detours {
             self.blocked_here = Some((along_m, now));
         }
         if !view.neighbours.are_all_standing(now) {
-            // Another vehicle moved: the block of the path may have gone.
+            // Another vehicle moved, which may have freed the path.
             (self.quiet_since, self.failures, self.no_retry) = (None, 0, false);
         } else if self.quiet_since.is_none() {
             self.quiet_since = Some(now);
@@ -434,8 +434,8 @@ impl Detours {
         self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
-    /// Whether another vehicle has stopped it for long: one that lets it go first, or over a field
-    /// one off the plan.
+    /// Whether the filter has kept the vehicle from continuing for 20 s although it goes first;
+    /// over an area also because of a neighbour off the plan.
     fn is_stopped<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -458,8 +458,8 @@ impl Detours {
         let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
-        // One that hovers sways: what blocked the path over a field blocks it until it is as far
-        // away as a detour keeps.
+        // A vehicle that hovers sways. What blocked the path over an area blocks it until it is as
+        // far away as a detour keeps.
         let waits = view.config.division.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
@@ -475,8 +475,8 @@ impl Detours {
                 Some(obstacle) => tell(*obstacle),
                 None => neighbours.for_each_zone_of(source - new.len(), now, apart_m, tell),
             },
-            // Over a field it photographs what comes before, and flies around what blocks the way
-            // when it comes there.
+            // Over an area the vehicle photographs on, and stops and flies around an obstacle when
+            // it comes near.
             |obstacle| {
                 let until_m = match view.config.division {
                     Some(_) => along_m.max(0.0) + LOOK_AHEAD_M,
@@ -495,7 +495,7 @@ impl Detours {
         )
     }
 
-    /// Whether it may claim its turn to fly around.
+    /// Whether this vehicle may claim the turn to fly a detour.
     fn may_claim_turn<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -503,14 +503,14 @@ impl Detours {
         let wait_s = ALL_STAND_S
             + TURN_S * view.neighbours.blocked_count_before(view.config.system_id)
             + DETOUR_RETRY_S * u64::from(self.failures);
-        // Over a field nobody flies around.
+        // Over an area there are no turns.
         self.blocked
             && view.config.division.is_none()
             && view.neighbours.are_all_standing(view.now)
             && self.quiet_since.is_some_and(|at| view.now - at >= Duration::from_secs(wait_s))
     }
 
-    /// Whether it may fly around now.
+    /// Whether this vehicle may begin its detour: it has claimed the turn, and all others wait.
     pub(crate) fn is_our_turn<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

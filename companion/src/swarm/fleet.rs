@@ -1,14 +1,14 @@
-//! Which vehicles of a coverage mission still fly, and the division of what the others left: agreed
-//! on with nobody in charge.
+//! The fleet of a coverage mission: which vehicles still fly, and the division of what the others
+//! left among them, agreed on without a leader.
 //!
 //! Each vehicle keeps an entry for every vehicle of the roster. Entries only grow and are merged by
 //! maximum, so lost, repeated and reordered messages do no harm. Where a vehicle is lost or leaves,
-//! each of the others states once how far it flies on: its promise. It holds there. From the
-//! entries all compute the same division, report its hash, and fly on once all that live have
-//! reported the same one and hold ([`Fleet::step`]). A vehicle photographs only while it has its
-//! lease: within [`LEASE`] a majority said that it hears it. Others take its part no sooner than
-//! [`SILENT_AFTER`] after each of them last heard it. Why no waypoint has two owners is in
-//! `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
+//! each of the others reports once how far it still flies along its path: its promise. It holds
+//! there. From the entries all compute the same division, report its hash, and fly on once all that
+//! live have reported the same hash and hold ([`Fleet::step`]). A vehicle photographs only while it
+//! has its lease: within [`LEASE`] a majority reported that they hear it. Others take its part no
+//! sooner than [`SILENT_AFTER`] after each of them last heard it. Why no waypoint has two owners is
+//! in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
 
 use heapless::Vec;
 use planner_core::file::CRC32;
@@ -23,96 +23,95 @@ pub use lots::{DivisionInput, DivisionInputs};
 /// Time for which a vehicle continues photographing after a majority last reported that they hear
 /// it.
 pub const LEASE: Duration = Duration::from_secs(20);
-/// Greatest age of a report that renews the lease.
+/// Greatest age of a neighbour's report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
-/// Silence after which a vehicle's share is divided among the others.
+/// Silence of a vehicle after which it counts as lost, and its share is divided among the others.
 pub const SILENT_AFTER: Duration = Duration::from_secs(45);
-/// Time for which a vehicle commits itself to fly on, seconds, up to the last picture that it takes
-/// within it. A vehicle requests a division this long before its path ends if its route continues
-/// there.
+/// Time of flight for which a vehicle promises to fly on, seconds: up to the last picture that it
+/// takes within it. A vehicle whose path ends before its route requests a division this long before
+/// that end.
 pub const COMMITMENT_S: f32 = 10.0;
-/// Most divisions of a mission; after the last one the waypoints that a vehicle leaves stay
-/// unphotographed.
+/// Maximum number of divisions of a mission; after the last one the waypoints that a vehicle leaves
+/// stay unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
-/// Number of distinct incarnations: 3 bits.
+/// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
 
-/// Time limits of a fleet. A vehicle that has no lease lands after twice the lease.
+/// Time limits of a fleet. A vehicle without a lease lands after twice the lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct FleetTimeouts {
-    /// As [`LEASE`].
+    /// Time for which a renewed lease lasts, as [`LEASE`].
     pub lease: Duration,
-    /// As [`LEASE_HEARD_WITHIN`].
+    /// Greatest age of a report that renews the lease, as [`LEASE_HEARD_WITHIN`].
     pub heard: Duration,
-    /// As [`SILENT_AFTER`].
+    /// Silence after which a vehicle counts as lost, as [`SILENT_AFTER`].
     pub silent: Duration,
-    /// A lost vehicle is down once it has been silent for so long.
+    /// Silence after which a lost vehicle is down, at whatever height it was lost.
     pub down: Duration,
 }
 
 impl FleetTimeouts {
-    /// Time limits of a flight in which a vehicle that no other vehicle hears any more is down
-    /// after `down`.
+    /// Time limits of a flight in which a vehicle that no other vehicle hears is down after `down`.
     pub const fn of_flight(down: Duration) -> Self {
         Self { lease: LEASE, heard: LEASE_HEARD_WITHIN, silent: SILENT_AFTER, down }
     }
 }
 
-/// State that a vehicle reports of itself.
+/// This vehicle's state, as it reports it to the fleet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnReport {
-    /// Whether it takes part.
+    /// Whether this vehicle takes part in the mission, was lost, has left or has finished.
     pub status: MemberStatus,
-    /// Whether it has not been started: it may come back as one that is new.
+    /// Whether this vehicle was not started yet: it may take part again as a new vehicle.
     pub waits: bool,
-    /// Divisions that count for the path it flies: what follows is along that.
+    /// Number of divisions from which its path follows: the fields below are along that path.
     pub division: usize,
-    /// Progress of the vehicle along its path, decimetres.
+    /// Progress along its path, decimetres.
     pub progress_dm: u16,
-    /// Place where the vehicle would hold if it were requested now; none while it cannot say.
+    /// Place where this vehicle would hold if it promised now, decimetres along its path.
     pub commitment_dm: Option<u16>,
-    /// Whether it stands where it promised.
+    /// Whether this vehicle stands where it promised to hold.
     pub holds: bool,
-    /// Whether its path, a stretch of its route, ends soon: all are to divide what is left.
+    /// Whether this vehicle's path, the first part of its route, ends soon: all are to divide.
     pub wants_division: bool,
 }
 
-/// State of another vehicle, as this one hears it.
+/// Reception of another vehicle: whether this one and others hear it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MemberReception {
-    /// When it was last heard itself.
+    /// When this vehicle last received an intent from the other one.
     pub heard_at: Option<Instant>,
-    /// Whether that said that it hears this one.
+    /// Whether the other vehicle lately reported that it hears this one.
     pub hears_us: bool,
-    /// Whether another one that is heard said that it hears it.
+    /// Whether a vehicle heard by this one lately reported that it hears the other one.
     pub heard_by_others: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 struct FleetMember {
     entry: RosterReportEntry,
-    /// Whether it was alive when the last division began to count.
+    /// Whether the member was alive when the last division became binding: then it has a part.
     in_roster: bool,
-    /// When it was last heard, by this vehicle or one that this one hears.
+    /// When the member was last heard, by this vehicle or by one that this vehicle hears.
     heard_at: Instant,
-    /// Whether this vehicle heard it lately itself.
+    /// Whether this vehicle itself lately heard the member.
     heard_itself: bool,
-    /// The vehicle's hash of the division under way; 0 for none.
+    /// Hash of the division under way that the member has computed; 0 for none.
     hash: u32,
 }
 
-/// All vehicles of the roster, this one among them.
+/// What this vehicle knows of all vehicles of the roster, itself included, and of their divisions.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Fleet<const V: usize> {
     own: usize,
     members: Vec<FleetMember, V>,
-    /// The divisions that count.
+    /// Inputs of the binding divisions, oldest first.
     divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
     committed_hash: u32,
-    /// Inputs of the division under way, once all of them are known.
+    /// Inputs of the division under way; empty until all of them are known.
     division_inputs: DivisionInputs<V>,
     hash: u32,
-    /// Inputs as they were reported before the last change.
+    /// Inputs of the division that this vehicle reported last and withdrew since.
     previous_inputs: DivisionInputs<V>,
     previous_hash: u32,
     lease_at: Instant,
@@ -121,7 +120,7 @@ pub struct Fleet<const V: usize> {
 }
 
 impl<const V: usize> Fleet<V> {
-    /// A fleet of so many vehicles (at most `V`), seen by the one of rank `own`.
+    /// A fleet of `count` vehicles (at most `V`), as known to the vehicle of rank `own`.
     pub fn new(own: usize, count: usize, limits: FleetTimeouts) -> Self {
         let member = FleetMember { in_roster: true, ..FleetMember::default() };
         Self {
@@ -139,7 +138,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Starts a flight, or a new plan: no vehicle counts as silent from before.
+    /// Begins a flight, or a new plan: silence before does not count.
     pub fn begin_flight(&mut self, now: Instant) {
         let entry = self.members[self.own].entry;
         if entry.status != MemberStatus::Alive || self.excluded || !self.divisions.is_empty() {
@@ -149,7 +148,7 @@ impl<const V: usize> Fleet<V> {
         self.lease_at = now;
     }
 
-    /// Forgets the fleet's state and takes part again under this incarnation number.
+    /// Forgets what is known of the fleet, and takes part again under this incarnation number.
     fn rejoin(&mut self, incarnation: u8) {
         *self = Self {
             lease_at: self.lease_at,
@@ -158,17 +157,18 @@ impl<const V: usize> Fleet<V> {
         self.members[self.own].entry.incarnation = incarnation;
     }
 
-    /// One step: the knowledge of all vehicles, the lease, and the division under way.
+    /// One step: updates this vehicle's entry, the reception of the others, the lease, and the
+    /// division under way.
     pub fn step(
         &mut self,
         now: Instant,
         own: &OwnReport,
         hearing: impl Fn(usize) -> MemberReception,
     ) {
-        // The vehicle's path may be that of the division before yet.
+        // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[self.own].entry;
-        // The path that the vehicle flies after it has left is not its share.
+        // A vehicle that has left flies a path outside its share.
         if caught_up && entry.status == MemberStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
@@ -196,7 +196,7 @@ impl<const V: usize> Fleet<V> {
         }
         let asks = own.wants_division && self.is_alive(self.own) && !self.divisions.is_full();
         if (self.is_dividing() || asks) && caught_up {
-            // The promise shows others that this vehicle requests a division.
+            // The promise requests the division from the others.
             let entry = &mut self.members[self.own].entry;
             entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
             entry.holds |= own.holds && entry.commitment_dm.is_some();
@@ -207,9 +207,9 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether what some vehicle left is to be divided. What was promised binds until a division
-    /// counts, even if the lost vehicle turns out to have finished: it may count for others
-    /// already.
+    /// Whether a division is under way: a vehicle was lost or left, or one has promised where to
+    /// hold. A promise binds until a division does, even if the lost vehicle turns out to have
+    /// finished: others may already count on it.
     pub fn is_dividing(&self) -> bool {
         let asks = |m: &FleetMember| match m.entry.status {
             MemberStatus::Alive => m.entry.commitment_dm.is_some(),
@@ -220,14 +220,14 @@ impl<const V: usize> Fleet<V> {
         self.is_alive(self.own) && !self.divisions.is_full() && asked
     }
 
-    /// Whether this vehicle of the roster takes part.
+    /// Whether the vehicle of this rank takes part.
     pub(crate) fn is_alive(&self, rank: usize) -> bool {
         let member = &self.members[rank];
         member.in_roster && member.entry.status == MemberStatus::Alive
     }
 
-    /// Whether these are a majority of those that take part, or were lost: of half of them, the
-    /// half with the lowest rank.
+    /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
+    /// halves, the one with the lowest rank is.
     fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
         let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
         let all = || self.members.iter().enumerate().filter(|(_, m)| counts(m));
@@ -236,8 +236,8 @@ impl<const V: usize> Fleet<V> {
         2 * these > all().count() || (2 * these == all().count() && lowest)
     }
 
-    /// The inputs of the division, once all vehicles that live have stated their promise, and every
-    /// lost vehicle has been silent here too.
+    /// Computes the inputs of the division, once all vehicles that live have promised, and this
+    /// vehicle has not heard the lost ones for [`SILENT_AFTER`] either.
     fn prepare_division_inputs(&mut self, now: Instant) {
         let known = |m: &FleetMember| match m.entry.status {
             MemberStatus::Alive => m.entry.commitment_dm.is_some(),
@@ -249,7 +249,7 @@ impl<const V: usize> Fleet<V> {
             self.division_inputs.clear();
             return;
         }
-        // A vehicle without a part in the division before has none in this one.
+        // A vehicle that has no part since an earlier division gets none in this one.
         let lot = |m: &FleetMember| {
             if m.in_roster { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
         };
@@ -259,7 +259,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Withdraws the last reported inputs.
+    /// Withdraws the inputs that were reported last, and remembers them.
     fn withdraw_inputs(&mut self) {
         if self.hash != 0 {
             (self.previous_inputs, self.previous_hash) = (self.division_inputs.clone(), self.hash);
@@ -267,20 +267,19 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// The division to be computed, if there is one: all that count, and the one under way.
+    /// Whether the shell is to compute the division under way: all its inputs are known.
     pub fn needs_division(&self) -> bool {
         self.hash == 0 && !self.division_inputs.is_empty()
     }
 
-    /// The lots of every division that counts, and of the one under way where that is to be
-    /// computed.
+    /// The inputs of every binding division, and of the one under way where that is to be computed.
     pub fn losses(&self) -> impl Iterator<Item = &[DivisionInput]> {
         let under_way = self.needs_division().then_some(&self.division_inputs);
         self.divisions.iter().chain(under_way).map(|lots| &lots[..])
     }
 
-    /// Takes the CRC of the plan that was computed. The hash covers what it follows from as well:
-    /// plans may be alike of which one counts on a vehicle that the other has given up.
+    /// Sets the hash of the division under way from the CRC of the computed plan and from the
+    /// inputs: the same plan may follow from inputs with another lost vehicle.
     pub fn take_plan_crc(&mut self, plan_crc: u32) {
         if self.needs_division() {
             let mut digest = CRC32.digest();
@@ -289,7 +288,7 @@ impl<const V: usize> Fleet<V> {
                 let [low, high] = lot.along_dm.to_le_bytes();
                 digest.update(&[u8::from(lot.alive), low, high]);
             }
-            // 0 is none.
+            // 0 stands for no hash.
             self.hash = digest.finalize().max(1);
             self.members[self.own].hash = self.hash;
         }
@@ -309,7 +308,7 @@ impl<const V: usize> Fleet<V> {
             && self.is_majority(|rank, _| self.is_alive(rank))
     }
 
-    /// Makes the division under way binding.
+    /// Makes the division under way binding: vehicles without a part in it leave the fleet.
     fn commit_division(&mut self) {
         let lots = core::mem::take(&mut self.division_inputs);
         self.committed_hash = self.hash;
@@ -323,11 +322,12 @@ impl<const V: usize> Fleet<V> {
             member.entry =
                 RosterReportEntry { incarnation, status: standing, ..RosterReportEntry::default() };
         }
-        // No division is under way where they are full.
+        // With `MAX_DIVISIONS` no further one is ever under way.
         let _ = self.divisions.push(lots);
     }
 
-    /// Handles what the vehicle of rank `sender` reports.
+    /// Handles the roster report of the vehicle of rank `sender`; `waits`: this vehicle was not
+    /// started.
     pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, waits: bool) {
         if sender >= self.members.len() || sender == self.own {
             return;
@@ -347,7 +347,7 @@ impl<const V: usize> Fleet<V> {
                 self.handle_own_entry(entry, waits);
             } else if rank < self.members.len() {
                 let behind = roster.divisions < self.divisions.len() as u8 && rank != sender;
-                // The vehicle may have finished its share of a division that the sender does not
+                // The member may have finished its share of a division that the sender does not
                 // know; it reports that itself.
                 if !(behind
                     && entry.status == MemberStatus::Left
@@ -362,8 +362,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Lets the division count that counts for the sender, if it was reported here: then the others
-    /// counted on that.
+    /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
+    /// then the others counted on that. Returns whether it did.
     fn adopt_division(&mut self, roster: &RosterReport) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
@@ -398,23 +398,22 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Handles the entry that another vehicle reports about this one.
+    /// Handles the entry about this vehicle in another one's report.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
         let own = self.members[self.own].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
         match (outlived, waits) {
             (false, _) => {}
-            // This vehicle was restarted: what others know is of its flight before.
+            // This vehicle was restarted: the others report its flight before.
             (true, true) => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
             (true, false) => self.excluded = true,
         }
     }
 
-    /// The vehicles from rank `first` on, as they are to be reported.
+    /// The roster report of this vehicle, with the entries from rank `first` on.
     pub fn roster_message(&self, first: usize) -> RosterReport {
-        // A vehicle that has left computes no more, so its knowledge of the division under way gets
-        // old.
+        // A vehicle that has left computes no divisions: its hash would soon be outdated.
         let hash = if self.is_alive(self.own) { self.hash } else { 0 };
         let entry =
             |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
@@ -428,9 +427,9 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// The same fleet on a clock that shows `then` where this one's shows `now`. A time past every
-    /// limit keeps only that: fleets that will act alike are equal then, so a search recognises a
-    /// state that it has visited.
+    /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
+    /// limit are cut to that limit. Fleets that will act alike become equal, so a search recognises
+    /// a state that it has visited.
     pub fn move_to_clock(&mut self, now: Instant, then: Instant) {
         let FleetTimeouts { lease, silent, down, .. } = self.limits;
         let moved = |at: Instant, most: Duration| {
@@ -444,23 +443,23 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Number of vehicles.
+    /// Number of vehicles in the roster.
     pub(crate) fn vehicle_count(&self) -> usize {
         self.members.len()
     }
 
-    /// Whether it has its lease.
+    /// Whether this vehicle has its lease: a majority lately reported that they hear it.
     pub fn has_lease(&self, now: Instant) -> bool {
         now - self.lease_at <= self.limits.lease
     }
 
-    /// Time since a majority last said that it hears this vehicle; nothing where it takes no part
-    /// any more, and needs no lease.
+    /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
+    /// takes no part, and needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
         if self.is_alive(self.own) { now - self.lease_at } else { Duration::default() }
     }
 
-    /// Hash of the inputs of the division to be computed, or of the last one that counts.
+    /// Hash of the inputs of all binding divisions, and of the one that is to be computed.
     pub fn division_hash(&self) -> u32 {
         let mut digest = CRC32.digest();
         for lot in self.losses().flatten() {
@@ -470,14 +469,14 @@ impl<const V: usize> Fleet<V> {
         digest.finalize()
     }
 
-    /// Place where this vehicle is to hold, decimetres along its path, while a division is under
-    /// way.
+    /// Place where this vehicle promised to hold, decimetres along its path, while a division is
+    /// under way; `None` before its promise.
     pub fn commitment_dm(&self) -> Option<u16> {
         self.members[self.own].entry.commitment_dm.filter(|_| self.is_dividing())
     }
 
-    /// Place where this vehicle held for the last division that counts, decimetres along its path
-    /// before.
+    /// Place where this vehicle held for the last binding division, decimetres along its path
+    /// before it.
     pub fn held_at_dm(&self) -> u16 {
         let lots = self.divisions.last().and_then(|lots| lots.get(self.own));
         lots.map_or(0, |lot| lot.along_dm)
@@ -488,28 +487,28 @@ impl<const V: usize> Fleet<V> {
         self.divisions.len()
     }
 
-    /// The hash of the last division that counts.
+    /// Hash of the last binding division; 0 before the first.
     pub fn committed_hash(&self) -> u32 {
         self.committed_hash
     }
 
-    /// Whether the others have counted it as lost, or have divided its part; one that has finished
-    /// its part has none.
+    /// Whether the others count this vehicle as lost, or have divided its part; false for one that
+    /// has finished its part.
     pub fn is_excluded(&self) -> bool {
         self.excluded && self.members[self.own].entry.status != MemberStatus::Finished
     }
 
-    /// Whether this vehicle flies its part of the area, or will fly it.
+    /// Whether this vehicle flies its part of the area, or will.
     pub(crate) fn takes_part(&self) -> bool {
         self.is_alive(self.own)
     }
 
-    /// Whether this vehicle has left the mission and has reported it.
+    /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
         self.members[self.own].entry.status == MemberStatus::Left
     }
 
-    /// Whether another vehicle that lives has not been heard for `span`.
+    /// Whether a vehicle that takes part has not been heard for `span`.
     pub fn is_any_missing(&self, now: Instant, span: Duration) -> bool {
         let missed =
             |rank: &usize| self.is_alive(*rank) && now - self.members[*rank].heard_at >= span;
@@ -517,7 +516,8 @@ impl<const V: usize> Fleet<V> {
     }
 }
 
-/// Status carried over to another division: a vehicle that finished its part may get another part.
+/// The status that counts for another division than that of the report: one that had finished its
+/// part then may have another part now, so it counts as having left.
 fn status_in_division(standing: MemberStatus, same: bool) -> MemberStatus {
     if standing == MemberStatus::Finished && !same { MemberStatus::Left } else { standing }
 }

@@ -1,10 +1,10 @@
-//! The neighbours as last heard on the swarm link, one slot for each system id, in the mission
+//! The neighbours as last heard on the swarm link, one entry for each system id, in the mission
 //! frame.
 //!
 //! From the byte to the speed scale: GLOBAL_POSITION_INT → [`Neighbours::handle_position`] → ENU in
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
-//! [`Neighbours::states_at`] brings the ages up to date, and `planner_core::deconflict::advise`
-//! makes of them a speed scale.
+//! [`Neighbours::states_at`] computes the ages, and `planner_core::deconflict::advise` computes the
+//! speed scale from the result.
 
 mod bounds;
 mod contact;
@@ -36,46 +36,46 @@ use crate::link::intent::{
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
-/// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are
-/// known by their position only: whatever else they send changes nothing. A few are kept, in what
-/// the roster leaves free, until they are silent for a minute.
+/// Table of the other vehicles. Those of the roster have their entry from the start. Others, the
+/// strangers, are known by their positions only: their other messages change nothing. A few are
+/// kept, in entries that the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
     contacts: Vec<NeighbourEntry, V>,
     heard: Vec<Neighbour, V>,
-    /// The first contacts are the roster, sorted by id; the rest are strangers.
+    /// Number of roster vehicles in `contacts`, sorted by id; behind them are the strangers.
     roster: usize,
     dropped: u32,
-    /// When it was last found that no vehicle that is out blocks the path.
+    /// When the last scan began that found no vehicle out of the plan on the path.
     clear_at: Instant,
-    /// No vehicle's progress grows faster, m/s.
+    /// Greatest speed at which a reported progress is believed to grow, m/s.
     fastest_mps: f32,
-    /// An unheard one makes this much at least, m/s.
+    /// Least speed at which an unheard vehicle is assumed to make progress, m/s.
     assumed_speed_mps: f32,
-    /// Distance from which on the radio may not reach, metres.
+    /// Distance from which on the radio may not reach, metres; ∞ where it reaches every vehicle.
     range_edge_m: f32,
-    /// Place of the own vehicle.
+    /// Position of this vehicle, ENU.
     place: Point,
-    /// With the vehicle of this rank the next relay begins.
+    /// Rank of the vehicle with which the next relay message begins.
     relay_next: u16,
     /// Rank of this vehicle in the roster.
     own_rank: u16,
-    /// The fleet: the state that all vehicles of a coverage mission agree on.
+    /// The fleet, by which vehicles of a coverage mission agree; `None` in other missions.
     fleet: Option<Fleet<V>>,
-    /// The ground of an area that is not level.
+    /// Heights of the ground of an area that is not level.
     ground: Option<Ground>,
-    /// After this silence a vehicle is down.
+    /// Silence after which a vehicle is on the ground.
     down: Duration,
-    /// Distance by which two vehicles in the air may be nearer than they believe, metres: over an
-    /// area, where it is kept.
+    /// Distance by which two vehicles in the air over an area may be nearer than their estimates
+    /// say, metres; 0 in other missions.
     pair_position_error_m: f32,
-    /// With the vehicle of this rank the next report of all begins.
+    /// Rank of the vehicle with which the next roster report begins.
     roster_next: usize,
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The vehicles of a roster sorted by id, without the own one; no other vehicle heard yet. None
-    /// of them flies faster along its path than `nominal_mps`, or than it lands.
+    /// A table of the roster's vehicles, sorted by id, without the own one; none of them was heard
+    /// yet. Their progress is believed to grow no faster than `nominal_mps`, or than they land.
     pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
@@ -107,20 +107,20 @@ impl<const V: usize> Neighbours<V> {
         table
     }
 
-    /// The own place now, and how far the radio reaches, metres.
+    /// Sets this vehicle's position, and the range of the radio, metres.
     pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
         let all = radio_range_m >= REACHES_ALL_M;
         self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
         self.place = place;
     }
 
-    /// Whether it is known how far the radio reaches.
+    /// Whether the operator has set the range of the radio (`FLK_RADIO_M`).
     pub(crate) fn knows_range(&self) -> bool {
         self.range_edge_m.is_finite()
     }
 
-    /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the
-    /// radio may not reach: no radio has failed.
+    /// Whether every vehicle of the roster that has not ended its flight was last heard, if ever,
+    /// where the radio may not reach: then its silence is no failure.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports(LANDED | OUT_OF_PLAN)
@@ -133,7 +133,7 @@ impl<const V: usize> Neighbours<V> {
         self.own_rank
     }
 
-    /// Number of frames from vehicles for which the table had no slot.
+    /// Number of positions dropped because the table had no room for their sender.
     pub fn dropped_count(&self) -> u32 {
         self.dropped
     }
@@ -190,7 +190,7 @@ impl<const V: usize> Neighbours<V> {
         Some(self.contacts.len() - 1)
     }
 
-    /// Rank in the roster of a vehicle whose intents are of our mission.
+    /// Index of a vehicle of the roster that has lately sent an intent of our mission.
     fn roster_rank(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.roster_index(id)?;
         self.contacts[at]
@@ -208,7 +208,7 @@ impl<const V: usize> Neighbours<V> {
         strangers.iter().position(|c| c.id == id).map(|at| at + self.roster)
     }
 
-    /// Removes the strangers that do not meet the condition.
+    /// Removes the strangers for which `keep` returns false.
     fn retain_strangers(&mut self, mut keep: impl FnMut(&NeighbourEntry) -> bool) {
         let mut at = self.roster;
         while let Some(contact) = self.contacts.get(at) {
@@ -220,7 +220,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// The slot of a position's sender: that of the roster, or a stranger's, made if there is room.
+    /// The entry of a position's sender: that of the roster, else a stranger's, added if it fits.
     fn slot_for_position(&mut self, id: u8, now: Instant) -> Option<&mut NeighbourEntry> {
         if let Some(at) = self.roster_rank(id, now).or_else(|| self.stranger_index(id)) {
             return self.contacts.get_mut(at);
@@ -236,9 +236,9 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that
-    /// decodes and is of our mission: what anybody can send must not make the next true one look
-    /// late. Positions carry their time instead.
+    /// Whether an intent of `id` is newer than its last one, by the sequence number. To be called
+    /// only for an intent that decodes and is of our mission: what anybody can send must not make
+    /// the next true one look late. Positions carry a time instead.
     pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             let contact = &mut self.contacts[at];
@@ -250,8 +250,8 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// A neighbour's position. It is the roster's only if this vehicle's intents are of our
-    /// mission; else it is a stranger's.
+    /// Handles a neighbour's position. It is that of the roster's vehicle only if that has lately
+    /// sent an intent of our mission; else it is a stranger's.
     pub fn handle_position(
         &mut self,
         now: Instant,
@@ -284,8 +284,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// A neighbour's intent. It counts only from a vehicle of the roster and with our mission's
-    /// CRC, its progress only if the plan is ours too. `rank` is our own.
+    /// Handles a neighbour's intent. It counts only from a vehicle of the roster with our mission's
+    /// CRC, its progress only with our plan's CRC. `rank` is our own.
     pub fn handle_intent(
         &mut self,
         now: Instant,
@@ -299,7 +299,7 @@ impl<const V: usize> Neighbours<V> {
         else {
             return;
         };
-        // The vehicle is no stranger.
+        // A vehicle of the roster is no stranger.
         self.retain_strangers(|c| c.id != intent.system_id);
         let contact = &mut self.contacts[at];
         contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
@@ -317,7 +317,7 @@ impl<const V: usize> Neighbours<V> {
         }
         let out = contact.reports(OUT_OF_PLAN) && contact.position_at.is_some();
         contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
-        // Ranks beyond the bitmap are not reported.
+        // From rank 32 on there is no bit: this vehicle counts as heard.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
         }
@@ -339,9 +339,9 @@ impl<const V: usize> Neighbours<V> {
             shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position or progress was ever heard, or which is lost, with its age at
-    /// `now`. A vehicle that is out opens no gate before it was checked whether it blocks the path
-    /// ([`Self::mark_path_clear`]).
+    /// State and age, at `now`, of every neighbour whose position or progress was ever heard, or
+    /// that counts as dead. A vehicle out of the plan opens no gate until a scan has found that it
+    /// does not block the path ([`Self::mark_path_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
@@ -353,7 +353,7 @@ impl<const V: usize> Neighbours<V> {
                 continue;
             }
             let state = Neighbour {
-                // Of a vehicle that was never heard itself only the progress is known.
+                // Of a vehicle known by relays alone, only the progress is known.
                 position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
                 age_s: placed_at.map_or(0.0, |at| (now - at).as_secs_f32()),
                 rank: contact.rank,
@@ -369,7 +369,7 @@ impl<const V: usize> Neighbours<V> {
         &self.heard
     }
 
-    /// Whether `gate` is open for good: its vehicle has come past it, or is out of the plan.
+    /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
     pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
         let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
         contact.is_some_and(|c| {
@@ -381,14 +381,14 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for
-    /// so long that they lie.
+    /// so long that they lie on the ground.
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster]
             .iter()
             .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
     }
 
-    /// Whether a vehicle of the roster counts as dead, but not yet as one that lies.
+    /// Whether a vehicle of the roster counts as dead, but may still be coming down.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
         let roster = &self.contacts[..self.roster];
         roster.iter().any(|c| {
@@ -396,15 +396,15 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Whether a vehicle of the roster has landed, or is out of the plan.
+    /// Whether the vehicle `id` of the roster has landed, or is out of the plan.
     pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now)
         })
     }
 
-    /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having
-    /// flown.
+    /// Whether the vehicle `id` of the roster was not heard yet, or stands on the ground without
+    /// having flown.
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
         let waits = |c: &NeighbourEntry| {
             c.heard_at.is_none() || (c.reports(GROUNDED) && !c.reports(LANDED | OUT_OF_PLAN))
@@ -412,33 +412,33 @@ impl<const V: usize> Neighbours<V> {
         self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
     }
 
-    /// Delay estimate of the messages from `id`.
+    /// Estimated delay of the messages from the vehicle `id` of the roster.
     pub(crate) fn message_delay(&mut self, id: u8) -> Option<&mut MessageDelay> {
         let at = self.roster_index(id)?;
         Some(&mut self.contacts[at].message_delay)
     }
 
-    /// Greatest message delay of all vehicles that are heard, seconds.
+    /// Greatest message delay of the roster's vehicles, seconds.
     pub(crate) fn max_message_delay_s(&self) -> f32 {
         self.contacts[..self.roster]
             .iter()
             .fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
     }
 
-    /// Whether no vehicle of the roster is heard: then this vehicle's own radio is assumed faulty.
+    /// Whether no vehicle of the roster was heard for 3 s: this vehicle's receiver may have failed.
     #[inline(never)]
     pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
         self.roster > 0
             && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
-    /// The echo of one neighbour's last intent, of each in turn.
+    /// An echo of a neighbour's last intent, for the next own intent: of each neighbour in turn.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
         let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
         IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
     }
 
-    /// Vehicles heard lately, one bit for each rank.
+    /// Vehicles heard within 0.8 s, a bit for each rank below 32.
     pub fn heard_bits(&self, now: Instant) -> u32 {
         let heard =
             self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
@@ -451,38 +451,38 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().all(|c| c.is_waiting(now))
     }
 
-    /// As [`Self::are_all_waiting`], but some vehicles may have claimed the turn for a detour.
+    /// Whether every other vehicle of the roster is out of the plan, waits, or claims the turn.
     pub fn are_all_standing(&self, now: Instant) -> bool {
         self.contacts[..self.roster].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
     }
 
-    /// Whether a vehicle with a lower system id than `id` claims the turn to fly around.
+    /// Whether a vehicle with a lower system id than `id` claims the turn to fly a detour.
     pub fn is_turn_claimed_before(&self, id: u8, now: Instant) -> bool {
         self.contacts.iter().any(|c| c.id < id && c.claims_turn(now))
     }
 
-    /// Number of blocked vehicles that have a lower system id than `id`.
+    /// Number of vehicles with a lower system id than `id` that report a blocked path.
     pub fn blocked_count_before(&self, id: u8) -> u64 {
         self.contacts.iter().filter(|c| c.id < id && c.reports(BLOCKED)).count() as u64
     }
 
-    /// Whether a vehicle of this id is heard to follow the shared plan, or is none that is known.
+    /// Whether the vehicle `id` was last heard to follow the shared plan; true for an unknown id.
     pub(crate) fn follows_plan(&self, id: u8) -> bool {
         self.contacts.iter().find(|c| c.state.id == id).is_none_or(NeighbourEntry::on_plan)
     }
 
-    /// Number of contacts.
+    /// Number of vehicles in the table, strangers included.
     pub fn len(&self) -> usize {
         self.contacts.len()
     }
 
-    /// Whether the table has no entry.
+    /// Whether the table has no vehicle.
     pub fn is_empty(&self) -> bool {
         self.contacts.is_empty()
     }
 
-    /// The plan is another one: results of the scan, and the vehicles flown around, do not count
-    /// any more.
+    /// Forgets what holds for an older plan only: the scan's result, avoided vehicles, relayed
+    /// progress and open gates.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
         for contact in &mut self.contacts {
@@ -492,23 +492,23 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether a neighbour of the roster was heard within `span`, and one reported that it hears
-    /// us.
+    /// Whether, within `span`, a vehicle of the roster was heard, and one reported that it hears
+    /// this vehicle.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
         let roster = &self.contacts[..self.roster];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
     }
 
-    /// Whether every other vehicle of the roster reported that it has landed or is out; true where
-    /// there is none.
+    /// Whether every other vehicle of the roster last reported that it has landed or is out of the
+    /// plan; true where there is none.
     pub fn are_all_at_rest(&self) -> bool {
         self.contacts[..self.roster].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
     }
 
-    /// Time since any neighbour of the roster was heard, or since one reported that it hears us,
-    /// whichever is longer; zero when all of them have landed or are out, or there are none. Where
-    /// neither ever was, the time since `since`.
+    /// Time since any vehicle of the roster was heard, or since one reported that it hears this
+    /// vehicle, whichever is longer; counted from `since` at the earliest. Zero when all of them
+    /// have landed or are out of the plan, or there are none.
     pub fn silence_duration(&self, now: Instant, since: Instant) -> Duration {
         if self.are_all_at_rest() {
             return Duration::default();

@@ -1,4 +1,4 @@
-//! Obstacles that were not on the map, reported by a ground station.
+//! Obstacles that are not on the map, which a ground station reports.
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
@@ -7,31 +7,30 @@ use planner_core::{Length, Point};
 
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 
-/// Most reported obstacles that were not on the map.
+/// Maximum number of reported obstacles.
 pub(crate) const MAX_OBSTACLES: usize = 16;
 /// Greatest radius of a reported obstacle, metres: a wrong digit must not close a whole building.
 pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
-/// Two obstacles nearer than this are one that was sent twice, metres; a revocation this near an
-/// obstacle revokes it.
+/// Centres nearer than this are those of one obstacle, reported or revoked again, metres.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
-/// Obstacles that were not on the map, and for how many of them a detour was planned.
+/// Reported obstacles; the first `avoided` of them are avoided by the detour that is flown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Obstacles {
     known: Vec<KeepOutZone, MAX_OBSTACLES>,
     avoided: usize,
-    /// Number of obstacles known when a detour was last requested: the detour does not avoid those
-    /// that came later.
+    /// Number of obstacles known when a detour was last requested: the detour does not avoid later
+    /// ones.
     requested: usize,
 }
 
 impl Obstacles {
-    /// Number of obstacles.
+    /// Number of reported obstacles.
     pub(crate) fn count(&self) -> usize {
         self.known.len()
     }
 
-    /// Forgets the obstacle at this place.
+    /// Removes every obstacle whose centre is at this place.
     fn remove_at(&mut self, centre: &Point) {
         while let Some(at) =
             self.known.iter().position(|o| (o.from - centre).length() < SAME_OBSTACLE_M)
@@ -42,10 +41,10 @@ impl Obstacles {
         }
     }
 
-    /// Takes an obstacle that is not on the map, ENU about `origin`: its centre, and its radius, to
-    /// which the required clearance is added; a radius that is not above zero revokes the one at
-    /// that place. It stays until revoked, or until the companion starts again: a wall does not go
-    /// away by itself.
+    /// Handles the command that reports an obstacle; returns the MAV_RESULT. The place is its
+    /// centre, ENU about `origin`, `param1` its radius, metres, to which the required clearance is
+    /// added. A radius that is not above zero revokes the obstacle there. It stays until revoked,
+    /// or until the companion starts again: a wall does not go away by itself.
     pub(crate) fn handle_command(
         &mut self,
         command: &Command,
@@ -86,22 +85,22 @@ impl Obstacles {
         &self.known
     }
 
-    /// Obstacles that no detour was planned around.
+    /// Obstacles that the detour flown now does not avoid: these may block the path.
     pub(crate) fn new_ones(&self) -> &[KeepOutZone] {
         &self.known[self.avoided..]
     }
 
-    /// No detour around any obstacle has been planned.
+    /// Makes all obstacles count as new: the path changes to one that avoids none of them.
     pub(crate) fn forget_avoided(&mut self) {
         self.avoided = 0;
     }
 
-    /// Notes that a detour around all obstacles known now is requested.
+    /// Notes that a detour around all obstacles known now is requested from the shell.
     pub(crate) fn mark_requested(&mut self) {
         self.requested = self.known.len();
     }
 
-    /// The requested detour has come.
+    /// Notes that the requested detour is flown: the obstacles known at the request are avoided.
     pub(crate) fn avoid_requested(&mut self) {
         self.avoided = self.requested;
     }

@@ -1,30 +1,31 @@
-//! Is any of many things on the path? Asked a few at a time, since a control step is not to take
-//! longer with more neighbours.
+//! Does one of many keep-out zones meet a condition? A scan that is asked a few zones at a time, so
+//! that a control step takes no longer with more neighbours.
 //!
-//! The things are stretches to keep off ([`KeepOutZone`]), given by sources: a neighbour gives up
-//! to 16 of them. A step asks about as many as its budget pays for, the next continues from there.
-//! One thing that is on the path answers at once, and its source is asked first the next time: what
-//! blocks the way mostly continues doing so. That nothing is, is known after all were asked.
+//! The zones ([`KeepOutZone`]) come from sources: a neighbour gives up to 16. A step tests as many
+//! as its budget pays for, the next step continues from there. One zone that meets the condition
+//! ends the scan with yes, and the next scan begins with its source: an obstacle on the path mostly
+//! stays there. The scan ends with no after all zones were tested.
 
 use planner_core::detour::KeepOutZone;
 
-/// Progress of the scan.
+/// Progress of a scan over the keep-out zones of several sources.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IncrementalScan {
-    /// The source that is asked now, of how many.
+    /// The source whose zones are tested now, and the number of sources.
     source: u16,
     sources: u16,
-    /// Sources that were asked.
+    /// Number of sources of which all zones were tested.
     sources_checked: u16,
-    /// Things of this source that were asked about.
+    /// Number of zones of the present source that were tested.
     zones_checked: u16,
 }
 
 impl IncrementalScan {
-    /// Asks on: `tell` gives the things of a source, each costs `each` of `budget` and a source
-    /// one. `Some(true)` once one of them `is_in_the_way`, `Some(false)` when none of all `sources`
-    /// is, then from the first; `None` when the budget is spent, which has to begin with at least
-    /// `each`. Where the number of sources changes all are asked again.
+    /// Continues the scan. `tell` calls back with each zone of a source; a zone costs `each` of
+    /// `budget`, a source 1. Returns `Some(true)` at the first zone that `is_in_the_way`,
+    /// `Some(false)` when no zone of all `sources` is; the next call begins a new scan. `None` when
+    /// the budget is spent; it has to be at least `each`. Where the number of sources changes, the
+    /// scan begins again.
     pub fn continue_scan(
         &mut self,
         sources: usize,
@@ -65,7 +66,7 @@ impl IncrementalScan {
         Some(false)
     }
 
-    /// Restarts the scan from the current source.
+    /// Begins the scan again, at the present source.
     pub fn restart(&mut self) {
         (self.sources_checked, self.zones_checked) = (0, 0);
     }

@@ -1,4 +1,4 @@
-//! What decisions about other vehicles follow from, and what a vehicle reports to them.
+//! What decisions about detours are made from, and the place that a vehicle reports to the others.
 
 use planner_core::Point;
 
@@ -9,7 +9,7 @@ use crate::mission::course::Mission;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-/// The view that decisions about detours follow from.
+/// References to the companion's parts by which decisions about detours are made.
 pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize> {
     pub(crate) now: Instant,
     pub(crate) config: &'a Config<V>,
@@ -20,10 +20,10 @@ pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize>
     pub(crate) scene: GuidanceInputs<'a, W, G>,
 }
 
-/// The place that the vehicle reports to the others.
+/// Position and velocity that this vehicle reports to the others.
 pub(crate) struct ReportedPlace {
     pub(crate) position: Point,
     pub(crate) velocity: Point,
-    /// When that was known.
+    /// When the position was measured, or last known before a jump.
     pub(crate) at: Instant,
 }

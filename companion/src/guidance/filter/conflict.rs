@@ -1,4 +1,5 @@
-//! Which neighbour's set meets that of the vehicle, and which of the two goes first.
+//! Which neighbour's reachable set conflicts with that of this vehicle, and which of the two goes
+//! first.
 
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
@@ -11,28 +12,29 @@ use crate::mission::State;
 use crate::swarm::neighbours::{FilterNeighbour, Neighbours, ReachQuery};
 use crate::time::{Duration, Instant};
 
-/// Time of the other vehicle's path ahead that has to be free before the vehicle that yields goes
-/// on, seconds.
+/// Flight time along the other vehicle's points that has to be free before a vehicle that yields
+/// continues, seconds.
 const YIELD_LOOK_AHEAD_S: f32 = 3.0;
-/// Most neighbours that are compared in one step: with more nearby the vehicle stops.
+/// Maximum number of neighbours whose sets are compared in one step: with more nearby the vehicle
+/// stops.
 const MAX_NEAR_COMPARED: usize = 4;
 /// Overshoot of two vehicles in the air beyond their stops, together, metres; the schedule leaves
 /// 0.5 m for this and for tracking errors.
 const OVERSHOOT_MARGIN_M: f32 = 0.25;
-/// Tracking error of this vehicle alone, off its path, metres.
+/// Tracking error of this vehicle beside its path, metres: kept from a vehicle on the ground.
 const TRACKING_MARGIN_M: f32 = 0.1;
-/// Distance between the hulls of two vehicles that is kept from a stranger while passing it slowly,
+/// Distance between the hulls that is kept from a stranger while this vehicle passes it slowly,
 /// metres.
 const STRANGER_HULL_GAP_M: f32 = 0.3;
-/// Speed above its reference's at which a vehicle still stops with the reference, m/s.
+/// Speed by which the vehicle may exceed its setpoint's without a longer stop, m/s: sway.
 const STOPPING_SWAY_MPS: f32 = 0.3;
-/// Wait of a landing after which it needs no more room than the hulls.
+/// Time for which a landing was held, after which it keeps only the hulls apart.
 const LANDING_WAITED_LONG: Duration = Duration::from_secs(40);
 
 impl Guidance {
-    /// The set that the vehicle can no longer avoid on its path, and `extra_m`. The set begins at
-    /// the setpoint, which is all that a stop can hold back: the vehicle flies on to the setpoint
-    /// in any case.
+    /// The places that the vehicle can no longer avoid on its path, or `back` along it, and
+    /// `extra_m` beyond them. The set begins at the setpoint: no stop keeps the vehicle from flying
+    /// on to there.
     pub(super) fn own_set<const W: usize>(
         &self,
         path: &Path<W>,
@@ -42,7 +44,7 @@ impl Guidance {
         back: bool,
     ) -> ReachableSet {
         let velocity_mps = fpu::sqrtf(telemetry.velocity.norm_squared());
-        // Beside the path it flies straight to where it continues.
+        // Beside its path the vehicle flies straight to where it continues on it.
         let joins =
             self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
         let join = if joins { path.point_at(self.tracker.along_m) } else { None };
@@ -63,7 +65,7 @@ impl Guidance {
                 fly_m,
             );
         }
-        // The vehicle stops for its gates in any case.
+        // Forward, advice stops the vehicle at `stops_at_m` in any case.
         let join_m = join.map_or(0.0, |join| (join - here).length());
         let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
@@ -71,7 +73,7 @@ impl Guidance {
         ReachableSet::along(here, core::iter::once(here).chain(join).chain(ahead), fly_m)
     }
 
-    /// The first neighbour whose set meets `own`.
+    /// The first neighbour that may come nearer to `own` than the distance kept from it.
     pub(super) fn first_conflict<const V: usize, const W: usize, const G: usize>(
         &self,
         state: State,
@@ -86,8 +88,7 @@ impl Guidance {
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.hears_nobody(now);
         let deaf = lands && hears_nobody;
-        // In a guided descent over an area it checks, as in a landing, for unheard vehicles on the
-        // ground.
+        // Like a landing, a guided descent over an area checks for unheard vehicles on the ground.
         let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
         let floor_m =
             scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
@@ -111,22 +112,22 @@ impl Guidance {
             let mut met = neighbours.for_filter(contact, dead, now);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
-                // The neighbour is not within radio range, and is where the plan has it.
+                // The neighbour is out of radio range, and where its gates let it be.
                 continue;
             }
             if by_gates {
-                // The gates keep two on the plan apart, however late their messages are.
+                // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
                 met.motion.delay_s = 0.0;
             }
             if met.lost && !lands && hears_nobody {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
-                // fly on.
+                // are not lost, they fly on.
                 (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
             }
             let silent = met.lost || met.motion.age_s > safety::FRESH_S;
             if lands && silent {
-                // A landing does not wait for a vehicle that is silent: only where it may have
-                // stopped counts.
+                // A landing does not wait for where a silent vehicle may fly, only for where it may
+                // have stopped.
                 (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
                 met.motion.rests_within_m = 0.0;
             }
@@ -137,15 +138,15 @@ impl Guidance {
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
             let held = self.filter.landing_held_for(now);
             if lands && met.stranger && held >= LANDING_WAITED_LONG {
-                // A place that anybody may claim keeps no vehicle in the air.
+                // A stranger, which anybody can feign, keeps no vehicle in the air for good.
                 continue;
             }
-            // Only beside its own pad, where no path leads back to it, or where nobody is heard on
-            // the way: everywhere else there is another place.
+            // At its own pad, off its path, and where it hears nobody, there is no other landing
+            // place to fly to.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
-            // A place aside was sought by then, and over an area the end of its path is above its
-            // pad.
+            // By then a place aside was sought in vain, and over an area the end of its path is
+            // above its pad.
             let at_end =
                 || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
             let rests = lies && held >= LANDING_WAITED_LONG && (last_place || at_end());
@@ -153,8 +154,8 @@ impl Guidance {
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.motion.grounded || met.stands) && by_gates {
-                // Past a vehicle that waits the schedule leads as near as that and what both
-                // deviate.
+                // The schedule leads past a vehicle that waits at the safety distance and the
+                // tracking errors of both.
                 safety_m
             } else if met.motion.grounded {
                 let vertical = lands || state == State::Climb || self.is_descending();
@@ -164,7 +165,7 @@ impl Guidance {
             } else {
                 safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m())
             };
-            // Where there is no other place what may have fallen beside it keeps nobody in the air.
+            // Landing late at the last place, it ignores where a vehicle may have fallen.
             let fallen = Some(now).filter(|_| !lands_late);
             let may_lie_below =
                 |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
@@ -188,7 +189,7 @@ impl Guidance {
             }
             near += 1;
             let meets = || {
-                // Between two on the plan the gates keep the order.
+                // Between two on the plan gates keep the order, so no time ahead is added.
                 let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
                 let other = met.motion.reachable_set(bounds, if ahead { ahead_s } else { 0.0 });
                 let low = |low: Point| own.conflicts(&ReachableSet::at(low), &low, apart_m);
@@ -212,15 +213,15 @@ impl Guidance {
         !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld)
     }
 
-    /// Whether this vehicle lets `met` go first: a vehicle on the plan goes before one off it, then
-    /// the gates' order decides, then the lower id goes.
+    /// Whether this vehicle lets the neighbour `met` go first: a vehicle on the plan goes before
+    /// one off it, then the order of the gates decides, then the lower id goes first.
     pub(super) fn yields_to<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
         met: &FilterNeighbour<'_>,
     ) -> bool {
-        // Two vehicles with different plans do not follow each other's plan.
+        // A vehicle with another plan than the neighbour's counts as off the plan.
         let on_plan = self.on_plan(state, scene) && met.shares_plan;
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;
@@ -232,7 +233,7 @@ impl Guidance {
         if on_plan && self.advice.waiting_for == met.id && scene.plan.is_some_and(waits) {
             return true;
         }
-        // A vehicle on the plan that waits does so for one that goes first.
+        // A neighbour on the plan that reports that it waits lets this vehicle go first.
         if on_plan && met.waits {
             return false;
         }

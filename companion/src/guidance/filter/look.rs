@@ -1,4 +1,4 @@
-//! One look of the filter: the way ahead, compared with all neighbours.
+//! One step of the safety filter: this vehicle's way ahead, compared with all neighbours.
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
@@ -18,8 +18,8 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// Compares the way ahead with all neighbours; to be called once a step, before the reference
-    /// moves.
+    /// Runs the filter for one step: compares the way ahead with all neighbours, and decides
+    /// whether the vehicle is stopped. To be called before the reference moves.
     pub(in crate::guidance) fn filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -56,8 +56,8 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                // The filter continues checking the neighbour that stopped the vehicle's descent
-                // while the vehicle stands.
+                // While the vehicle stands in its descent, the filter goes on checking the column
+                // below it for the neighbour that stopped it.
                 match self.is_descending() {
                     true => FlightDirection::Vertical {
                         to_m: ground_m(),
@@ -113,8 +113,8 @@ impl Guidance {
         let own = OwnSet::new(&set, &mut legs);
         let mut found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if found.is_none() && on_pad {
-            // Armed on the ground it has a few seconds only: it waits where one falls silent that
-            // would bar the climb soon.
+            // PX4 disarms within seconds on the ground. So it does not arm beside a vehicle that
+            // may just have fallen silent, whose set would soon bar the climb.
             let apart_m =
                 self.deconflict.safety_distance_m + bounds.speed_max_mps * bounds.silent_s;
             let missed = neighbours.missed_beside(position, apart_m, now);
@@ -135,7 +135,7 @@ impl Guidance {
                     self.filter.activations = self.filter.activations.wrapping_add(1);
                 }
                 self.filter.clear_since = None;
-                // A stranger hinders it for good only where the hull would touch it.
+                // A stranger counts as a hindrance only where it bars even the slow flight past it.
                 if !found.stranger || self.filter.passes_stranger(now) {
                     self.filter.note_hindered(found.yields, now);
                 }
@@ -145,7 +145,7 @@ impl Guidance {
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
-                // Past a stranger it continues in the same stop, slowly.
+                // Past a stranger it flies slowly in this stop, until free for longer.
                 let clear_for = if self.filter.passes_stranger(now) {
                     MAX_STOP_FOR_STRANGER
                 } else {
@@ -159,7 +159,8 @@ impl Guidance {
         }
     }
 
-    /// How low the ground below it may be, metres: not above the vehicle.
+    /// Least height that the ground below the vehicle may have, ENU up, metres; at most the
+    /// vehicle's.
     pub(super) fn landing_height_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -169,21 +170,21 @@ impl Guidance {
         let z_m = scene.telemetry.position.z;
         let mut ground_m = self.ground_m(plan).min(z_m);
         if self.returning && scene.detours {
-            // The way back ends where a detour began: the height of that place above the ground is
-            // unknown.
+            // The way back along a detour ends in the air where the detour began: the ground there
+            // counts as no higher than the climb's height below that.
             ground_m = plan
                 .path
                 .point_at(0.0)
                 .map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
         }
-        // Between pad and goal the ground may be lower than below either.
+        // On the path between pad and goal the ground may be lower than at either.
         let lands = matches!(state, State::Land | State::LandingHeld);
         let between = lands && self.on_path && !self.has_reached_end(&plan.path);
         if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }
     }
 
-    /// Whether the vehicle flies back along its path, or stands and is about to. What is still to
-    /// be flown forward counts first: a reference that turns back leaves the setpoint on its way.
+    /// Whether the vehicle flies back along its path, or stands and is about to. As long as the
+    /// setpoint is still to fly forward to the reference, it does not.
     fn is_flying_back<const W: usize>(&self, path: &Path<W>) -> bool {
         if self.tracker.along_m > self.setpoint_m + MAX_TURNING_SETPOINT_M {
             return false;
@@ -203,7 +204,8 @@ impl Guidance {
         self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
     }
 
-    /// A standstill before a vehicle that no gate waits for counts as one of the filter's.
+    /// Counts as a hindrance by the filter where advice stops the vehicle right before another one
+    /// although no gate nearby waits for that one.
     fn count_standstill<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,

@@ -1,6 +1,7 @@
-//! What is asked of the shell: a detour, aside or home; and what becomes of its answer.
+//! Requests for a path from the shell (detour, aside, home or back), and what follows from its
+//! answer.
 //!
-//! Cost: a request lists every known obstacle on the path.
+//! Cost: a request lists every known keep-out zone.
 
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
@@ -15,25 +16,26 @@ use crate::time::{Duration, Instant};
 
 /// Time from a search that found no landing place aside to the next search, seconds.
 const SIDESTEP_RETRY_S: u64 = 30;
-/// Wait of a landing after which a vehicle that hears no other one seeks a landing place aside.
+/// Time for which a landing was held, after which a vehicle that hears no other one seeks a landing
+/// place aside.
 const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Two searches from places nearer than this are searches from the same place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
 
-/// Whether a detour that was not found may be found later.
+/// Whether a search that found no detour may succeed later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RetryOutlook {
-    /// A silent vehicle may still come down, and leave more room once it lies.
+    /// A silent vehicle is still coming down; on the ground it leaves more room.
     Settles,
-    /// Some vehicle may still move.
+    /// Another vehicle may still move.
     Open,
-    /// The situation cannot change.
+    /// No other vehicle will move any more.
     Closed,
 }
 
 impl Detours {
-    /// Whether it may search for a landing place beside its path: it is on its path, hears another
-    /// vehicle, and did not just fail.
+    /// Whether this vehicle may search for a landing place beside its path: it has a flight, hears
+    /// another vehicle or has waited for long, and did not fail lately.
     pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -46,14 +48,15 @@ impl Detours {
             && self.no_way_aside_at.is_none_or(retries)
     }
 
-    /// Whether enough detours were not found, or led nowhere.
+    /// Whether this vehicle seeks no further detour: enough searches failed, or enough detours led
+    /// nowhere.
     pub(crate) fn has_given_up(&self) -> bool {
         self.no_retry
             || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
     }
 
-    /// Time for which it has waited below a landing vehicle without another place; zero for a while
-    /// after no way aside was found.
+    /// Time for which this vehicle has waited below a vehicle that lands, unable to leave along its
+    /// path; zero for [`DETOUR_RETRY_S`] after a search aside failed.
     pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -64,7 +67,7 @@ impl Detours {
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
-    /// Notes that a path is requested of the shell.
+    /// Notes that a path for this purpose is requested from the shell.
     pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Back(_)) {
             self.flown = self.flown.without_return();
@@ -74,17 +77,18 @@ impl Detours {
         self.detour_ready = false;
     }
 
-    /// The shell reads what is sought: the next answer is to that.
+    /// Notes that the shell reads the request: its next answer belongs to it.
     pub(crate) fn note_request_read(&mut self) {
         self.request_read = self.sought.is_some();
     }
 
-    /// Whether the shell has read what is sought.
+    /// Whether the shell has read the request.
     pub(crate) fn is_request_read(&self) -> bool {
         self.request_read
     }
 
-    /// The requested detour; `None` without a plan. `tell` is given all keep-out zones.
+    /// The request for the shell's planner; `None` without a plan or a request. `tell` is called
+    /// with each keep-out zone.
     pub(crate) fn detour_request<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -104,8 +108,8 @@ impl Detours {
         match view.config.division {
             Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut tell),
             _ => {
-                // No nearer than blocks the way: a goal that is planned beside one that lies can be
-                // flown to.
+                // A vehicle that lies is kept off by no more than what blocks a path: a goal that
+                // is planned beside it can be flown to.
                 let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
                 view.neighbours.for_each_place(view.now, apart, &mut tell);
             }
@@ -152,7 +156,8 @@ impl Detours {
         })
     }
 
-    /// The detour has come: it is flown from here on. `progress_m` is the progress on the plan.
+    /// Begins the detour that has come, at `progress_m` on the path before, which last grew at
+    /// `progress_at`.
     pub(crate) fn begin_detour(
         &mut self,
         purpose: DetourPurpose,
@@ -180,17 +185,19 @@ impl Detours {
         };
     }
 
-    /// No path back to the plan's can be requested: there is no free place on that.
+    /// Notes that there is no free place on the plan's path to come back to, so that no detour can
+    /// be requested.
     pub(crate) fn note_no_rejoin_place(&mut self, now: Instant) {
         self.field_searches.note_failure(now);
     }
 
-    /// The requested detour has not come; `along_m` is the place on the path.
+    /// Notes that the shell found no path from `along_m` metres along the path, and whether to
+    /// search again.
     pub(crate) fn note_failure(&mut self, along_m: f32, outlook: RetryOutlook, now: Instant) {
         match self.sought {
-            // The way home is sought again.
+            // The path home is sought again after a while.
             Some(DetourPurpose::Home) => return self.home.note_failure(now),
-            // Where no path aside is found a detour may yet exist.
+            // Without a path aside there may still be a detour.
             Some(DetourPurpose::Aside(_) | DetourPurpose::Landing) => {
                 self.no_way_aside_at = Some(now);
                 return;

@@ -1,15 +1,15 @@
-//! Around what hovers or lies on a path over a field, and back to that path beyond it.
+//! Around an obstacle that hovers or lies on a path over an area, and back to that path beyond it.
 //!
-//! The vehicle stops, asks its shell for the way to the first free place of its path behind what
-//! blocks that, flies it beside the plan, and then asks for its own plan again, to continue from
-//! there. It keeps its part: its progress stays where it left its path until it is back, and others
-//! wait for it. It comes back no further than its gates are open. From under a vehicle that comes
-//! down it first flies aside, and seeks the way back from there: to where it left its path, or
-//! beyond that if that place stays barred.
+//! The vehicle stops, requests from its shell the way to the first free place of its path beyond
+//! the obstacle, flies it beside the plan, and then requests its own plan again, to continue from
+//! there. It keeps its part of the area: its progress stays where it left its path until it is
+//! back, and others wait for it. It comes back no further than its gates are open. From under a
+//! vehicle that descends it first flies aside, and seeks the way back from there: to where it left
+//! its path, or beyond that if that place stays barred.
 //!
 //! ENU metres. Constant work but for [`is_barred`], which asks for the places of all others, and
-//! [`first_rejoin_m`], once an attempt each: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`]
-//! things.
+//! [`first_rejoin_m`], once an attempt each: at most [`MAX_SAMPLES`] places on the path, each
+//! compared with [`MAX_ZONES`] zones.
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
@@ -26,21 +26,22 @@ pub(super) const LOOK_AHEAD_M: f32 = 60.0;
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
 const DETOUR_RETRY: Duration = Duration::from_secs(30);
-/// Most detours in one plan.
+/// Maximum number of detours while one plan is flown.
 const MAX_DETOURS: u8 = 16;
-/// Most keep-out zones that are compared with the path.
+/// Maximum number of keep-out zones that are compared with the path.
 const MAX_ZONES: usize = 8;
-/// Most samples of the path.
+/// Maximum number of places on the path that are compared with the zones.
 const MAX_SAMPLES: usize = 100;
-/// Least spacing of the samples along the path, metres.
+/// Least spacing of the places on the path that are compared with the zones, metres.
 const MIN_SAMPLE_SPACING_M: f32 = 0.5;
-/// Distance before a block of the path within which keep-out zones already count, metres.
+/// Distance beyond [`LOOK_AHEAD_M`] up to which the start of a block is searched, metres.
 const DETOUR_BEGINS_BEFORE_M: f32 = 1.0;
 /// Distance beyond the last blocked sample at which a detour returns to the path, metres: at the
 /// very edge the same zone would block the path again.
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
-/// Searches of a vehicle for a path beside its own.
+/// Searches of a vehicle for detours that lead back to its path over an area: when one failed, and
+/// how many succeeded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FieldSearches {
     missed_at: Option<Instant>,
@@ -48,31 +49,32 @@ pub(crate) struct FieldSearches {
 }
 
 impl FieldSearches {
-    /// Notes that no path was found.
+    /// Notes that a search found no detour.
     pub(crate) fn note_failure(&mut self, now: Instant) {
         self.missed_at = Some(now);
     }
 
-    /// A path has come.
+    /// Notes that a detour has come.
     pub(super) fn note_found(&mut self) {
         self.found = self.found.saturating_add(1);
     }
 
-    /// Whether it may seek a way now.
+    /// Whether a detour may be sought now: not within [`DETOUR_RETRY`] of a failure, and
+    /// [`MAX_DETOURS`] times at most.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
         self.found < MAX_DETOURS && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
     }
 }
 
-/// Number of the sources of [`zones_of_source`].
+/// Number of sources that [`zones_of_source`] knows: two for each neighbour.
 fn source_count<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
 ) -> usize {
     2 * view.neighbours.len()
 }
 
-/// Zones that one other vehicle occupies over a field: first come the places of each, then the
-/// columns in which those in the air off the plan may come down.
+/// Keep-out zones of one source over an area: first come the places of each neighbour, then for
+/// each the columns in which it may come down from the air off the plan.
 fn zones_of_source<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     source: usize,
@@ -90,7 +92,7 @@ fn zones_of_source<const V: usize, const W: usize, const G: usize>(
     }
 }
 
-/// Zones that all other vehicles occupy over a field.
+/// Keep-out zones of all other vehicles over an area.
 pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     tell: &mut dyn FnMut(KeepOutZone),
@@ -98,14 +100,14 @@ pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     (0..source_count(view)).for_each(|source| zones_of_source(view, source, tell));
 }
 
-/// Distance of a place from what is in a zone, metres; below zero within it.
+/// Distance of a place from the surface of a zone, metres; negative inside.
 fn far_m(zone: &KeepOutZone, place: &Point) -> f32 {
     let (axis, away) = (zone.to - zone.from, place - zone.from);
     let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
     (away - axis * share).length() - zone.radius_m
 }
 
-/// Whether another vehicle, or what is `known`, keeps a vehicle from a place.
+/// Whether a place is inside a zone of another vehicle, or of a `known` obstacle.
 pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     known: &[KeepOutZone],
@@ -116,8 +118,8 @@ pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
     barred
 }
 
-/// The first free place of its path behind what blocks that, metres; none before its last descent,
-/// or before the gate that is closed.
+/// The first free place along the path beyond the block, metres; `None` if there is none before the
+/// last descent and the first closed gate.
 pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     known: &[KeepOutZone],
@@ -133,7 +135,8 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     };
     known.iter().for_each(|thing| add(*thing, &mut things));
     for source in 0..source_count(view) {
-        // Full beyond what may be near at once: the search for the way knows them all.
+        // When the list is full the rest is left out: the search for the detour itself knows all
+        // zones.
         if things.is_full() {
             break;
         }
@@ -146,7 +149,7 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
             return None;
         }
         let place = plan.path.point_at(at_m)?;
-        // No zone is nearer than that.
+        // No zone is nearer than this.
         let free_m = things.iter().map(|thing| far_m(thing, &place)).fold(LOOK_AHEAD_M, f32::min);
         if met && free_m > 0.0 {
             return Some(at_m + DETOUR_RETURNS_BEYOND_M);

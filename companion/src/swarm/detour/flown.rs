@@ -1,65 +1,67 @@
-//! What path a vehicle flies, and what path it seeks: one value each.
+//! The path that a vehicle flies, and the path that it seeks: one value each.
 //!
 //! A path is sought from the request to the shell until it comes, or the vehicle leaves the state
-//! in which it waits for that. A path that has come is flown for the purpose that it was sought
-//! for.
+//! in which it waits for it. A path that has come is flown for the purpose for which it was
+//! requested.
 
 use planner_core::Point;
 
-/// A place of the plan's path.
+/// A place on the path of the vehicle's plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RejoinPlace {
-    /// Distance along that path, metres.
+    /// Arc length along the plan's path, metres.
     pub along_m: f32,
     pub position: Point,
 }
 
-/// Where a vehicle that makes room comes back to its path over a field.
+/// Places where a vehicle that went aside over an area comes back to its path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RejoinPlaces {
-    /// Where it left that path, or holds for a division.
+    /// Where the vehicle left its path, or is to hold for a division.
     pub own: RejoinPlace,
-    /// The next free one when it left, used if the other one stays barred; the same where there was
-    /// none.
+    /// First free place beyond the block when it left, used if `own` stays barred; equal to `own`
+    /// where there was none.
     pub beyond: RejoinPlace,
 }
 
-/// Purpose of a requested path.
+/// Purpose of a path requested from the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum DetourPurpose {
-    /// To fly to the goal.
+    /// A detour to the goal of the plan.
     Goal,
-    /// To leave the column under a vehicle that lands; and, over a field, to come back from there.
+    /// Aside, out of the column under a vehicle that lands; over an area with the places where it
+    /// comes back to its path.
     Aside(Option<RejoinPlaces>),
-    /// To land where no vehicle lies.
+    /// Aside, to land where no other vehicle lies.
     Landing,
-    /// To fly home over a field.
+    /// Straight home over an area.
     Home,
-    /// To fly back to the own path over a field.
+    /// Around an obstacle over an area, back to this place on the own path.
     Back(RejoinPlace),
 }
 
-/// Path that a vehicle flies.
+/// Kind of path that a vehicle flies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum FlownPath {
-    /// That of its plan.
+    /// The path of its plan.
     #[default]
     Plan,
-    /// That of its plan again, which has come and is not taken up yet.
+    /// The path of its plan after a detour: it has come from the shell, and the vehicle has not
+    /// begun it yet.
     PlanReturned,
-    /// One that was sought.
+    /// A path that was requested for this purpose.
     Detour(DetourPurpose),
-    /// One beside its path, to which it does not come back any more.
+    /// A path beside the plan's, to which the vehicle does not come back any more.
     Astray,
 }
 
 impl DetourPurpose {
-    /// Whether the path ends where the vehicle only makes room, or lands.
+    /// Whether the path ends aside, where the vehicle only makes room, or lands.
     pub(crate) fn is_aside(&self) -> bool {
         matches!(self, Self::Aside(_) | Self::Landing)
     }
 
-    /// Place where the vehicle comes back to its own path over a field.
+    /// Place where the vehicle comes back to its own path over an area; `None` if it does not.
     pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
         match self {
             Self::Back(back) => Some(*back),
@@ -68,14 +70,14 @@ impl DetourPurpose {
         }
     }
 
-    /// Whether the vehicle keeps to its plan: it comes back to it.
+    /// Whether the vehicle comes back to its plan after this path.
     pub(crate) fn keeps_to_plan(&self) -> bool {
         self.rejoin().is_some()
     }
 }
 
 impl FlownPath {
-    /// The purpose of the detour that is flown.
+    /// Purpose of the detour that is flown; `None` on the plan's path, or astray.
     pub(crate) fn purpose(&self) -> Option<DetourPurpose> {
         match self {
             Self::Detour(purpose) => Some(*purpose),
@@ -83,12 +85,12 @@ impl FlownPath {
         }
     }
 
-    /// Whether it is not that of the plan.
+    /// Whether the path is another one than that of the plan.
     pub(crate) fn is_detour(&self) -> bool {
         matches!(self, Self::Detour(_) | Self::Astray)
     }
 
-    /// The path once the vehicle does not come back to its plan from beside it.
+    /// The kind of path once the vehicle has given up coming back to its plan.
     pub(crate) fn without_return(self) -> Self {
         match self {
             Self::PlanReturned => Self::Plan,

@@ -1,6 +1,6 @@
-//! The way home over a field: a vehicle that is ordered back, or whose path stays blocked, does not
-//! fly its lanes back. It stops, asks its shell for the way straight home in its own layer, and
-//! flies that. It is off the plan from the moment on at which it turns: the others divide what it
+//! The way home over an area. A vehicle that is ordered back, or whose path stays blocked, does not
+//! fly its lanes back. It stops, requests from its shell the way straight home in its own layer,
+//! and flies that. It is off the plan from the moment at which it turns: the others divide what it
 //! leaves.
 //!
 //! Constant work.
@@ -8,30 +8,30 @@
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
-/// Time from a search that found no way home to the next search.
+/// Time from a search that found no path home to the next search.
 const RETURN_RETRY: Duration = Duration::from_secs(5);
-/// Most times that a vehicle turns home in one flight: a block after the last time is not flown
-/// around.
+/// Maximum number of turns home in one flight: blocked after the last, a vehicle seeks no further
+/// path home.
 const MAX_RETURNS: u8 = 4;
 
-/// Progress of a vehicle that seeks its path home.
+/// The search of a vehicle for its path home over an area.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HomewardFlight {
-    /// Time since which the vehicle stands and seeks its way.
+    /// Since when the vehicle stops for its path home, and seeks it.
     seeks_since: Option<Instant>,
-    /// When it was last not found.
+    /// When a search for the path home last failed.
     missed_at: Option<Instant>,
     attempts: u8,
 }
 
 impl HomewardFlight {
-    /// The vehicle turns home.
+    /// Begins the search: the vehicle turns home.
     pub(crate) fn begin(&mut self, now: Instant) {
         let turns = self.attempts.saturating_add(1);
         *self = Self { seeks_since: Some(now), attempts: turns, ..Self::default() };
     }
 
-    /// The vehicle flies the path that it sought, or back another way.
+    /// Ends the search: the path home has come, or the vehicle flies back another way.
     pub(crate) fn cancel(&mut self) {
         *self = Self { attempts: self.attempts, ..Self::default() };
     }
@@ -41,12 +41,12 @@ impl HomewardFlight {
         self.missed_at = Some(now);
     }
 
-    /// Whether it stops for its path home, or seeks it.
+    /// Whether the vehicle stops for its path home, or seeks it.
     pub(crate) fn is_seeking(&self) -> bool {
         self.seeks_since.is_some()
     }
 
-    /// Time for which the vehicle has been seeking its path home.
+    /// Time for which the vehicle has been seeking its path home; `None` if it does not.
     pub(crate) fn seeking_for(&self, now: Instant) -> Option<Duration> {
         self.seeks_since.map(|since| now - since)
     }
@@ -57,7 +57,8 @@ impl HomewardFlight {
         self.is_seeking() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
     }
 
-    /// Whether it can turn home: over a field, on a path, and not too often before.
+    /// Whether the vehicle can turn home: it is on its path over an area, and has turned fewer than
+    /// `MAX_RETURNS` times.
     pub(crate) fn can_turn<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

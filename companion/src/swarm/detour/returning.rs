@@ -1,4 +1,4 @@
-//! What path a vehicle flies, and whether it comes back to that of its plan from there.
+//! Which path a vehicle flies, and whether it comes back from there to its plan's path.
 //!
 //! Constant work but for [`Detours::rejoin_from_aside`], once a search.
 
@@ -7,50 +7,52 @@ use super::{Detours, beside};
 use crate::swarm::view::DetourView;
 use crate::time::Duration;
 
-/// Time for which a vehicle that made room waits for the place where it left its path, seconds:
+/// Time for which a vehicle aside waits until the place where it left its path is free, seconds:
 /// less than until it flies home.
 const BARRED_MOST_S: u64 = 60;
-/// Time for which it seeks a way to that place once that is free, seconds.
+/// Time for which a vehicle aside seeks a way to the place where it left its path, once that is
+/// free, seconds.
 const NO_WAY_MOST_S: u64 = 90;
 
 impl Detours {
-    /// Whether the current path is a detour.
+    /// Whether the path that is flown is not the plan's.
     pub(crate) fn is_on_detour(&self) -> bool {
         self.flown.is_detour()
     }
 
-    /// What the shell is asked for.
+    /// Purpose of the path that is requested from the shell; `None` if none is.
     pub(crate) fn sought(&self) -> Option<DetourPurpose> {
         self.sought
     }
 
-    /// Ends the search: the vehicle stays on the path that it is on.
+    /// Forgets the request for a path: the vehicle stays on the path that it flies.
     pub(crate) fn end_search(&mut self) {
         (self.sought, self.request_read, self.detour_ready) = (None, false, false);
     }
 
-    /// Whether it flies its way home over a field, stops for it, or seeks it.
+    /// Whether the vehicle flies straight home over an area, stops for that, or seeks the way.
     pub(crate) fn is_homeward(&self) -> bool {
         self.home.is_seeking() || self.flown == FlownPath::Detour(DetourPurpose::Home)
     }
 
-    /// Whether the path flown ends elsewhere than over the vehicle's goal: aside, or back on its
-    /// own path.
+    /// Whether the path that is flown ends aside, or back on the plan's path, not over the
+    /// vehicle's goal.
     pub(crate) fn ends_aside(&self) -> bool {
         self.flown.purpose().is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
     }
 
-    /// Whether it is beside its path over a field, to come back to it.
+    /// Whether the vehicle flies a detour over an area after which it comes back to its plan.
     pub(crate) fn is_beside_plan(&self) -> bool {
         self.flown.purpose().is_some_and(|purpose| purpose.keeps_to_plan())
     }
 
-    /// Whether the detour that it flies leads back to its path over a field.
+    /// Whether the detour that is flown ends on the plan's path over an area.
     pub(crate) fn leads_back(&self) -> bool {
         matches!(self.flown, FlownPath::Detour(DetourPurpose::Back(_)))
     }
 
-    /// Places where it is to come back to its path over a field.
+    /// Places where the vehicle is to come back to its path over an area; `None` if it does not
+    /// come back.
     pub(crate) fn rejoin_places(&self) -> Option<RejoinPlaces> {
         match self.flown {
             FlownPath::Detour(DetourPurpose::Aside(places)) => places,
@@ -58,13 +60,15 @@ impl Detours {
         }
     }
 
-    /// Place where it is to come back to its path over a field.
+    /// Place where the vehicle is to come back to its path over an area; `None` if it does not come
+    /// back.
     pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
         self.flown.purpose().and_then(|purpose| purpose.rejoin())
     }
 
-    /// Place where it comes back to its path from aside: where it left that, or beyond if that
-    /// place stays barred, or no way leads there. `None` while it waits for that place.
+    /// Place where a vehicle aside comes back to its path now: where it left that; or beyond the
+    /// block, if that place stays barred, or no way leads there. `None` while it waits for that
+    /// place.
     pub(crate) fn rejoin_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -78,39 +82,40 @@ impl Detours {
         }
     }
 
-    /// The vehicle turns to another task: it does not come back to its path from beside it.
+    /// Gives up the plan: the vehicle does not come back to it from beside its path.
     pub(crate) fn give_up_plan(&mut self) {
         self.flown = self.flown.without_return();
     }
 
-    /// The vehicle takes up its own path.
+    /// The vehicle flies its plan's path, if that has come again.
     pub(crate) fn take_up_plan(&mut self) {
         if self.is_own_plan_ready() {
             self.flown = FlownPath::Plan;
         }
     }
 
-    /// Whether its own path has come, and is to be taken up.
+    /// Whether the plan's path has come again, and is not flown yet.
     pub(crate) fn is_own_plan_ready(&self) -> bool {
         self.flown == FlownPath::PlanReturned
     }
 
-    /// Whether it is to take up its own path again, or to go home without it.
+    /// Whether the vehicle is beside its plan's path, or about to fly it again, or has to fly home
+    /// without it.
     pub(crate) fn is_own_plan_outstanding(&self) -> bool {
         self.is_own_plan_ready() || self.is_own_plan_lost() || self.is_beside_plan()
     }
 
-    /// Whether its own path will not come.
+    /// Whether the vehicle is beside its plan's path and will not come back to it.
     pub(crate) fn is_own_plan_lost(&self) -> bool {
         self.flown == FlownPath::Astray
     }
 
-    /// Whether it seeks a place aside to land at.
+    /// Whether the vehicle seeks a landing place aside.
     pub(crate) fn seeks_landing(&self) -> bool {
         self.sought == Some(DetourPurpose::Landing)
     }
 
-    /// Whether it lands at the end of its detour.
+    /// Whether the vehicle lands at the end of the detour that it flies.
     pub(crate) fn lands_at_end(&self) -> bool {
         self.flown == FlownPath::Detour(DetourPurpose::Landing)
     }

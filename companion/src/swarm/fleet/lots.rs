@@ -1,25 +1,25 @@
-//! What a division follows from.
+//! The inputs from which all vehicles compute the same division.
 
 use heapless::Vec;
 
 use crate::link::roster::{MemberStatus, RosterReportEntry};
 
-/// Inputs of a division, of one vehicle: as [`planner_core::coverage::losses::VehicleStatus`], in
-/// decimetres.
+/// What a division needs to know of one vehicle: as
+/// [`planner_core::coverage::losses::VehicleStatus`], in decimetres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DivisionInput {
-    /// Whether it flies on.
+    /// Whether the vehicle flies on, and gets a part of what is divided.
     pub alive: bool,
-    /// Place along its path up to which the pictures are the vehicle's own;
-    /// [`DivisionInput::WHOLE_PATH`] where the vehicle took all of them.
+    /// Place along its path, decimetres, up to which it takes, or took, its pictures;
+    /// [`DivisionInput::WHOLE_PATH`] where it took all of them.
     pub along_dm: u16,
 }
 
 impl DivisionInput {
-    /// Mark of a vehicle's whole path.
+    /// Value of `along_dm` for a vehicle that took all pictures of its path.
     pub const WHOLE_PATH: u16 = u16::MAX;
 
-    /// The inputs of a vehicle of the roster.
+    /// The input of a vehicle, from its entry in the roster report.
     pub fn from_entry(entry: &RosterReportEntry) -> Self {
         let along_dm = match entry.status {
             MemberStatus::Alive => entry.commitment_dm.unwrap_or(entry.progress_dm),
@@ -29,7 +29,7 @@ impl DivisionInput {
         Self { alive: entry.status == MemberStatus::Alive, along_dm }
     }
 
-    /// The place, metres; infinite for [`DivisionInput::WHOLE_PATH`].
+    /// `along_dm` in metres; infinite for [`DivisionInput::WHOLE_PATH`].
     pub fn along_m(&self) -> f32 {
         if self.along_dm == Self::WHOLE_PATH {
             f32::INFINITY
@@ -39,5 +39,5 @@ impl DivisionInput {
     }
 }
 
-/// The lots of all vehicles by rank.
+/// The inputs of all vehicles, by their rank in the roster.
 pub type DivisionInputs<const V: usize> = Vec<DivisionInput, V>;

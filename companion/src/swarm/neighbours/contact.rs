@@ -1,4 +1,4 @@
-//! One vehicle as it was last heard, and where it may be since.
+//! A neighbour as it was last heard, and where it may be since.
 
 use heapless::Vec;
 use planner_core::deconflict::Neighbour;
@@ -14,14 +14,14 @@ use crate::link::echo::MessageDelay;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, MAX_POINTS, ON_DETOUR, OUT_OF_PLAN, WAITING};
 use crate::time::{Duration, Instant};
 
-/// Ground of an area.
+/// What a mission over an area knows of where its vehicles come down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AreaGround {
-    /// Ground that is not level.
+    /// Heights of the ground, where it is not level.
     pub(super) ground: Option<Ground>,
-    /// After this silence a vehicle is down.
+    /// Silence after which a vehicle is on the ground.
     pub(super) down: Duration,
-    /// Distance by which two vehicles in the air may be nearer than they believe, metres.
+    /// Distance by which two vehicles in the air may be nearer than their estimates say, metres.
     pub(super) pair_position_error_m: f32,
 }
 
@@ -34,63 +34,62 @@ pub(crate) struct NeighbourEntry {
     pub(super) position_at: Option<Instant>,
     pub(super) boot_ms: u32,
     pub(super) flags: u8,
-    /// Since when it has reported that it is out, with its place known.
+    /// Since when the neighbour has reported that it is out of the plan, with its position known.
     pub(super) out_since: Option<Instant>,
     pub(super) hears_us_at: Option<Instant>,
-    /// Whom it hears, a bit for each rank.
+    /// Vehicles that the neighbour hears, a bit for each rank.
     pub(super) heard_bits: u32,
-    /// Progress of the vehicle as others passed it on, metres.
+    /// The neighbour's progress along the shared plan as others relayed it, metres.
     pub(super) relayed_m: Option<f32>,
-    /// When that was so.
+    /// When the neighbour made the newest report that others relayed.
     pub(super) relayed_at: Option<Instant>,
-    /// Sequence number of its last intent.
+    /// Sequence number of the neighbour's last intent.
     pub(super) intent_sequence: u8,
     pub(super) message_delay: MessageDelay,
-    /// When an intent of our mission was last heard from it.
+    /// When the neighbour's last intent of our mission was heard.
     pub(super) intent_at: Option<Instant>,
     pub(super) points: Vec<Point, MAX_POINTS>,
-    /// Number of the last of them that the vehicle flies to only where no other vehicle hears it.
+    /// Number of the last of its points that the neighbour flies to only while unheard.
     pub(super) first_unheard_point: u8,
-    /// Place of the vehicle on its reported points.
+    /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
-    /// Distance to which the points lead from the first of them, metres.
+    /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
     pub(super) extent_m: f32,
-    /// Length of its points from its place on, metres, where it flies to the last of them unheard:
-    /// over an area, where it reports as many as its lease allows. Negative elsewhere.
+    /// Length of all its points from its position on, metres, if it flies to the last of them
+    /// unheard: over an area, where it reports as many as its lease allows. Negative elsewhere.
     pub(super) unheard_way_m: f32,
-    /// Whether it may come down from where it is, and the height of the ground below it; NaN where
-    /// it never reported any.
+    /// Whether the neighbour may come down from where it is; and the height of the ground below it,
+    /// ENU up, metres, NaN if it never reported any.
     pub(super) may_come_down: bool,
     pub(super) ground_m: f32,
-    /// Place along its path up to which the vehicle's gates were open, or would be, metres: the
-    /// vehicle flies on to there unheard.
+    /// Place along its path up to which its gates were open, or would open after a wait, metres:
+    /// unheard it flies on to there.
     pub(super) gates_open_up_to_m: f32,
-    /// Seconds by which that flight is delayed.
+    /// Seconds by which gates and climb delay its unheard flight to `gates_open_up_to_m`.
     pub(super) unheard_delay_s: u8,
-    /// Whether it was last heard where the radio may not reach.
+    /// Whether the neighbour's last position was where the radio may not reach.
     pub(super) at_range_edge: bool,
-    /// Progress that an unheard vehicle makes at least, m/s.
+    /// Least speed at which the neighbour is assumed to make progress while unheard, m/s.
     pub(super) assumed_speed_mps: f32,
-    /// How fast it was when its position was heard, m/s.
+    /// The neighbour's speed at its last position, m/s.
     pub(super) speed_mps: f32,
-    /// Whether its plan is ours, whether it follows it or not.
+    /// Whether the neighbour's plan has our plan's CRC, whether it follows that plan or not.
     pub(super) shares_plan: bool,
-    /// Whether it follows another plan of our mission.
+    /// Whether the neighbour follows a plan of our mission with another CRC than ours.
     pub(super) other_plan: bool,
-    /// When it was last known to move.
+    /// When a position last showed it faster than [`MAX_HOVER_MPS`].
     pub(super) moved_at: Instant,
-    /// The furthest it can have come, metres along its path, and when that was.
+    /// Greatest progress that the neighbour can have made, metres along its path, and when.
     pub(super) furthest: Option<(f32, Instant)>,
-    /// Place of the vehicle before it took off: its autopilot may fly it back there.
+    /// The neighbour's place before its take-off: its autopilot may fly it back there.
     pub(super) pad: Option<Point>,
-    /// Place where the vehicle rested when a detour was planned; NaN where none was.
+    /// Place where the neighbour rested when the present detour was planned; NaN for none.
     pub(super) avoided_at: Point,
     pub(super) state: Neighbour,
 }
 
 impl NeighbourEntry {
-    /// Notes where its position is on its points: to be called when either was heard, so that no
-    /// step has to look for it.
+    /// Finds where the neighbour's position is on its points, once, when either was heard.
     pub(super) fn update_place_on_points(&mut self) {
         self.place_on_points = PlaceOnPoints::find(&self.state.position, self.points_for_now());
         if self.is_leased() {
@@ -100,12 +99,12 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether it flies to the last of its points unheard.
+    /// Whether the neighbour flies to the last of its points even unheard: over an area.
     pub(crate) fn is_leased(&self) -> bool {
         self.unheard_way_m >= 0.0
     }
 
-    /// Its points as far as it will go for now.
+    /// The neighbour's points up to where it will stop for now.
     pub(super) fn points_for_now(&self) -> &[Point] {
         &self.points[..self.points.len().saturating_sub(usize::from(self.first_unheard_point))]
     }
@@ -114,10 +113,10 @@ impl NeighbourEntry {
         self.heard_at.is_some_and(|at| now - at < span)
     }
 
-    // The contact has one copy of this and of other common calls: a board has little room.
+    // One copy of this, as of other common calls, instead of inlining: a board has little flash.
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
-        // Most are heard.
+        // Most neighbours are heard: no further work for these.
         let lost = |at: &Instant| now - *at >= LOST_AFTER && self.rank != STRANGER_RANK;
         let Some(heard_at) = self.heard_at.filter(lost) else { return false };
         let flight_ms = (1000.0 * self.unheard_flight_time_s()) as u32;
@@ -125,19 +124,19 @@ impl NeighbourEntry {
         now - heard_at >= dead && self.relayed_at.is_none_or(|at| now - at >= dead)
     }
 
-    /// Whether it is heard, but has had no valid position for long.
+    /// Whether the neighbour is heard, but has reported no valid position for 3 s.
     pub(super) fn is_imprecise(&self) -> bool {
         self.heard_at
             .zip(self.position_at)
             .is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
     }
 
-    /// Whether it follows the shared plan, as last heard.
+    /// Whether the neighbour follows the shared plan, as last heard.
     pub(super) fn on_plan(&self) -> bool {
         self.state.progress_m.is_some() && !self.reports(ON_DETOUR | OUT_OF_PLAN)
     }
 
-    /// Time that an unheard vehicle may take for what its gates left it, seconds.
+    /// Time that the neighbour may fly on unheard, through open gates, seconds.
     pub(super) fn unheard_flight_time_s(&self) -> f32 {
         match self.state.progress_m.filter(|_| self.flies_plan_unheard()) {
             Some(progress_m) => {
@@ -149,7 +148,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether it flies its plan while unheard, or did so.
+    /// Whether the neighbour flies on along its plan while unheard: it was at the edge of the
+    /// radio's range, with open gates ahead.
     #[inline(never)]
     pub(super) fn flies_plan_unheard(&self) -> bool {
         self.state.progress_m.is_some_and(|progress_m| {
@@ -157,8 +157,8 @@ impl NeighbourEntry {
         })
     }
 
-    /// Progress of the vehicle along the shared plan for sure, metres: unheard the vehicle flies on
-    /// as far as its gates were open.
+    /// Progress along the shared plan that the neighbour has surely made, metres: unheard at the
+    /// edge of the radio's range it is assumed to fly on as far as its gates were open.
     pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now)?;
         let Some(known_at) = self.intent_at.max(self.relayed_at) else { return Some(known_m) };
@@ -175,7 +175,8 @@ impl NeighbourEntry {
         ))
     }
 
-    /// Seconds until it has come past `until_m` for sure; none where that is open.
+    /// Seconds until the neighbour has surely come past `until_m`, heard or not; `None` where its
+    /// gates may stop it before.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now).filter(|_| !self.reports(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.intent_at.max(self.relayed_at)?;
@@ -195,9 +196,9 @@ impl NeighbourEntry {
     }
 
     /// The part of a reported progress that is believed, metres: no more than the vehicle can have
-    /// flown since the report before, at `fastest_mps`. The rest comes by and by, a landing that
-    /// reports the whole way at once too. Less than before is believed: it opens no gate. The first
-    /// report of a plan is taken as it is, that of a vehicle that was restarted too.
+    /// flown since the report before, at `fastest_mps`. The rest is believed by and by; so is a
+    /// landing, which reports the whole way at once. A lower progress is believed: it opens no
+    /// gate. The first report of a plan is believed, and that of a vehicle that was restarted.
     pub(super) fn plausible_progress_m(
         &mut self,
         progress_m: f32,
@@ -214,21 +215,21 @@ impl NeighbourEntry {
         believed_m
     }
 
-    /// Whether it is on the ground: as it reports, or after so long a silence.
+    /// Whether the neighbour is on the ground: reported, or dead and silent for `down`.
     pub(super) fn is_on_ground(&self, now: Instant, down: Duration) -> bool {
         self.reports(GROUNDED)
             || (!self.reports(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
-    /// Whether it is out of the plan, or lately reported that it stands until another vehicle
-    /// moves.
+    /// Whether the neighbour is out of the plan, or lately reported that it stands until another
+    /// vehicle moves, or lands after its detour.
     pub(super) fn is_waiting(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
             || (self.reports(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
             || self.is_landing_after_detour(now)
     }
 
-    /// Whether it flew around and comes down at the end of that.
+    /// Whether the neighbour descends straight down at the end of a detour.
     pub(super) fn is_landing_after_detour(&self, now: Instant) -> bool {
         self.reports(ON_DETOUR)
             && !self.reports(GROUNDED)
@@ -238,7 +239,7 @@ impl NeighbourEntry {
             && self.heard_within(now, HEARD_WITHIN)
     }
 
-    /// Whether it claims the turn: it is blocked, hovers, and is about to fly a detour.
+    /// Whether the neighbour claims the turn to fly a detour: blocked, hovering, not waiting.
     pub(super) fn claims_turn(&self, now: Instant) -> bool {
         self.reports(BLOCKED)
             && !self.is_waiting(now)
@@ -246,8 +247,8 @@ impl NeighbourEntry {
             && self.state.velocity.length() < MAX_HOVER_MPS
     }
 
-    /// Whether it will land where it is without looking, or may: it is in the air off the plan, or
-    /// unheard.
+    /// Whether the neighbour may land where it is without looking for others: it is in the air off
+    /// the plan, or unheard.
     pub(super) fn may_land_unseen(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
@@ -258,8 +259,8 @@ impl NeighbourEntry {
             && (silent || (self.state.progress_m.is_none() && !self.reports(ON_DETOUR)))
     }
 
-    /// The columns it may come down in, `apart_m` around it; unheard it has come as far as `upto_m`
-    /// along its points.
+    /// Calls `tell` with the columns, of radius `apart_m`, in which the neighbour may come down;
+    /// unheard, below all places up to `upto_m` along its points.
     pub(super) fn landing_columns(
         &self,
         now: Instant,
@@ -288,15 +289,16 @@ impl NeighbourEntry {
         if age_s < MAX_HEIGHT_AGE_S {
             column(here, (FAR_BELOW_M + fallen_m).min(MAX_COLUMN_M), ZoneKind::Descending);
         } else {
-            // The vehicle may be anywhere down to there by now, and comes down from there.
+            // By now it may be anywhere down to there, and descends from there.
             column(here, fallen_m, ZoneKind::Static);
             column(here - up(fallen_m), FAR_BELOW_M, ZoneKind::Descending);
         }
     }
 
-    /// Depth of the column below a place on its path, metres: over an area at least to the ground.
+    /// Depth of the column below a place on the neighbour's path, metres: over an area to the
+    /// ground.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
-        // NaN counts as none.
+        // NaN, a ground never reported, counts as none.
         if self.is_leased() {
             libm::fmaxf(MAX_COLUMN_M, place.z - self.ground_m)
         } else {
@@ -304,7 +306,7 @@ impl NeighbourEntry {
         }
     }
 
-    /// Height of the top of its climb, if it climbs or is about to.
+    /// Height of the top of the neighbour's climb, ENU up, metres; `None` without a climb.
     pub(super) fn climb_top_m(&self) -> Option<f32> {
         let (top, here) = (self.points_for_now().last()?, self.state.position);
         let beside = (top - here).xy().norm_squared();
@@ -314,26 +316,26 @@ impl NeighbourEntry {
         (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
 
-    /// Stretch of its path that the vehicle may fly unheard, metres: over an area as far as its
-    /// points lead; elsewhere further where messages are late, its own and those by which it learns
-    /// that no vehicle hears it.
+    /// Length of the way along its points that the neighbour may fly unheard, metres: over an area
+    /// all of it; elsewhere what a stop takes, more where messages are late, its own and those by
+    /// which it learns that no vehicle hears it.
     pub(super) fn unheard_distance_m(&self) -> f32 {
-        // Rounding does not take away the last corner.
+        // The slack keeps rounding from cutting off the last corner.
         libm::fmaxf(self.unheard_way_m + LEGS_ROUNDING_M, self.unheard_stop_m())
     }
 
-    /// The stretch of a vehicle that stops where it notices that no other vehicle hears it, metres.
+    /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
     pub(super) fn unheard_stop_m(&self) -> f32 {
         UNHEARD_STRETCH_M + UNHEARD_STRETCH_PER_DELAY_MPS * 2.0 * self.message_delay.delay_s
     }
 
-    /// Whether it is in the air, or about to be, as it reported last.
+    /// Whether the neighbour was in the air, or about to take off, when it was last heard.
     pub(super) fn is_under_way(&self) -> bool {
         !self.reports(GROUNDED | LANDED) || self.first_unheard_point > 0
     }
 
-    /// Whether it is silent, and continues over an area as long as its lease allows, or as its
-    /// autopilot takes it.
+    /// Whether the neighbour is silent over an area, and may fly on as long as its lease allows, or
+    /// as its autopilot takes it.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.is_leased()
             && self.is_under_way()
@@ -341,8 +343,8 @@ impl NeighbourEntry {
             && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
-    /// Where it may have fallen, its motors off, if it is silent over an area: from its place as
-    /// far as its speed took it, and so much aside, metres.
+    /// Where the neighbour may have fallen with its motors off, if silent over an area: the line
+    /// from its position to where its speed carried it, and the distance beside that line, metres.
     #[inline(never)]
     pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
         let silent =
@@ -354,23 +356,24 @@ impl NeighbourEntry {
         silent.then(|| ([here, here + carried], self.fall_aside_m()))
     }
 
-    /// How far aside from where its speed takes it it may fall, metres.
+    /// Distance by which the wind may carry the neighbour aside while it falls, metres.
     #[inline(always)]
     pub(super) fn fall_aside_m(&self) -> f32 {
         let high_m = self.state.position.z - self.ground_m;
-        // NaN counts as none.
+        // NaN, a ground never reported, counts as none.
         if high_m > 0.0 { FALL_DRIFT_SHARE * high_m.min(MAX_FALL_M) } else { 0.0 }
     }
 
-    /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a
-    /// place. No pads are as near to each other.
+    /// Whether the neighbour may still fly to its pad, and that is within `apart_m` of the vertical
+    /// through `place`. No two pads are that near to each other.
     pub(crate) fn comes_home(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
         self.may_fly_on(now) && self.pad.is_some_and(near)
     }
 
-    /// Legs of its path for `left_m`, as far as it may come unheard, each with its length and the
-    /// part that counts, metres; the first is the place where it was heard.
+    /// Calls `tell` with the neighbour's position and each leg along its points that it may have
+    /// flown unheard, `left_m` in all: both ends, and the lengths of the leg and of its flown part,
+    /// metres.
     #[inline(never)]
     pub(super) fn for_each_leg(&self, mut left_m: f32, tell: &mut dyn FnMut([Point; 2], [f32; 2])) {
         let mut at = self.state.position;
@@ -385,8 +388,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Places along its path for `upto_m`, as far as it may come unheard, and how much further than
-    /// from one of them it may be from the nearest of them.
+    /// Calls `tell` with places along its points that the neighbour may have come to unheard,
+    /// `upto_m` in all, and with its greatest distance from the nearest of them, metres.
     #[inline(never)]
     pub(super) fn for_each_place(&self, upto_m: f32, tell: &mut dyn FnMut(Point, f32)) {
         let step_m = if upto_m > self.unheard_stop_m() {
@@ -400,7 +403,7 @@ impl NeighbourEntry {
                 let along_m = step as f32 * step_m;
                 tell(at + (next - at) * (along_m / leg_m), wider_m);
             }
-            // The end too: it may have come as far.
+            // The end of the flown part too.
             tell(
                 if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
                 wider_m,
@@ -408,10 +411,10 @@ impl NeighbourEntry {
         });
     }
 
-    /// How high it lies at most, once it came down from a place: on the ground that it reported,
-    /// which away from pads is the lowest there is. Then it is below what it flew along, which is
-    /// over the ground by [`Ground::height_m`] but for what it deviated; above its pad, and where
-    /// it came down already, that is not known.
+    /// Greatest height at which the neighbour may lie after coming down from a place, ENU up,
+    /// metres: the ground that it reported, unless that is just the area's lowest. Then the highest
+    /// ground, but at least half of [`Ground::height_m`] below its path if it was on its plan away
+    /// from its pad.
     pub(super) fn max_ground_m(&self, field: AreaGround, place: &Point) -> f32 {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;
@@ -425,8 +428,8 @@ impl NeighbourEntry {
         libm::fmaxf(self.ground_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
-    /// Keep-out zones of the places where the vehicle may be from now on, `apart_m` around it,
-    /// which unheard has come as far as `upto_m` along its points. Over a field it lies on the
+    /// Calls `tell` with the keep-out zones, of radius `apart_m`, of all places where the neighbour
+    /// may be from now on; unheard up to `upto_m` along its points. Over an area it lies on the
     /// ground that it reported.
     pub(super) fn keep_out_zones(
         &self,
@@ -436,7 +439,7 @@ impl NeighbourEntry {
         tell: &mut dyn FnMut(KeepOutZone),
     ) {
         let here = self.state.position;
-        // The zone is for vehicles in the air: those on the ground lie beside each other's pads.
+        // Wider in the air only: vehicles on the ground lie beside each other's pads.
         let wide_m = apart_m + field.map_or(0.0, |field| field.pair_position_error_m);
         let place =
             |radius_m: f32| KeepOutZone { from: here, to: here, radius_m, kind: ZoneKind::Static };
@@ -455,19 +458,19 @@ impl NeighbourEntry {
         {
             let below = column(here, ZoneKind::Static);
             tell(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
-            // The place of the vehicle may not be approached from above or the side, whatever its
-            // column leaves.
+            // The neighbour's place is not to be approached from above or the side either, whatever
+            // its column leaves.
             tell(place(wide_m + PAIR_SWAY_M));
         } else if self.is_dead(now) && self.flies_plan_unheard() {
-            // The vehicle is where the plan has it.
+            // The neighbour is where its gates let it fly: gates keep it apart, no zone.
         } else if self.is_dead(now) {
             if let Some(pad) = self.pad {
                 tell(KeepOutZone { from: pad, to: pad, ..place(apart_m) });
             }
             let down = !self.heard_within(now, field.map_or(DOWN_AFTER, |field| field.down));
             if let Some(field) = field.filter(|_| down && !self.ground_m.is_nan()) {
-                // No lane and no layer comes as low: as thin as it lies, and below that at corners
-                // alone.
+                // No lane or layer is as low: the zone is as thin as a vehicle that lies, and
+                // reaches down to the reported ground at corners of its path only.
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
                 let high = |at: Point| low(at, self.max_ground_m(field, &at));
                 return self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {

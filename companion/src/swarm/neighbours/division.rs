@@ -1,16 +1,18 @@
-//! What the fleet of a coverage mission agrees on follows from which vehicles hear each other.
+//! The fleet of a coverage mission, and which vehicles hear each other, by which it decides.
 
 use super::*;
 use crate::config::Ground;
 use crate::link::roster::{MAX_ENTRIES, RosterReport};
 use crate::swarm::fleet::{FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport};
 
-/// Time for which a vehicle's report of its plan counts.
+/// Time for which a neighbour's report of another plan counts.
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
-    /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many
-    /// seconds; `ground` is what is not level. By `stray_m` two may be nearer than they believe.
+    /// Makes the mission one over an area, with a fleet that divides what a vehicle leaves.
+    /// `down_s`: silence after which a lost vehicle is on the ground, seconds; `ground`: heights of
+    /// ground that is not level; `stray_m`: distance by which two vehicles may be nearer than their
+    /// estimates say.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
         (self.ground, self.pair_position_error_m) = (ground, stray_m);
         self.down = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
@@ -22,17 +24,17 @@ impl<const V: usize> Neighbours<V> {
         ));
     }
 
-    /// The fleet; none where the mission is no area.
+    /// The fleet; `None` where the mission is no area.
     pub(crate) fn fleet(&self) -> Option<&Fleet<V>> {
         self.fleet.as_ref()
     }
 
-    /// The fleet, to be changed.
+    /// The fleet, mutable; `None` where the mission is no area.
     pub(crate) fn fleet_mut(&mut self) -> Option<&mut Fleet<V>> {
         self.fleet.as_mut()
     }
 
-    /// Updates which vehicles of the fleet are heard.
+    /// One step of the fleet, with this vehicle's report and which vehicles hear each other.
     pub(crate) fn step_fleet(&mut self, own: &OwnReport, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
         let roster = &self.contacts[..self.roster];
@@ -54,15 +56,15 @@ impl<const V: usize> Neighbours<V> {
         });
     }
 
-    /// Whether one that follows another plan of this mission was heard lately.
+    /// Whether a vehicle was heard lately that follows another plan of this mission.
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
         let lately =
             |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
-    /// Whether another vehicle that takes part is in flight, and none of them is missed: while one
-    /// may be lost, each that lives counts for a majority.
+    /// Whether another vehicle that takes part is in flight, and none of those has been silent for
+    /// `missed_after`: while a vehicle may be lost, each that lives counts for a majority.
     pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
         let flies = |c: &&NeighbourEntry| heard(c) && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
@@ -73,7 +75,7 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Handles what another vehicle reports of all. `waits`: this one has not been started.
+    /// Handles another vehicle's roster report. `waits`: this vehicle has not been started.
     pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, waits: bool) {
         let rank = self.roster_index(id).map(|at| usize::from(self.contacts[at].rank));
         if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {
@@ -81,7 +83,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// The next of the reports of all vehicles.
+    /// The next roster report: all vehicles, or in turn as many as one message holds.
     pub(crate) fn roster(&mut self) -> Option<RosterReport> {
         let fleet = self.fleet.as_ref()?;
         let first = if self.roster_next < fleet.vehicle_count() { self.roster_next } else { 0 };

@@ -1,5 +1,5 @@
-//! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it
-//! is too far away to matter.
+//! A neighbour as the safety filter sees it: the inputs of its reachable set; or that it is too far
+//! away to matter.
 
 use planner_core::Point;
 use planner_core::safety::{
@@ -12,50 +12,52 @@ use super::*;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilterNeighbour<'a> {
     pub(crate) id: u8,
-    /// Whether the roster does not name it.
+    /// Whether the roster does not name it, so that only its positions count.
     pub(crate) stranger: bool,
-    /// Whether it follows the shared plan.
+    /// Whether the neighbour was last heard to follow the shared plan.
     pub(crate) on_plan: bool,
-    /// Whether it does so out of range, as others report.
+    /// Whether the neighbour follows the shared plan out of radio range, as others relay or by its
+    /// last position.
     pub(crate) out_of_range: bool,
-    /// Whether it knows that plan.
+    /// Whether the neighbour's plan has our plan's CRC, even while it flies off that plan.
     pub(crate) shares_plan: bool,
-    /// Whether it has stood for a while.
+    /// Whether the neighbour is on the ground, or has stood for 5 s.
     pub(crate) stands: bool,
-    /// Whether it stands until another vehicle moves.
+    /// Whether the neighbour lately reported that it stands until another vehicle moves.
     pub(crate) waits: bool,
-    /// Whether it has been silent for so long that it counts as lost.
+    /// Whether the neighbour has been silent for so long that it counts as lost.
     pub(crate) lost: bool,
-    /// Inputs of the neighbour's set.
+    /// Inputs of the neighbour's reachable set.
     pub(crate) motion: NeighbourMotion<'a>,
-    /// Place where the neighbour was last heard, if its set is that of a climb since: it may not
-    /// have begun the climb.
+    /// Last position of a neighbour that may have climbed to its top since, where its set is: it
+    /// may not have begun the climb.
     pub(crate) before_climb: Option<Point>,
 }
 
-/// Inputs of the first comparison of a vehicle with its neighbours.
+/// Inputs of the first, cheap comparison of this vehicle with each neighbour.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReachQuery<'a> {
-    /// The vehicle's own set.
+    /// Reachable set of this vehicle.
     pub(crate) own: &'a OwnSet<'a>,
-    /// Greatest distance kept, metres.
+    /// Greatest distance to be kept from any neighbour, metres.
     pub(crate) within_m: f32,
-    /// Bounds expected of the neighbours.
+    /// Limits within which neighbours are expected to fly.
     pub(crate) bounds: &'a MotionBounds,
-    /// Time of the neighbours' flight that counts as well, seconds.
+    /// Flight time of the neighbours that has to be free as well, seconds.
     pub(crate) ahead_s: f32,
-    /// Whether it follows the shared plan: gates keep it apart from those that do.
+    /// Whether this vehicle follows the shared plan: gates keep it apart from those that do too.
     pub(crate) on_plan: bool,
-    /// Whether it hears no other vehicle: then those that it does not hear fly on.
+    /// Whether this vehicle hears no other one: then the others are assumed to fly on.
     pub(crate) hears_nobody: bool,
-    /// Whether it lands: then it looks for where those that it does not hear may lie.
+    /// Whether this vehicle lands, or descends over an area: then places count where unheard
+    /// vehicles may lie.
     pub(crate) lands: bool,
 }
 
 impl NeighbourEntry {
-    /// Whether it counts as dead, where it may come within reach; `None` where it stays out of
-    /// reach wherever it can be: what most of them do, seen without making a set of it. Never
-    /// `None` where [`Neighbours::for_filter`] and its reach say otherwise.
+    /// `None` if the neighbour stays out of reach wherever it can be, as most do: found without
+    /// computing its set. Else whether it counts as dead. Never `None` where the set of
+    /// [`Neighbours::for_filter`] would come within reach.
     #[inline(always)]
     fn within_reach(&self, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> Option<bool> {
         let placed_at = self.position_at?;
@@ -74,7 +76,7 @@ impl NeighbourEntry {
             speed_mps: self.speed_mps,
             age_s: age.as_secs_f32(),
             delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.message_delay.delay_s },
-            // The first alone is asked for.
+            // Only the first point is read.
             points: &self.points,
             place_on_points: self.place_on_points,
             extent_m: self.extent_m,
@@ -90,11 +92,11 @@ impl NeighbourEntry {
         (!beyond).then_some(false)
     }
 
-    /// The same where its place is old. Seen from above it is where it was or, known by its
-    /// intents, at the first of its points; or as far from there as it can have flown: as long as
-    /// it may not have noticed that no other vehicle hears it, in a climb to its top and a little
-    /// further, and once it counts as dead along its points alone. What lies after so long moves no
-    /// more.
+    /// Whether a neighbour whose position is older than [`MAX_HEIGHT_AGE`] stays out of reach, seen
+    /// from above. It is at its last position or, by a newer intent, at the first of its points; or
+    /// as far from there as it can have flown: at full speed for as long as it may not have noticed
+    /// that no vehicle hears it; in a climb to its top and a little further; once dead, along its
+    /// points alone. A vehicle that lies on the ground moves no more.
     fn is_silent_beyond(
         &self,
         age: Duration,
@@ -135,8 +137,8 @@ impl NeighbourEntry {
         away_sq >= most_m * most_m
     }
 
-    /// Points that it may have flown along, all of them once it is dead, and no less than the
-    /// distance to which they lead, metres.
+    /// Points along which it may have flown, all of them once it is dead; and an upper bound of the
+    /// distance from the first to any other of them, metres.
     fn points_flown(&self, dead: bool) -> (&[Point], f32) {
         match dead {
             true if self.is_leased() => (&self.points, self.unheard_distance_m()),
@@ -145,8 +147,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its
-    /// points, and is no ball.
+    /// Over an area: for a vehicle silent for longer than a stop takes, replaces the ball around
+    /// its last position by the part of its points that it may have flown since.
     pub(crate) fn follow_unheard<'a>(
         &'a self,
         heard: &mut NeighbourMotion<'a>,
@@ -167,7 +169,7 @@ impl NeighbourEntry {
         heard.rests_within_m = libm::fminf(flown_m, self.unheard_distance_m());
     }
 
-    /// Greatest distance of the vehicle from where it stopped unheard, metres.
+    /// Greatest distance of the vehicle's set from the place where it stopped unheard, metres.
     #[inline(never)]
     fn rest_radius_m(&self, reach: &ReachQuery<'_>) -> f32 {
         let rests = NeighbourMotion {
@@ -186,7 +188,8 @@ impl NeighbourEntry {
         rests.reach_m(reach.bounds, reach.ahead_s)
     }
 
-    /// Whether it follows the plan out of range, as others report or as it was heard last.
+    /// Whether the neighbour follows the plan out of radio range, as others relay or by its last
+    /// position.
     fn is_out_of_range(&self, now: Instant) -> bool {
         let silent = !self.reports(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
         let unheard = silent && self.at_range_edge && self.on_plan();
@@ -194,7 +197,7 @@ impl NeighbourEntry {
         self.is_reported_out_of_range(now) || (unheard && flies_on())
     }
 
-    /// Whether it counts as dead and rests on its points, its place so old.
+    /// Whether the neighbour counts as dead and rests on its points, with a position of this age.
     #[inline(never)]
     pub(super) fn rests_silently(&self, age: Duration, now: Instant) -> bool {
         age >= LOST_AFTER
@@ -204,9 +207,9 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// A vehicle in flight, not out of the plan, within `apart_m` of the vertical through `pad`
-    /// that was missed for a moment, and may have fallen silent: three of its positions were lost,
-    /// or more.
+    /// System id of a vehicle in flight, not out of the plan, within `apart_m` of the vertical
+    /// through `pad` whose positions have been missing for 0.6 to 3 s: three or more were lost, or
+    /// it has fallen silent.
     #[inline(never)]
     pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {
         let missed = |c: &&NeighbourEntry| {
@@ -219,7 +222,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().find(missed).map(|c| c.id)
     }
 
-    /// The first contact from number `from` on that was placed and may be within reach, its number,
+    /// The first contact from index `from` on that was placed and may be within reach: its index,
     /// and whether it counts as dead.
     pub(crate) fn next_within(
         &self,
@@ -236,8 +239,8 @@ impl<const V: usize> Neighbours<V> {
         None
     }
 
-    /// A contact as the safety filter sees it, `dead` or not; one that was never placed as if it
-    /// had been at the start.
+    /// A contact as the safety filter sees it, `dead` or not; one without a position counts as last
+    /// heard at the shell's start.
     #[inline(always)]
     pub(crate) fn for_filter<'a>(
         &'a self,
@@ -247,23 +250,23 @@ impl<const V: usize> Neighbours<V> {
     ) -> FilterNeighbour<'a> {
         let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
         let placed_s = placed_for.as_secs_f32();
-        // Most are heard: then nothing of what follows is so.
+        // Most neighbours are heard: then nothing of what follows for silent ones applies.
         let silent = placed_for >= MAX_HEIGHT_AGE;
-        // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
+        // Where positions are lost, a newer intent gives the place: that of its setpoint.
         let told_at = contact
             .intent_at
             .filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
         let told_s =
             told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
-        // Dead, or without a position of its own, it rests by then where a reroute keeps off; later
-        // on the ground below.
+        // Silent for `down`, or on the ground without a valid position, a vehicle lies on the
+        // ground below its last position.
         let down = silent
             && (placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise()));
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);
-        // Unheard in its climb it may have come to the top of it, and a little further.
+        // Unheard in its climb the neighbour may have come to the top, and a little further.
         let top =
             if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
@@ -287,8 +290,8 @@ impl<const V: usize> Neighbours<V> {
             position: here,
             velocity: contact.state.velocity,
             speed_mps: if rests { 0.0 } else { contact.speed_mps },
-            // A vehicle that flew along its points stopped on them, and rests where a reroute keeps
-            // off.
+            // A dead vehicle stopped on its points, or climbed to its top, and rests there: no ball
+            // grows around it.
             age_s: if rests { 0.0 } else { age_s },
             delay_s: match (dead, top) {
                 (false, Some(_)) => UNHEARD_BEYOND_TOP_S,

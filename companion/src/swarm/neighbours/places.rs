@@ -1,4 +1,4 @@
-//! Where others are and may come to be, as the search for a detour asks for it.
+//! Keep-out zones where the other vehicles are and may come to be, for the search for a detour.
 
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
@@ -10,13 +10,13 @@ use super::{
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
-    /// Distance by which vehicles in the air, off the plan, may be nearer than they believe,
-    /// metres: 0 where walls leave no room for it.
+    /// Distance by which two vehicles in the air, one of them off the plan, may be nearer than
+    /// their estimates say, metres; 0 without an area, where walls leave no room for it.
     pub(crate) fn pair_position_error_m(&self) -> f32 {
         self.pair_position_error_m
     }
 
-    /// The ground, where the mission is an area.
+    /// Ground and landing time for a mission over an area; `None` in other missions.
     pub(super) fn area_ground(&self) -> Option<AreaGround> {
         self.fleet.is_some().then_some(AreaGround {
             ground: self.ground,
@@ -25,8 +25,9 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears
-    /// no other vehicle has lost its own radio rather: the others fly on, nobody knows where.
+    /// Distance along its points that a contact may have flown unheard, metres. If this vehicle
+    /// hears nobody, rather its own radio has failed: then the others fly on, to places unknown
+    /// here.
     #[inline(never)]
     fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !contact.heard_within(now, LANDS_UNHEARD);
@@ -34,8 +35,8 @@ impl<const V: usize> Neighbours<V> {
         if far { contact.unheard_distance_m() } else { contact.unheard_stop_m() }
     }
 
-    /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
-    /// detour says so: `apart_m` away from it is far enough.
+    /// Calls `tell` with the keep-out zones, of radius `apart_m`, of contact `i` where it is out of
+    /// the plan, unless the present detour already avoids that place.
     pub fn for_each_zone_of(
         &self,
         i: usize,
@@ -57,24 +58,25 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Notes that every vehicle out of the plan at time `at` was checked and none blocks the path.
+    /// Notes that a scan begun at time `at` has found no vehicle out of the plan on the path.
     pub fn mark_path_clear(&mut self, at: Instant) {
         self.clear_at = at;
     }
 
-    /// Whether the path was found clear at `at` or later.
+    /// Whether a scan begun at `at` or later has found the path clear.
     pub fn is_path_clear_since(&self, at: Instant) -> bool {
         self.clear_at >= at
     }
 
-    /// Places of the other vehicles of the roster while they stand, those out of the plan among
-    /// them: `apart_m` away from one in the air is far enough, and `lying_m` from one that lies,
-    /// and no longer deviates.
+    /// Calls `tell` with the keep-out zones of the roster's other vehicles where they stand now, or
+    /// rest out of the plan. `apart`: radius for one in the air, and for one that lies, which no
+    /// longer deviates.
     pub fn for_each_place(&self, now: Instant, apart: [f32; 2], mut tell: impl FnMut(KeepOutZone)) {
         (0..self.roster).for_each(|i| self.places_of(i, now, apart, &mut tell));
     }
 
-    /// The places of contact `i`.
+    /// Calls `tell` with the keep-out zones of contact `i` of the roster where it stands or rests:
+    /// of radius `lying_m` if it is on the ground, else `apart_m`.
     pub(crate) fn places_of(
         &self,
         i: usize,
@@ -90,7 +92,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Columns in which vehicles that land without looking may come nearer than `apart_m`.
+    /// Calls `tell` with the columns, of radius `apart_m`, in which vehicles may come down that
+    /// land without looking.
     pub fn for_each_landing_column(
         &self,
         now: Instant,
@@ -100,7 +103,8 @@ impl<const V: usize> Neighbours<V> {
         (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
     }
 
-    /// The columns of contact `i`.
+    /// Calls `tell` with the columns, of radius `apart_m`, in which contact `i` may come down, if
+    /// it may land without looking.
     pub fn landing_column(
         &self,
         i: usize,
@@ -118,9 +122,9 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Zones in which a landing would end within `apart_m` of a vehicle that is there: a path may
-    /// lead over them, and not end there. Over an area a silent one may come down anywhere on its
-    /// way, or at its pad: that bars places at `height_m`.
+    /// Calls `tell` with the zones in which a landing would end within `apart_m` of another
+    /// vehicle: a path may lead through them, but not end there. Over an area a silent vehicle may
+    /// come down anywhere along its points, or at its pad: that bars places at height `height_m`.
     pub fn for_each_landing_zone(
         &self,
         now: Instant,
@@ -133,7 +137,8 @@ impl<const V: usize> Neighbours<V> {
             };
             let from = contact.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
-            // A place to land at is sought at one height, and as far away as the landing keeps.
+            // Landing places are sought at one height, so a zone is as wide there as the landing
+            // keeps off.
             let level = |at: Point| Point::new(at.x, at.y, height_m);
             let mut bar = |[a, b]: [Point; 2], wider_m: f32| {
                 zone(level(a), level(b), apart_m + self.pair_position_error_m + wider_m);
@@ -141,8 +146,8 @@ impl<const V: usize> Neighbours<V> {
             if contact.may_fly_on(now) {
                 contact.for_each_leg(contact.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
             }
-            // Whoever is in the air comes down at its pad, or off its plan below where it is, or at
-            // the end of its way.
+            // A vehicle in the air comes down at its pad; off its plan perhaps also below its
+            // place, or at the end of its points.
             if contact.is_leased() && contact.is_under_way() {
                 contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
                 if !contact.reports(ON_PLAN) {
@@ -156,8 +161,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as
-    /// near beside it.
+    /// Calls `tell` with the column above the last position of contact `i`, of radius `apart_m`:
+    /// there this vehicle might come down on it.
     pub fn column_above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;
@@ -167,9 +172,8 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column
-    /// from `place` down to the ground at `floor_m`: from where it may have come along its path it
-    /// comes down, never up. At the time `fallen`, if that is given, it may have fallen too, and
-    /// not straight down.
+    /// from `place` to the ground at `floor_m`. From each place along its points it comes down,
+    /// never up. With a time in `fallen` it may also have fallen, and not straight down.
     pub(crate) fn may_lie_below(
         &self,
         i: usize,
@@ -199,14 +203,15 @@ impl<const V: usize> Neighbours<V> {
         below
     }
 
-    /// Whether a neighbour was last heard lower than `position` and within `within_m` of its
+    /// Whether a neighbour's last position is lower than `position` and within `within_m` of its
     /// vertical.
     pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
         let under = |p: &Point| p.z < position.z && (p - position).xy().length() < within_m;
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
-    /// Marks the vehicles that now rest: a detour around them was planned.
+    /// Notes where the vehicles out of the plan rest now: the detour that begins avoids these
+    /// places.
     pub fn mark_avoided(&mut self, now: Instant) {
         for contact in &mut self.contacts {
             contact.avoided_at =
@@ -214,7 +219,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Vehicles that a detour led around count again.
+    /// Forgets the places that a detour avoided: they may block the path again.
     pub(crate) fn forget_avoided(&mut self) {
         self.contacts.iter_mut().for_each(|contact| contact.avoided_at = NO_PLACE);
     }

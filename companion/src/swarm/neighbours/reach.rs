@@ -1,4 +1,4 @@
-//! How far a vehicle flies on unheard, and when it comes there.
+//! How far a vehicle flies on while no other vehicle hears it, and when it comes there.
 //!
 //! A vehicle reports a lower bound of its later progress: from its progress now it flies at least
 //! at the assumed speed, after a delay of some seconds, as far as its gates are open or will be. A
@@ -17,9 +17,9 @@ use crate::time::Instant;
 const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl<const V: usize> Neighbours<V> {
-    /// Place of the first of these gates before which an unheard vehicle would wait too long,
-    /// metres, infinite if there is none, and the seconds by which those before it delay a flight
-    /// at the assumed speed from `progress_m`.
+    /// Place along the path of the first of `gates` before which this vehicle, unheard, would wait
+    /// too long, metres, ∞ if there is none; and the seconds by which the gates before that delay
+    /// it, compared with a flight at the assumed speed from `progress_m`.
     pub(crate) fn unheard_reach(&self, gates: &[Gate], progress_m: f32, now: Instant) -> (f32, u8) {
         let mut delay_s = 0.0;
         let closed = gates.iter().find(|gate| {

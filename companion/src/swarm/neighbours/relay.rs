@@ -1,11 +1,11 @@
-//! Progress of vehicles that a neighbour does not hear: a vehicle that hears them passes it on.
+//! Relays of the progress of vehicles that a neighbour does not hear, by a vehicle that hears them.
 //!
 //! The order of the schedule needs the progress of vehicles that may be out of radio range by then.
-//! So each vehicle reports, once a second at most, how far those have come that some neighbour of
-//! it does not hear: nothing at all while everybody hears everybody. Progress never falls, so it
-//! may be old. It opens gates; and a vehicle that is not heard, but was reported to follow the
-//! shared plan a moment ago, is neither lost nor somewhere about: gates keep it apart. What a
-//! vehicle itself reports goes before what others say of it.
+//! So each vehicle relays, once a second at most, the progress of those that one of its neighbours
+//! does not hear: nothing at all while everybody hears everybody. Progress never falls, so it may
+//! be old. It opens gates. And a vehicle that is not heard, but was reported a moment ago to follow
+//! the shared plan, counts neither as lost nor as possibly anywhere near: gates keep it apart. What
+//! a vehicle itself reports goes before what others relay of it.
 //!
 //! The payload of TUNNEL under a private payload type, little-endian, at most 122 bytes:
 //!
@@ -18,10 +18,10 @@
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 + 11 i | u8 | rank in the roster sorted by system id |
-//! | 13 + 11 i | u8 | how old that is, 0.1 s; 255: so old or older |
-//! | 14 + 11 i | f32 | its progress on the plan, metres |
-//! | 18 + 11 i | f32 | place up to which its gates are open, or will be, metres: exactly as it reported it, since gates stand there |
-//! | 22 + 11 i | u8 | seconds by which that delays its flight |
+//! | 13 + 11 i | u8 | age of its report, 0.1 s; 255: that old or older |
+//! | 14 + 11 i | f32 | its progress along the plan's path, metres |
+//! | 18 + 11 i | f32 | place up to which its gates are open, or will be, metres: as it reported it |
+//! | 22 + 11 i | u8 | seconds by which gates and climb delay its flight |
 
 use heapless::Vec;
 
@@ -31,7 +31,7 @@ use crate::time::{Duration, Instant};
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
-/// Most vehicles reported in one message.
+/// Maximum number of vehicles relayed in one message.
 const MAX_RELAYED: usize = 10;
 const VERSION: u8 = 3;
 const TUNNEL_HEAD: usize = 5;
@@ -39,22 +39,24 @@ const HEADER_LEN: usize = 12;
 const ITEM_LEN: usize = 11;
 /// Longest TUNNEL payload, bytes.
 pub(crate) const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
-/// Age within which a vehicle's own messages replace relayed ones.
+/// Age of a vehicle's own message up to which relayed reports of it are ignored.
 const HEARD_DIRECTLY_WITHIN: Duration = Duration::from_secs(1);
-/// Silence after which a vehicle is out of range, and not a victim of lost messages.
+/// Silence after which a vehicle that others still hear is out of range; shorter silence may be
+/// lost messages.
 const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
 /// Time for which a relayed report that a vehicle follows the plan counts: three hops, and the loss
 /// of a message.
 const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
-/// Age that each hop adds, microseconds: longer than most messages take.
+/// Age that each relay adds to a report, microseconds: longer than most messages take.
 const HOP_AGE_US: u64 = 500_000;
-/// Delay that each hop adds to that of the flight, seconds: a progress is not as old as its age
-/// says.
+/// Delay that each relay adds to the delay of a vehicle's flight, seconds: its progress is not as
+/// old as the added age says.
 const HOP_DELAY_S: u8 = 1;
 /// Unit of an age in the message, microseconds.
 const AGE_TICK_US: u64 = 100_000;
 
-/// Progress of the vehicle of a rank, and the age of that progress in 0.1 s.
+/// Relayed report of the vehicle of a rank: its progress, the age of that in 0.1 s, and how far it
+/// flies on unheard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RelayedProgress {
     rank: u8,
@@ -64,7 +66,7 @@ struct RelayedProgress {
     unheard_delay_s: u8,
 }
 
-/// Relayed reports of a vehicle.
+/// A relay message: the reports of several vehicles, as one vehicle sends them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Relay {
     pub(crate) mission_crc: u32,
@@ -77,7 +79,7 @@ impl Relay {
         self.items.is_empty()
     }
 
-    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    /// Writes the whole TUNNEL payload, addressed to all. Returns its length, bytes.
     pub(crate) fn encode(&self, system_id: u8, out: &mut [u8; MAX_LEN]) -> usize {
         let len = HEADER_LEN + ITEM_LEN * self.items.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
@@ -95,7 +97,8 @@ impl Relay {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not one of these.
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not a sound
+    /// relay.
     pub(crate) fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let body = padded[TUNNEL_HEAD..].get(..usize::from(padded[4]))?;
         let is_ours = u16::from_le_bytes([padded[0], padded[1]]) == PAYLOAD_TYPE;
@@ -118,7 +121,7 @@ impl Relay {
                 gates_open_up_to_m: float(6),
                 unheard_delay_s: item[10],
             };
-            // Room for all that fits into a payload.
+            // All reports that a payload holds fit into the list.
             let finite = item.progress_m.is_finite() && item.gates_open_up_to_m.is_finite();
             relay.items.push(item).ok().filter(|()| finite)?;
         }
@@ -127,8 +130,9 @@ impl Relay {
 }
 
 impl NeighbourEntry {
-    /// Progress of the vehicle on the shared plan, metres: as it reports it, or as others do while
-    /// it is not heard. None if it was last heard off the plan.
+    /// Progress of the vehicle along the shared plan, metres: as it reports it; unheard for a
+    /// second, the greater of that and what others relayed. `None` if it was last heard off the
+    /// plan.
     pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
         if self.heard_within(now, HEARD_DIRECTLY_WITHIN)
@@ -142,8 +146,9 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether it is out of range, and was lately reported to follow the plan: by those that heard
-    /// it longer than this vehicle did. One that all heard up to the same moment has failed.
+    /// Whether the neighbour is silent, but vehicles that heard it longer than this one lately
+    /// relayed that it follows the plan: then it is out of range. A vehicle that all heard up to
+    /// the same moment has failed.
     #[inline(never)]
     pub(super) fn is_reported_out_of_range(&self, now: Instant) -> bool {
         let longer =
@@ -153,7 +158,7 @@ impl NeighbourEntry {
             && self.progress_m(now).is_some()
     }
 
-    /// The relayed report of this vehicle: none off the plan.
+    /// The report of this vehicle to be relayed; `None` if it is off the plan.
     fn relayed_progress(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.progress_m(now)?;
         let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
@@ -169,13 +174,13 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// Reports of vehicles that neighbours do not hear themselves, beginning where the last message
-    /// was full.
+    /// The next relay message: vehicles that some neighbour does not hear, from where the last
+    /// message was full on.
     pub(crate) fn next_relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));
-        // A report that one neighbour misses is sent to all.
+        // A relay goes to all, even if one neighbour alone does not hear the vehicle.
         let missed = |c: &NeighbourEntry| {
             speaking().any(|by| by.rank != c.rank && by.heard_bits & (1 << c.rank) == 0)
         };
@@ -193,7 +198,7 @@ impl<const V: usize> Neighbours<V> {
         relay
     }
 
-    /// Takes what a vehicle of the roster passes on of the plan that is ours.
+    /// Handles a relay, for our plan, from the vehicle `from` of the roster.
     pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
         if self.roster_rank(from, now).is_none() {
             return;
@@ -208,11 +213,11 @@ impl<const V: usize> Neighbours<V> {
             let newest_m =
                 libm::fmaxf(known_m, contact.state.progress_m.unwrap_or(f32::NEG_INFINITY));
             if item.progress_m > newest_m {
-                // Progress that others report of a vehicle is believed no faster than progress that
-                // the vehicle reports itself.
+                // Relayed progress is believed to grow no faster than progress that the vehicle
+                // reports itself.
                 let believed_m = contact.plausible_progress_m(item.progress_m, fastest_mps, now);
                 contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
-                // Both belong to this progress.
+                // Gates and delay belong to this progress.
                 contact.gates_open_up_to_m = item.gates_open_up_to_m;
                 contact.unheard_delay_s = item.unheard_delay_s.saturating_add(HOP_DELAY_S);
             }
