@@ -1,27 +1,31 @@
-//! ArduCopter's numbers: flight modes, setpoint masks, the estimator's flags and the streams a
-//! companion needs. Source: ArduCopter 4.6 `mode.h`, `GCS_MAVLink_Copter.cpp` and what its
-//! recording shows. The shape is that of `px4`.
+//! ArduCopter's constants: flight modes, setpoint masks, limit parameters, the estimator's flags,
+//! and the streams that a companion needs. Source: ArduCopter 4.6 `mode.h`,
+//! `GCS_MAVLink_Copter.cpp` and a recording (`docs/autopilots.md`). The module has the shape of
+//! `px4`.
 
 use crate::autopilot::limits::{Limit, LimitParameter};
 
-/// GUIDED, `custom_mode` of HEARTBEAT.
+/// GUIDED as `custom_mode` of HEARTBEAT.
 pub const GUIDED: u32 = 4;
-/// LAND.
+/// LAND as `custom_mode`.
 pub const LAND: u32 = 9;
-/// RTL.
+/// RTL as `custom_mode`.
 pub const RTL: u32 = 6;
-/// BRAKE: stops and holds, whatever the sticks say.
+/// BRAKE as `custom_mode`: the vehicle stops and holds its position, whatever the sticks command.
 pub const BRAKE: u32 = 17;
 
-/// Position, with velocity as feed-forward. Acceleration is left out: 0xC00 was not seen to fly.
+/// `type_mask` of a setpoint: position counts, velocity is feed-forward, acceleration is ignored.
+/// 0xC00, with acceleration, is not used: no recording shows that ArduCopter flies it.
 pub const MASK_POSITION_VELOCITY: u16 = 0xDC0;
 
-/// Lead of a setpoint's velocity, seconds: Guided closes an error of velocity with `WPNAV_ACCEL` /
-/// `PSC_JERK_XY`, and the recording's circle is flown 0.6 s behind. Acceleration over this time
-/// replaces the acceleration that is left out.
+/// Time, seconds, by which the velocity in a setpoint leads the reference: the velocity sent is the
+/// smoothed setpoint's plus its acceleration times this. It replaces the acceleration that the mask
+/// leaves out. Guided closes an error of velocity with `WPNAV_ACCEL` / `PSC_JERK_XY`, and flew the
+/// recorded circle 0.6 s late.
 pub const VELOCITY_LEAD_S: f32 = 0.5;
 
-/// Parameters that limit what it flies, with 4.6's defaults; centimetres but for the jerk.
+/// Parameters that limit how ArduCopter flies, with 4.6's defaults: centimetres, the jerk in
+/// metres.
 pub const LIMITS: [LimitParameter; 8] = [
     LimitParameter { name: "WPNAV_SPEED", limit: Limit::Speed, unit: 0.01, default: 1000.0 },
     LimitParameter { name: "WPNAV_SPEED_UP", limit: Limit::Climb, unit: 0.01, default: 250.0 },
@@ -33,34 +37,37 @@ pub const LIMITS: [LimitParameter; 8] = [
     LimitParameter { name: "PSC_JERK_Z", limit: Limit::JerkZ, unit: 1.0, default: 5.0 },
 ];
 
-/// Velocity alone: with zero, stop wherever that is.
+/// `type_mask` of a setpoint whose velocity alone counts: at velocity 0 ArduCopter stops where it
+/// is.
 pub const MASK_VELOCITY: u16 = 0xDC7;
 
-/// Parameters 2 and 3 of DO_SET_MODE.
+/// Parameters 2 and 3 of DO_SET_MODE that switch to the mode `custom_mode`.
 pub fn mode_params(custom_mode: u32) -> (f32, f32) {
     (custom_mode as f32, 0.0)
 }
 
-/// EKF_STATUS_REPORT: horizontal position known, relative and absolute.
+/// Flags of EKF_STATUS_REPORT: the horizontal position is known, relative (0x08) and absolute
+/// (0x10).
 const EKF_POSITION_KNOWN: u16 = 0x18;
-/// EKF_STATUS_REPORT: never initialised.
+/// Flag of EKF_STATUS_REPORT: the estimator was never initialised.
 const EKF_UNINITIALISED: u16 = 0x400;
 
-/// Whether the estimator's flags let it arm and fly Guided.
+/// Whether the flags of EKF_STATUS_REPORT allow the autopilot to arm and to fly Guided.
 pub fn estimator_ready(flags: u16) -> bool {
     flags & EKF_POSITION_KNOWN == EKF_POSITION_KNOWN && flags & EKF_UNINITIALISED == 0
 }
 
-/// Variance ratio from which an estimate counts as unsound: EKF_STATUS_REPORT gives innovations as
-/// a share of the largest that the filter accepts, and `FS_EKF_THRESH` is 0.8.
+/// Variance ratio of EKF_STATUS_REPORT from which the estimate counts as unsound. The ratio is an
+/// innovation as a share of the largest that the filter accepts; `FS_EKF_THRESH` is 0.8.
 const MAX_VARIANCE_RATIO: f32 = 0.8;
 
-/// Whether a variance ratio is sound; NaN is not.
+/// Whether a variance ratio of EKF_STATUS_REPORT is that of a sound estimate; false for NaN.
 pub(crate) fn is_variance_ratio_good(ratio: f32) -> bool {
     ratio < MAX_VARIANCE_RATIO
 }
 
-/// Streams to ask for: message id and interval in microseconds. Unasked it sends HEARTBEAT alone.
+/// Streams to request on connecting: message id and interval in microseconds. Without these
+/// requests ArduCopter sends HEARTBEAT alone.
 pub const STREAMS: [(u16, f32); 5] = [
     (32, 33_333.0),   // LOCAL_POSITION_NED
     (245, 200_000.0), // EXTENDED_SYS_STATE

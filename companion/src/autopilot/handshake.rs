@@ -1,16 +1,17 @@
-//! Arming, step by step, and what the autopilot refused.
+//! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
 use crate::autopilot::telemetry::{Ack, Telemetry};
 use crate::mission::State;
 use crate::time::{Duration, Instant};
 
-/// Time after which a denied arming is requested again.
+/// Time from a denied arming request to the next arming request.
 const ARMING_RETRY_EVERY: Duration = Duration::from_millis(1000);
-/// Longest time from the ack of arming to the first HEARTBEAT (1 Hz) with the armed bit.
+/// Longest time from the COMMAND_ACK that accepts arming to the first HEARTBEAT (1 Hz) with the
+/// armed bit; also the time to wait for a COMMAND_ACK before arming is requested again.
 const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
-/// Arming requests that may stay without an answer; after them arming has failed.
+/// Most arming requests in a row without a COMMAND_ACK; after them arming has failed.
 const MAX_ARMING_TRIES: u8 = 2;
-/// Most different refusals reported in one state.
+/// Most different refusals (command and result) that are reported in one mission state.
 const MAX_REFUSALS: usize = 4;
 
 const NAV_TAKEOFF: u16 = 22;
@@ -21,33 +22,34 @@ const ACCEPTED: u8 = 0;
 /// `MAV_RESULT` IN_PROGRESS.
 const IN_PROGRESS: u8 = 5;
 
-/// State of the requests of this mission state.
+/// State of arming, disarming and flight modes between the companion and its autopilot.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Handshake {
     /// When arming was last requested.
     requested_at: Option<Instant>,
-    /// Requests without an answer.
+    /// Arming requests since the last COMMAND_ACK that denied one.
     unanswered: u8,
-    /// The last request was denied.
+    /// Whether the autopilot denied the last arming request.
     denied: bool,
-    /// When arming was accepted: from then on it is not requested again.
+    /// When the autopilot accepted arming: from then on arming is not requested again.
     accepted_at: Option<Instant>,
-    /// HEARTBEAT was missing since arming was last requested: it may have been armed, and disarmed
-    /// by its pilot, unseen.
+    /// Whether HEARTBEAT was missing since arming was last requested: meanwhile the vehicle may
+    /// have been armed, and disarmed again by its pilot. Then arming is not requested again.
     heartbeat_gap: bool,
-    /// Disarming was refused.
+    /// Whether the autopilot refused to disarm in this state.
     disarm_refused: bool,
-    /// Offboard or Guided was entered for this mission, and no other mode but landing was seen
-    /// since.
+    /// Whether the autopilot was switched to Offboard or Guided for this mission, and its HEARTBEAT
+    /// has shown no mode but that and the landing mode since.
     in_own_mode: bool,
-    /// The landing detector reported flight since arming was requested.
+    /// Whether the landing detector has reported flight while armed since the state `Arming` was
+    /// entered.
     flown: bool,
-    /// Refusals reported in this state: command and result.
+    /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
     reported: [Option<(u16, u8)>; MAX_REFUSALS],
 }
 
 impl Handshake {
-    /// Clears what belongs to the state that was left.
+    /// Clears what belongs to the state `from`; entering `Arming` clears everything.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
         self.reported = [None; MAX_REFUSALS];
         self.disarm_refused = false;
@@ -59,7 +61,8 @@ impl Handshake {
         }
     }
 
-    /// Updates the handshake from the mode and the landing detector.
+    /// Updates [`Self::is_in_own_mode`] and [`Self::has_flown`] from the autopilot's mode, armed
+    /// bit and landing detector.
     pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
         let kind = t.kind.unwrap_or_default();
         let on_ground = t.on_ground != Some(false);
@@ -73,24 +76,27 @@ impl Handshake {
         }
     }
 
-    /// Whether the armed bit is overdue after an accepted request.
+    /// Whether the autopilot accepted arming 2.5 s (`ARMED_TIMEOUT`) ago or more: HEARTBEAT should
+    /// show the armed bit by now.
     pub(crate) fn is_armed_bit_overdue(&self, now: Instant) -> bool {
         self.accepted_at.is_some_and(|at| now - at >= ARMED_TIMEOUT)
     }
 
-    /// Whether arming was requested as often as allowed without any answer.
+    /// Whether arming has failed for want of an answer: 2.5 s have passed since the last arming
+    /// request, no COMMAND_ACK came, and either two requests were sent or HEARTBEAT was missing
+    /// meanwhile.
     pub(crate) fn is_arming_unanswered(&self, now: Instant) -> bool {
         let waited = self.requested_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
         let silent = !self.denied && self.accepted_at.is_none();
         waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.heartbeat_gap)
     }
 
-    /// Whether arming was not requested yet.
+    /// Whether arming has not been requested since the state `Arming` was entered.
     pub(crate) fn is_arming_unrequested(&self) -> bool {
         self.requested_at.is_none()
     }
 
-    /// Whether arming is to be requested now; notes that it is.
+    /// Whether an arming request is to be sent now; if so, counts it as sent.
     pub(crate) fn should_request_arming(&mut self, now: Instant, armed: bool) -> bool {
         let due = match self.requested_at {
             None => true,
@@ -109,28 +115,30 @@ impl Handshake {
         asks
     }
 
-    /// Whether disarming was refused.
+    /// Whether the autopilot refused to disarm in this state.
     pub(crate) fn is_disarm_refused(&self) -> bool {
         self.disarm_refused
     }
 
-    /// Whether the autopilot is in a mode of this mission's.
+    /// Whether the autopilot is still in the mode that the companion set: Offboard or Guided, or
+    /// the landing mode after it.
     pub(crate) fn is_in_own_mode(&self) -> bool {
         self.in_own_mode
     }
 
-    /// Whether the landing detector reported flight since arming was requested.
+    /// Whether the landing detector has reported flight while armed since the state `Arming` was
+    /// entered.
     pub(crate) fn has_flown(&self) -> bool {
         self.flown
     }
 
-    /// HEARTBEAT is missing.
+    /// Notes that HEARTBEAT is missing while the vehicle is to be armed.
     pub(crate) fn note_heartbeat_gap(&mut self) {
         self.heartbeat_gap = true;
     }
 
-    /// Takes the autopilot's answer to a request: what became of arming. Returns a refusal that is
-    /// to be reported: text, command and result.
+    /// Handles the autopilot's COMMAND_ACK. Returns a refusal to be reported, once a state for each
+    /// command and result: text, and as its numbers command and result.
     pub(crate) fn handle_ack(
         &mut self,
         state: State,

@@ -1,11 +1,12 @@
-//! Which autopilot flies the vehicle, by HEARTBEAT's `autopilot` field, and where its numbers are.
+//! The kind of autopilot that flies the vehicle, by HEARTBEAT's `autopilot` field, and that kind's
+//! modes, masks, limits and streams (constants of `px4` and `ardupilot`).
 
 use planner_core::frames::Projection;
 
 use super::limits::{AutopilotLimits, LimitParameter};
 use super::{ardupilot, px4};
 
-/// An autopilot the companion can fly.
+/// A kind of autopilot that the companion can fly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AutopilotKind {
     /// PX4, flown in Offboard.
@@ -16,8 +17,8 @@ pub enum AutopilotKind {
 }
 
 impl AutopilotKind {
-    /// The kind by `MAV_AUTOPILOT`; `None` for one the companion cannot fly, and for a component
-    /// that is no flight controller (8).
+    /// The kind by HEARTBEAT's `autopilot` field (`MAV_AUTOPILOT`): 12 PX4, 3 ArduPilot. `None` for
+    /// any other, also for 8, a component that is no flight controller.
     pub fn from_heartbeat(autopilot: u8) -> Option<Self> {
         match autopilot {
             12 => Some(Self::Px4),
@@ -26,7 +27,8 @@ impl AutopilotKind {
         }
     }
 
-    /// How it flattens the earth about its EKF origin.
+    /// The projection by which it converts latitude and longitude to local metres about its EKF
+    /// origin.
     pub fn projection(self) -> Projection {
         match self {
             Self::Px4 => Projection::Px4,
@@ -34,7 +36,8 @@ impl AutopilotKind {
         }
     }
 
-    /// The mode that follows setpoints: Offboard or Guided.
+    /// `custom_mode` of the mode that follows the companion's setpoints: PX4's Offboard,
+    /// ArduCopter's Guided.
     pub fn setpoint_mode(self) -> u32 {
         match self {
             Self::Px4 => px4::OFFBOARD,
@@ -42,7 +45,7 @@ impl AutopilotKind {
         }
     }
 
-    /// The mode that lands.
+    /// `custom_mode` of the mode in which it lands where it is.
     pub fn land_mode(self) -> u32 {
         match self {
             Self::Px4 => px4::LAND,
@@ -50,7 +53,7 @@ impl AutopilotKind {
         }
     }
 
-    /// Parameters 2 and 3 of DO_SET_MODE.
+    /// Parameters 2 and 3 of DO_SET_MODE that switch it to the mode `custom_mode`.
     pub fn mode_params(self, custom_mode: u32) -> (f32, f32) {
         match self {
             Self::Px4 => px4::mode_params(custom_mode),
@@ -58,7 +61,8 @@ impl AutopilotKind {
         }
     }
 
-    /// Mask of a setpoint to move.
+    /// `type_mask` of a SET_POSITION_TARGET_LOCAL_NED that moves the vehicle: its position and
+    /// feed-forward count, its yaw is ignored.
     pub fn move_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_POSITION_VELOCITY_ACCELERATION,
@@ -66,7 +70,8 @@ impl AutopilotKind {
         }
     }
 
-    /// Lead of a setpoint's velocity, as seconds of its acceleration.
+    /// Time, seconds, by which the velocity in a setpoint leads the reference: the velocity sent is
+    /// the reference's plus its acceleration times this.
     pub fn velocity_lead_s(self) -> f32 {
         match self {
             Self::Px4 => 0.0,
@@ -74,7 +79,8 @@ impl AutopilotKind {
         }
     }
 
-    /// Type mask of a setpoint that stops at the current place.
+    /// `type_mask` of a SET_POSITION_TARGET_LOCAL_NED whose velocity alone counts: at velocity 0
+    /// the vehicle stops where it is.
     pub fn stop_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_VELOCITY,
@@ -82,7 +88,8 @@ impl AutopilotKind {
         }
     }
 
-    /// The autopilot's parameters that limit what it flies.
+    /// The autopilot's parameters that limit its speed, acceleration and jerk, with unit and
+    /// default.
     pub fn limits(self) -> &'static [LimitParameter] {
         match self {
             Self::Px4 => &px4::LIMITS,
@@ -90,12 +97,13 @@ impl AutopilotKind {
         }
     }
 
-    /// The limits of one whose parameters have their defaults.
+    /// The limits of an autopilot whose parameters all have their defaults.
     pub(crate) fn default_limits(self) -> AutopilotLimits {
         AutopilotLimits::from_defaults(self.limits())
     }
 
-    /// Streams to ask for on connecting: message id and interval in microseconds, −1 off.
+    /// Streams to request on connecting: message id and interval in microseconds; −1 switches one
+    /// off.
     pub fn streams(self) -> &'static [(u16, f32)] {
         match self {
             Self::Px4 => &px4::STREAMS,
@@ -103,8 +111,8 @@ impl AutopilotKind {
         }
     }
 
-    /// Whether it needs a command to take off: PX4 lifts off towards a setpoint, ArduCopter only by
-    /// NAV_TAKEOFF, which a setpoint before the lift-off would cancel.
+    /// Whether it takes off by NAV_TAKEOFF only, as ArduCopter does, where a setpoint sent before
+    /// the lift-off would cancel the take-off. PX4 (false) lifts off towards a setpoint.
     pub fn takes_off_by_command(self) -> bool {
         self == Self::ArduPilot
     }

@@ -1,36 +1,36 @@
-//! What the autopilot's parameters allow: limits of speed, acceleration and jerk.
+//! Limits of speed, acceleration and jerk that the autopilot's own parameters set.
 //!
-//! They are read on connecting. A value that did not come, or that no vehicle has, counts as the
-//! default of its kind. Source: PX4 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and
-//! `PSC_*`.
+//! They are read on connecting. A parameter that was not received, or whose value is outside of
+//! [`Limit`]'s range, counts with the default of its autopilot kind. Source: PX4 1.17
+//! `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
 
 /// The quantity that an autopilot's parameter limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// Speed across, m/s.
+    /// Horizontal speed, m/s.
     Speed,
     /// Speed upwards, m/s.
     Climb,
     /// Speed downwards, m/s.
     Descend,
-    /// Acceleration across, m/s².
+    /// Horizontal acceleration, m/s².
     Accel,
     /// Acceleration upwards, m/s².
     AccelUp,
     /// Acceleration downwards, m/s².
     AccelDown,
-    /// Jerk across, m/s³.
+    /// Horizontal jerk, m/s³.
     Jerk,
-    /// Jerk upwards and downwards, m/s³.
+    /// Vertical jerk, upwards and downwards, m/s³.
     JerkZ,
 }
 
-/// Number of kinds of limits.
+/// Number of variants of [`Limit`].
 const LIMIT_KINDS: usize = 8;
 
 impl Limit {
-    /// The values that a vehicle may have, least and greatest: a value outside is no limit but a
-    /// switch (0, −1) or a mistake.
+    /// Least and greatest value that counts as a limit, in metres and seconds. A parameter outside
+    /// is a switch (0, −1) or a mistake, and is ignored.
     fn range(self) -> (f32, f32) {
         match self {
             Self::Speed | Self::Climb | Self::Descend => (0.1, 50.0),
@@ -40,27 +40,28 @@ impl Limit {
     }
 }
 
-/// A parameter of an autopilot that limits what it flies.
+/// An autopilot's parameter that limits how the vehicle flies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitParameter {
     /// Name of the parameter, at most 16 bytes.
     pub name: &'static str,
     /// The quantity that the parameter limits.
     pub limit: Limit,
-    /// Unit of the parameter, in metres and seconds.
+    /// Factor from the parameter's own unit to metres and seconds: 0.01 for centimetres.
     pub unit: f32,
-    /// Default of the parameter, in its own unit.
+    /// Default of the parameter, in the parameter's own unit.
     pub default: f32,
 }
 
-/// The limits that the autopilot's parameters set.
+/// The limits that the autopilot's parameters set, in metres and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutopilotLimits {
     values: [f32; LIMIT_KINDS],
 }
 
 impl AutopilotLimits {
-    /// The defaults of parameters.
+    /// The limits by the defaults of `parameters`; infinite for a quantity that none of them
+    /// limits.
     pub(crate) fn from_defaults(parameters: &[LimitParameter]) -> Self {
         let mut limits = Self { values: [f32::INFINITY; LIMIT_KINDS] };
         for parameter in parameters {
@@ -69,12 +70,13 @@ impl AutopilotLimits {
         limits
     }
 
-    /// A limit.
+    /// The value of a limit, in metres and seconds; infinite if the autopilot has no such limit.
     pub(crate) fn get(&self, limit: Limit) -> f32 {
         self.values[limit as usize]
     }
 
-    /// Takes a value as it was read; whether a limit changed. One that no vehicle has is ignored.
+    /// Stores a parameter's value, given in the parameter's own unit, unless it is outside of
+    /// `Limit::range`. Returns whether the limit changed.
     pub(crate) fn set(&mut self, parameter: &LimitParameter, value: f32) -> bool {
         let (value, (least, most)) = (value * parameter.unit, parameter.limit.range());
         if !(least..=most).contains(&value) {

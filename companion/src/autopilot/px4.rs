@@ -1,23 +1,23 @@
-//! PX4's numbers: flight modes, the setpoint mask, and the streams a companion needs. Source: PX4 1.17
-//! `px4_custom_mode.h` and what AUTOPILOTS recordings show. Another autopilot gets a module of the
-//! same shape.
+//! PX4's constants: flight modes, setpoint masks, limit parameters, and the streams that a
+//! companion needs. Source: PX4 1.17 `px4_custom_mode.h` and recordings (`docs/autopilots.md`).
+//! Another autopilot kind gets a module of the same shape.
 
 use crate::autopilot::limits::{Limit, LimitParameter};
 
-/// `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
+/// Offboard as `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
 pub const OFFBOARD: u32 = 0x0006_0000;
-/// AUTO.LAND.
+/// AUTO.LAND as `custom_mode`.
 pub const LAND: u32 = 0x0604_0000;
-/// AUTO.LOITER, which pilots call Hold.
+/// AUTO.LOITER as `custom_mode`; pilots call it Hold.
 pub const HOLD: u32 = 0x0304_0000;
-/// AUTO.RTL.
+/// AUTO.RTL as `custom_mode`.
 pub const RTL: u32 = 0x0504_0000;
 
-/// Position, with velocity and acceleration as feed-forward; yaw and yaw rate ignored (the heading
-/// stays as it is).
+/// `type_mask` of a setpoint: position counts, velocity and acceleration are feed-forward; yaw and
+/// yaw rate are ignored, so PX4 keeps the heading.
 pub const MASK_POSITION_VELOCITY_ACCELERATION: u16 = 0xC00;
 
-/// Parameters that limit what it flies, with 1.17's defaults; all are floats.
+/// Parameters that limit how PX4 flies, with 1.17's defaults; all are floats.
 pub const LIMITS: [LimitParameter; 7] = [
     LimitParameter { name: "MPC_XY_VEL_MAX", limit: Limit::Speed, unit: 1.0, default: 12.0 },
     LimitParameter { name: "MPC_Z_VEL_MAX_UP", limit: Limit::Climb, unit: 1.0, default: 3.0 },
@@ -28,16 +28,16 @@ pub const LIMITS: [LimitParameter; 7] = [
     LimitParameter { name: "MPC_JERK_AUTO", limit: Limit::Jerk, unit: 1.0, default: 4.0 },
 ];
 
-/// Velocity alone: with zero, stop wherever that is.
+/// `type_mask` of a setpoint whose velocity alone counts: at velocity 0 PX4 stops where it is.
 pub const MASK_VELOCITY: u16 = 0xDC7;
 
-/// Main and sub mode, the parameters 2 and 3 of DO_SET_MODE.
+/// Main and sub mode of `custom_mode`: parameters 2 and 3 of DO_SET_MODE.
 pub fn mode_params(custom_mode: u32) -> (f32, f32) {
     (((custom_mode >> 16) & 0xFF) as f32, (custom_mode >> 24) as f32)
 }
 
-/// Streams to set on connecting: message id and interval in microseconds, −1 off. PX4 floods about
-/// 18 kB/s unasked; these leave about 3 kB/s.
+/// Streams to request on connecting: message id and interval in microseconds; −1 switches one off.
+/// Without these requests PX4 sends about 18 kB/s, with them about 3 kB/s.
 pub const STREAMS: [(u16, f32); 19] = [
     (32, 33_333.0),     // LOCAL_POSITION_NED
     (245, 200_000.0),   // EXTENDED_SYS_STATE

@@ -1,5 +1,5 @@
-//! What is requested of the autopilot until it is so: streams, EKF origin, limits, mode, arming,
-//! take-off, landing.
+//! Requests to the autopilot, repeated until they have taken effect: streams, EKF origin, limit
+//! parameters, mode, arming, take-off, landing, disarming.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
@@ -16,66 +16,72 @@ use crate::mission::State;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
-/// Time between two requests for the EKF origin while another origin is in doubt.
+/// Time between two requests for the EKF origin while the autopilot has reported another one in
+/// flight.
 pub(crate) const ORIGIN_RETRY_EVERY: Duration = Duration::from_millis(200);
-/// Time from entering the state to the request to disarm, and between two such requests.
+/// Time from entering the state `Disarm` to the first request to disarm, and between two such
+/// requests.
 pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(4000);
-/// Time for which the safety filter watches the column below before a landing is requested: two
-/// steps.
+/// Least time in the state `Land` before the landing mode is requested: the safety filter checks
+/// the column below the vehicle for two steps first.
 const LAND_REQUEST_AFTER: Duration = Duration::from_millis(100);
 const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
-/// Time after which the take-off is requested again: longer than ArduCopter takes to spin up and
-/// lift off (2.3 s).
+/// Time between two requests to take off: longer than ArduCopter takes to spin up and lift off (2.3
+/// s).
 const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
-/// When no position arrives for this long while HEARTBEAT still does, the autopilot has rebooted
-/// and lost its streams.
+/// Age of the position, while HEARTBEAT still arrives, after which all streams are requested again:
+/// the autopilot has rebooted and forgotten them.
 const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Least time between two requests for all streams.
 const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
-/// Age up to which HEARTBEAT counts as heard: HEARTBEAT comes at 1 Hz, and one late is not yet
-/// silence.
+/// Greatest age of the last HEARTBEAT with which the autopilot counts as heard: HEARTBEAT comes at
+/// 1 Hz, and one late is not yet silence.
 const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
-/// Streams that are requested in each step while connecting.
+/// Most streams requested in one step while connecting.
 const STREAM_REQUESTS_PER_STEP: usize = 5;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
-/// Most requests for the autopilot's limit parameters, all together.
+/// Most PARAM_REQUEST_READ that are sent for all limit parameters together, on one connecting.
 const MAX_LIMIT_REQUESTS: u8 = 80;
-/// Time between two requests for limit parameters.
+/// Time between two PARAM_REQUEST_READ for limit parameters.
 const LIMIT_REQUEST_EVERY: Duration = Duration::from_millis(150);
 /// `MAV_PARAM_TYPE_REAL32`.
 const PARAM_TYPE_REAL32: u8 = 9;
-/// Age after which a stream is requested again: SYS_STATUS comes each second.
+/// Age of a stream's last message after which that stream is requested again; the slowest stream,
+/// SYS_STATUS, has a period of 1 s.
 const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
-/// Greatest age of the reported charge with which a vehicle takes off.
+/// Greatest age of the reported battery charge with which a vehicle takes off.
 const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
-/// The situation that requests follow from.
+/// The companion's situation, from which the requests to its autopilot follow.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RequestContext {
     pub(crate) now: Instant,
     pub(crate) state: State,
-    /// Since the state was entered.
+    /// Time since the mission state was entered.
     pub(crate) in_state: Duration,
-    /// Height of the climb, metres.
+    /// Height of the climb above the pad, metres.
     pub(crate) climb_m: f32,
-    /// How long Guided keeps the last velocity, seconds.
+    /// Value for ArduCopter's `GUID_TIMEOUT`: how long Guided keeps flying the last velocity
+    /// without a further setpoint, seconds.
     pub(crate) guided_timeout_s: f32,
-    /// Whether no vehicle is in the column that it is about to climb or descend.
+    /// Whether no other vehicle is in the vertical column that this vehicle is about to climb or
+    /// descend.
     pub(crate) column_clear: bool,
-    /// Whether a landing may be requested now.
+    /// Whether the landing mode may be requested now.
     pub(crate) may_land: bool,
 }
 
-/// State of the requests.
+/// State of the requests to the autopilot.
 #[derive(Clone, Debug)]
 pub(crate) struct Requests {
     handshake: Handshake,
-    /// The limits that the autopilot's parameters set.
+    /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
     limits: AutopilotLimits,
-    /// Which of them were read, by bits, and how often they may still be requested.
+    /// Which of the limit parameters were read, a bit each (`limits_read`); `tries` counts the
+    /// requests for them that may still be sent.
     limits_read: u16,
     tries: u8,
-    /// Next of the streams to be requested.
+    /// Index of the next of the kind's streams to be requested.
     next_stream: usize,
 }
 
@@ -93,28 +99,29 @@ impl Default for Requests {
 }
 
 impl Requests {
-    /// State of the arming.
+    /// State of arming, disarming and flight modes.
     pub(crate) fn handshake(&self) -> &Handshake {
         &self.handshake
     }
 
-    /// The limits that the autopilot's parameters set, as far as they were read.
+    /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
     pub(crate) fn limits(&self) -> &AutopilotLimits {
         &self.limits
     }
 
-    /// Clears what belongs to the state that was left.
+    /// Clears what belongs to the mission state `from`.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
         self.handshake.state_changed(from, to);
     }
 
-    /// Updates the handshake from the mode and the landing detector.
+    /// Updates the handshake from the autopilot's mode, armed bit and landing detector.
     pub(crate) fn update_mode_and_landed(&mut self, state: State, telemetry: &Telemetry) {
         self.handshake.update_mode_and_landed(state, telemetry);
     }
 
-    /// Starts requesting the streams from the first, and on the ground the limits. Returns whether
-    /// those are others now.
+    /// Requests all streams from the first on, in the following steps. With motors off it also sets
+    /// the limits to their defaults, to be read from the autopilot again, and returns true.
+    /// ArduPilot's `GUID_TIMEOUT` is set too.
     pub(crate) fn start_on_connect(
         &mut self,
         telemetry: &Telemetry,
@@ -123,7 +130,7 @@ impl Requests {
         links: &mut Links,
     ) -> bool {
         self.next_stream = 0;
-        // In flight the limits stay as they are.
+        // In flight the limits that bound the setpoints do not change.
         let reads = !s.state.streams_setpoints() && !telemetry.armed;
         if reads {
             self.limits = telemetry.kind().default_limits();
@@ -137,7 +144,7 @@ impl Requests {
         reads
     }
 
-    /// Requests the next limit that was not read.
+    /// Requests the next limit parameter that was not read yet, when its time has come.
     fn request_next_limit(
         &mut self,
         kind: AutopilotKind,
@@ -150,7 +157,7 @@ impl Requests {
         }
         let all = kind.limits();
         let from = usize::from(self.tries);
-        // Parameters are requested in turn, so that one that does not exist holds back none.
+        // Parameters are requested in turn, so that one that the autopilot lacks delays no other.
         let missing = (from..from + all.len())
             .map(|i| i % all.len())
             .find(|i| self.limits_read & 1 << i == 0);
@@ -163,8 +170,9 @@ impl Requests {
         links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
     }
 
-    /// PARAM_VALUE of the autopilot; whether a limit changed. Read by field: a type newer than the
-    /// crate's must not hide the value.
+    /// Handles the autopilot's PARAM_VALUE; while armed it is ignored. Returns whether a limit
+    /// changed. It is decoded field by field: a `MAV_PARAM_TYPE` newer than the crate's must not
+    /// hide the value.
     pub(crate) fn handle_limit(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
         const ID: core::ops::Range<usize> = 8..24;
         let p = frame.padded();
@@ -180,7 +188,8 @@ impl Requests {
         changed
     }
 
-    /// Requests whatever is due. Returns whether the limits are others now.
+    /// Sends the requests that are due by time and mission state. Returns whether the limits were
+    /// set to their defaults, so that the caller must use the new ones.
     pub(crate) fn request_due(
         &mut self,
         telemetry: &Telemetry,
@@ -229,7 +238,7 @@ impl Requests {
         tunes
     }
 
-    /// Requests what the state waits for.
+    /// Requests the change of mode, take-off or disarming that the mission state waits for.
     fn request_for_state(
         &self,
         telemetry: &Telemetry,
@@ -249,7 +258,7 @@ impl Requests {
         let mut push = |request| links.push(Link::Autopilot, request);
         match s.state {
             State::Engaging => push(change_to(kind.setpoint_mode())),
-            // HEARTBEAT may not show the mode yet in which a landing was requested.
+            // The HEARTBEAT at hand may be older than the landing mode that was requested before.
             State::LandingHeld
                 if s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode() =>
             {
@@ -272,7 +281,8 @@ impl Requests {
         }
     }
 
-    /// Requests streams again that are old, or never came, while the autopilot is heard.
+    /// Requests again each stream that has been silent for 4 s (`STREAM_LOST_AFTER`) or never came,
+    /// while HEARTBEAT is heard.
     fn request_lost_streams(
         &self,
         telemetry: &Telemetry,
@@ -292,8 +302,8 @@ impl Requests {
         }
     }
 
-    /// Takes the autopilot's answer to a request, and reports what it refused; `own` is this
-    /// vehicle's system id.
+    /// Handles the autopilot's COMMAND_ACK if it is addressed to this companion or to nobody, and
+    /// reports a refusal on both links; `own` is this vehicle's system id.
     pub(crate) fn handle_ack(
         &mut self,
         ack: &Ack,
@@ -312,8 +322,8 @@ impl Requests {
 }
 
 impl RequestContext {
-    /// Whether a landing may be requested: once the safety filter has looked down and the column is
-    /// clear, or whatever is below.
+    /// Whether the landing mode may be requested: once the column below has been checked for 0.1 s
+    /// (`LAND_REQUEST_AFTER`) and is clear, or at any time if the vehicle `must_land`.
     pub(crate) fn may_request_landing(
         in_state: Duration,
         column_clear: bool,
@@ -323,8 +333,8 @@ impl RequestContext {
     }
 }
 
-/// Whether the battery's charge was reported lately, or does not count (`low_percent` not above
-/// zero).
+/// Whether SYS_STATUS with the battery's charge was received in the last 5 s (`MAX_BATTERY_AGE`);
+/// also true where the charge is not checked, with `low_percent` ≤ 0.
 pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
     low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= MAX_BATTERY_AGE
 }

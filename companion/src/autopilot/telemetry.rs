@@ -1,16 +1,17 @@
-//! What the autopilot says of itself, turned into the mission frame.
+//! The autopilot's telemetry: its messages decoded, and its position and velocity converted from
+//! its local NED frame to the mission frame (ENU).
 //!
-//! Only component 1 of the own system is listened to. Frames that repeat or come out of order are
-//! dropped by their sequence number, positions also by their time. A position that jumps further
-//! than a vehicle flies means that the EKF origin moved or that the estimate was wrong, before or
-//! now: the position counts as lost until the origin is heard again and [`POSITION_SETTLE_TIME`]
-//! has passed without another jump.
+//! Only component 1 of the own system is heard. Frames that repeat or come out of order are dropped
+//! by their sequence number, positions also by their time. A position that jumps further than a
+//! vehicle can fly means that the EKF origin moved, or that the estimate was wrong before or is
+//! now. The position then counts as lost until the origin is reported again and
+//! [`POSITION_SETTLE_TIME`] has passed without another jump.
 //!
-//! While the motors are armed the EKF origin that setpoints are computed with does not change,
-//! whatever is heard: a GPS_GLOBAL_ORIGIN that an autopilot forwards from its radio looks like its
-//! own. Another origin is in doubt until the autopilot, asked again, has named no other for 0.8 s
-//! (`ORIGIN_DOUBT_TIME`); then it has moved, and the mission lands. An origin further than 30 km
-//! (`MAX_ORIGIN_DISTANCE_M`) from the mission's counts as none.
+//! While the motors are armed, setpoints are computed with one EKF origin, whatever is received: a
+//! GPS_GLOBAL_ORIGIN that an autopilot forwards from its radio looks like its own. When another
+//! origin is received, the autopilot is asked for its origin again. If it reports no other than the
+//! new one for 0.8 s (`ORIGIN_DOUBT_TIME`), the origin has moved, and the mission lands. An origin
+//! further than 30 km (`MAX_ORIGIN_DISTANCE_M`) from the mission's counts as unknown.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -32,37 +33,39 @@ const EXTENDED_SYS_STATE: u32 = 245;
 const FLAG_ARMED: u8 = 0x80;
 const STATE_CRITICAL: u8 = 5;
 const LANDED_STATE_ON_GROUND: u8 = 1;
-/// Least jump, metres: the distance of a position from the one that the last position and velocity
-/// lead to, beyond [`POSITION_JUMP_MPS`] × time.
+/// Distance, metres, from the predicted position (the last position and velocity extrapolated) to
+/// the reported one, beyond which the position has jumped; [`POSITION_JUMP_MPS`] × time is added.
 const POSITION_JUMP_M: f32 = 1.0;
-/// Change of velocity between two positions that no vehicle flown so far exceeded, m/s.
+/// Change of velocity between two reported positions that no vehicle has exceeded so far, m/s.
 const POSITION_JUMP_MPS: f32 = 5.0;
-/// Greatest distance of the EKF origin from the mission's origin, metres: the autopilot's frame is
-/// f32, and rounds a setpoint by up to 1.4 mm at this distance, by metres on the other side of the
-/// earth.
+/// Greatest distance from the mission's origin to the EKF origin, metres. The autopilot's local
+/// frame is f32: it rounds a setpoint by up to 1.4 mm at this distance, by metres on the other side
+/// of the earth.
 const MAX_ORIGIN_DISTANCE_M: f32 = 30_000.0;
-/// Longest gap between two positions, seconds: the mission waits for its autopilot no longer.
+/// Longest time between two positions over which the jump test extrapolates, seconds: after a
+/// longer silence of the autopilot the mission has ended.
 const MAX_GAP_S: f32 = 60.0;
-/// Time for which the position is not used after a jump, or after an equally long gap; another jump
-/// starts the time again. The first messages after a silence may have waited on the way.
+/// Time for which positions are not used after a jump, or after a gap longer than this time;
+/// another jump starts it again. The first messages after a silence may have been delayed.
 pub const POSITION_SETTLE_TIME: Duration = Duration::from_millis(1000);
-/// Time without a report of the known EKF origin after which a different one is accepted; the
-/// origin is requested several times meanwhile.
+/// Time for which only another EKF origin is reported while armed, after which the origin counts as
+/// moved and the mission lands; it is requested several times meanwhile.
 const ORIGIN_DOUBT_TIME: Duration = Duration::from_millis(800);
-/// Gap after which the frames' sequence numbers start afresh.
+/// Gap between two frames after which any sequence number is accepted.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
-/// Streams whose age is kept: more than any autopilot is asked for.
+/// Most streams whose age is kept: no autopilot kind has more streams on.
 const MAX_STREAMS: usize = 8;
 
-/// Drops frames that repeat or come late: up to 64 behind the newest of the last second.
+/// Drops MAVLink frames that repeat or come late: up to 63 numbers behind the last accepted frame,
+/// for 1 s after it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SequenceFilter {
     last: Option<(u8, Instant)>,
 }
 
 impl SequenceFilter {
-    /// Whether the frame is new.
+    /// Whether the frame is new; if so, stores its sequence number as the last.
     pub fn accept(&mut self, sequence: u8, now: Instant) -> bool {
         if let Some((last, at)) = self.last {
             let behind = last.wrapping_sub(sequence);
@@ -75,121 +78,127 @@ impl SequenceFilter {
     }
 }
 
-/// COMMAND_ACK.
+/// The autopilot's COMMAND_ACK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Ack {
     /// `MAV_CMD`.
     pub(crate) command: u16,
     /// `MAV_RESULT`.
     pub(crate) result: u8,
-    /// Addressee: system and component, 0 where the autopilot names none.
+    /// Addressee: system and component id; (0, 0) where the autopilot names none.
     pub(crate) to: (u8, u8),
 }
 
 /// The effect of a frame on the telemetry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TelemetryChange {
-    /// No change, or a frame for another component.
+    /// No value of interest changed, or the frame was dropped.
     None,
-    /// Some value is newer.
+    /// A value was updated.
     Updated,
-    /// The EKF origin is no longer known: ask for it.
+    /// The EKF origin is no longer known: the caller is to request it.
     OriginLost,
-    /// Another EKF origin was heard while armed: ask for it.
+    /// An EKF origin other than the one flown with was received while armed: the caller is to
+    /// request it again.
     OriginDoubted,
-    /// An EKF origin so many kilometres from the mission's is not used.
+    /// The EKF origin was rejected: it is this many kilometres from the mission's origin.
     OriginFar(u32),
 }
 
-/// The autopilot as last heard.
+/// The autopilot's state as last received.
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
     sequence: SequenceFilter,
-    /// Which autopilot it is, from its first HEARTBEAT on; others are then ignored.
+    /// Kind of autopilot by the first HEARTBEAT; HEARTBEATs of another kind are ignored from then
+    /// on.
     pub kind: Option<AutopilotKind>,
-    /// When HEARTBEAT was last heard.
+    /// When the last HEARTBEAT was received.
     pub heartbeat_at: Option<Instant>,
-    /// Flight mode, the autopilot's own number.
+    /// Flight mode in the autopilot's own numbering.
     pub custom_mode: u32,
     /// Whether the motors are armed.
     pub armed: bool,
     /// `MAV_STATE`.
     pub system_status: u8,
-    /// Whether the landing detector reports ground; `None` before the first report.
+    /// Whether the landing detector reports the vehicle on the ground; `None` before its first
+    /// report.
     pub on_ground: Option<bool>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
-    /// Height above home in metres, as ArduCopter's NAV_TAKEOFF counts it.
+    /// Height above home, metres; ArduCopter's NAV_TAKEOFF takes its height from there.
     pub above_home_m: f32,
-    /// Whether there is no mission whose origin the EKF's is compared with.
+    /// Whether an EKF origin counts at any distance, as there is no mission origin to compare it
+    /// with.
     accept_any_origin: bool,
-    /// EKF origin, once heard.
+    /// EKF origin; `None` while it is unknown.
     pub ekf_origin: Option<Geodetic>,
-    /// The origin that was last used while armed.
+    /// EKF origin with which the vehicle was armed; `None` while disarmed.
     last_armed_origin: Option<Geodetic>,
-    /// Since when only other origins are heard.
+    /// Since when, while armed, only EKF origins other than that one were received.
     origin_doubtful_since: Option<Instant>,
-    /// The EKF origin moved while armed.
+    /// Whether the EKF origin moved while armed.
     pub(crate) origin_moved: bool,
-    /// Error that the estimator last reported, metres, and when; infinite for an estimate that is
-    /// not sound.
+    /// Error of the position that the estimator last reported, metres, and when; infinite for an
+    /// unsound estimate.
     accuracy: Option<(f32, Instant)>,
-    /// When the position below was heard; `None` while it is unknown.
+    /// When the last usable position was received; `None` while the position is unknown.
     pub position_at: Option<Instant>,
-    /// Place, ENU metres.
+    /// Position in the mission frame, ENU metres.
     pub position: Point,
-    /// Velocity, ENU m/s.
+    /// Velocity in the mission frame, ENU m/s.
     pub velocity: Point,
-    /// The last answer to a command, until it is taken.
+    /// The last COMMAND_ACK, until the caller takes it.
     pub(crate) ack: Option<Ack>,
-    /// When each stream of [`AutopilotKind::streams`] that is on was last heard, in that order;
-    /// `Instant::ZERO`: never.
+    /// When each stream of [`AutopilotKind::streams`] that is on was last received, in that order;
+    /// `Instant::ZERO` for never.
     streams: [Instant; MAX_STREAMS],
     boot_ms: u32,
-    /// Time of the last position used, by the autopilot's clock, milliseconds.
+    /// Autopilot's time (`time_boot_ms`) of the last position that passed the jump test,
+    /// milliseconds.
     position_boot_ms: u32,
-    /// When a position was last read, used or not.
+    /// When a position last passed the jump test, whether or not it was usable.
     position_read_at: Option<Instant>,
     settled_at: Instant,
-    /// After a silence positions count from then on.
+    /// From when on positions are usable after a gap.
     positions_valid_from: Instant,
     estimator_ready: bool,
 }
 
 impl Telemetry {
-    /// Telemetry before any frame. With `accept_any_origin` (a board without a mission) an EKF
-    /// origin is accepted anywhere.
+    /// Telemetry before any frame. With `anywhere` (a board without a mission) an EKF origin is
+    /// accepted at any distance.
     pub fn new(anywhere: bool) -> Self {
         Self { battery_percent: -1, accept_any_origin: anywhere, ..Self::default() }
     }
 
-    /// Which autopilot flies the vehicle; PX4 while none was heard.
+    /// Kind of autopilot that flies the vehicle; PX4 until a HEARTBEAT is received.
     pub(crate) fn kind(&self) -> AutopilotKind {
         self.kind.unwrap_or_default()
     }
 
-    /// `MAV_STATE_CRITICAL` or worse: a failsafe acts.
+    /// Whether HEARTBEAT reports `MAV_STATE_CRITICAL` or worse: a failsafe of the autopilot acts.
     pub fn is_critical(&self) -> bool {
         self.system_status >= STATE_CRITICAL
     }
 
-    /// Whether the battery is known to hold less than so many percent.
+    /// Whether the battery's charge is known and less than `percent`.
     pub(crate) fn charge_below(&self, percent: i8) -> bool {
         (0..percent).contains(&self.battery_percent)
     }
 
-    /// Time since the last HEARTBEAT; the greatest value if none came.
+    /// Time since the last HEARTBEAT; the greatest duration if none was received.
     pub fn heartbeat_age(&self, now: Instant) -> Duration {
         time_since(self.heartbeat_at, now)
     }
 
-    /// Time since the last usable position; the greatest value if none is known.
+    /// Time since the last usable position; the greatest duration while the position is unknown.
     pub fn position_age(&self, now: Instant) -> Duration {
         time_since(self.position_at, now)
     }
 
-    /// Bound of the estimate's error, metres, by what the autopilot reports and by what the
-    /// operator vouches for (`FLK_EST_M`); infinite while the error is not known.
+    /// Bound of the error of the estimated position, metres: three times the reported accuracy
+    /// (`ACCURACY_FACTOR`), and at least `vouched_m`, which the operator vouches for (`FLK_EST_M`).
+    /// Infinite while no recent accuracy is known.
     pub(crate) fn estimate_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
         match self.accuracy {
             Some((accuracy_m, at)) if now - at <= margins::MAX_ACCURACY_AGE => {
@@ -199,32 +208,35 @@ impl Telemetry {
         }
     }
 
-    /// Whether another EKF origin is in doubt, so that the autopilot is to be asked.
+    /// Whether the last EKF origin received while armed is another than the one flown with: the
+    /// autopilot is to be asked again.
     pub(crate) fn is_origin_doubtful(&self) -> bool {
         self.origin_doubtful_since.is_some()
     }
 
-    /// Whether the position jumped lately.
+    /// Whether the position jumped, or the EKF origin changed, within the last second
+    /// (`POSITION_SETTLE_TIME`).
     pub fn is_settling(&self, now: Instant) -> bool {
         now < self.settled_at
     }
 
-    /// Updates the telemetry from a frame of the autopilot link.
+    /// Updates the telemetry from a frame of the autopilot's link; `mission_origin` is the mission
+    /// frame's.
     pub fn handle_frame(
         &mut self,
         now: Instant,
         mission_origin: &Geodetic,
         frame: &Frame,
     ) -> TelemetryChange {
-        // An origin is confirmed while armed, so a forwarded one needs no place in the sequence,
-        // and takes none from the true ones.
+        // While armed GPS_GLOBAL_ORIGIN only confirms the origin: a forwarded one, with another
+        // sender's sequence number, must not make the filter drop the autopilot's own frames.
         let confirmed = self.armed && frame.message_id == GPS_GLOBAL_ORIGIN_DATA::ID;
         if !confirmed && !self.sequence.accept(frame.sequence, now) {
             return TelemetryChange::None;
         }
         self.note_stream(frame.message_id, now);
         match frame.message_id {
-            // Decoded field by field: a command newer than the crate's may be answered.
+            // Decoded field by field: the command may be one that the crate does not know.
             COMMAND_ACK_DATA::ID => {
                 let p = frame.padded();
                 let command = u16::from_le_bytes([p[0], p[1]]);
@@ -257,7 +269,7 @@ impl Telemetry {
             }
             SYS_STATUS_DATA::ID => match frame.decode::<SYS_STATUS_DATA>() {
                 Some(status) => {
-                    // Unknown (−1) does not hide what was known.
+                    // Unknown (−1) does not replace a known charge.
                     if status.battery_remaining >= 0 {
                         self.battery_percent = status.battery_remaining;
                     }
@@ -276,8 +288,8 @@ impl Telemetry {
                     ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
                 let ratio =
                     |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
-                // Velocity, horizontal and vertical position, compass. It reports no metres: 0
-                // leaves what is vouched for.
+                // Ratios of velocity, horizontal and vertical position, compass. ArduPilot reports
+                // no metres: 0 leaves the bound at what the operator vouches for.
                 let sound = self.estimator_ready
                     && [0, 4, 8, 12]
                         .into_iter()
@@ -294,7 +306,7 @@ impl Telemetry {
                 let metres =
                     |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
                 let (across_m, height_m) = (metres(32), metres(36));
-                // NaN, and what is less than nothing, is not known.
+                // A NaN or negative accuracy counts as unknown.
                 let known = across_m >= 0.0 && height_m >= 0.0;
                 let worst_m = if known { libm::fmaxf(across_m, height_m) } else { f32::INFINITY };
                 self.accuracy = Some((worst_m, now));
@@ -315,13 +327,13 @@ impl Telemetry {
         }
     }
 
-    /// Time since a stream was last heard; the greatest value if it never was.
+    /// Time since a stream's message was last received; the greatest duration if it never was.
     pub(crate) fn stream_age(&self, message_id: u32, now: Instant) -> Duration {
         let heard = self.stream(message_id).and_then(|at| self.streams.get(at)).copied();
         time_since(heard.filter(|at| *at > Instant::ZERO), now)
     }
 
-    /// Index of the message among the streams that are on.
+    /// Index of the message among the streams that are on; `None` if it is none of them.
     fn stream(&self, message_id: u32) -> Option<usize> {
         let kept = self.kind.unwrap_or_default().streams();
         let mut on = kept.iter().filter(|(_, interval_us)| *interval_us > 0.0);
@@ -366,12 +378,13 @@ impl Telemetry {
             return TelemetryChange::OriginFar((away_m * 1e-3) as u32);
         }
         if self.ekf_origin.is_some_and(|known| known != origin) {
-            // A position on its way may still be about the old one.
+            // A position received next may still be relative to the old origin.
             self.settled_at = now + POSITION_SETTLE_TIME;
         }
         if self.ekf_origin != Some(origin) {
             self.ekf_origin = Some(origin);
-            // The next position is about the new origin and no jump.
+            // The next position is relative to the new origin: the jump test must not compare it
+            // with the last.
             self.position_at = None;
             self.position_read_at = None;
         }
@@ -379,7 +392,8 @@ impl Telemetry {
         TelemetryChange::Updated
     }
 
-    /// While armed the origin stays. While disarmed a doubtful origin is requested again.
+    /// While armed, keeps the origin that setpoints are computed with. While disarmed, forgets an
+    /// origin that has moved, so that it is requested again.
     fn update_origin_trust(&mut self) {
         if self.armed {
             self.last_armed_origin = self.last_armed_origin.or(self.ekf_origin);
@@ -418,8 +432,7 @@ impl Telemetry {
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
         if let Some(at) = self.position_read_at {
-            // Time by the autopilot's clock since the last position that was used: positions that
-            // waited on the way come all at once.
+            // Time by the autopilot's clock: delayed positions arrive all at once.
             let passed_s = d.time_boot_ms.wrapping_sub(self.position_boot_ms) as f32 * 1e-3;
             let dt_s = passed_s.min(MAX_GAP_S);
             if now - at > POSITION_SETTLE_TIME {
@@ -432,8 +445,8 @@ impl Telemetry {
         }
         (self.position_read_at, self.position_boot_ms) = (Some(now), d.time_boot_ms);
         self.position = position;
-        // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left
-        // out for velocity.
+        // The norths of the mission frame and of the autopilot's frame differ by the convergence of
+        // meridians, 1e-4 rad a kilometre; the velocity is not corrected for it.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
         if !self.is_settling(now) && now >= self.positions_valid_from {
             self.position_at = Some(now);
@@ -449,8 +462,8 @@ impl Telemetry {
         TelemetryChange::OriginLost
     }
 
-    /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while
-    /// the origin is unknown.
+    /// A point of the mission frame in NED metres about this autopilot's EKF origin; `None` while
+    /// that origin is unknown.
     pub fn to_ned(&self, mission_origin: &Geodetic, point: &Point) -> Option<Vector3<f32>> {
         let geodetic = frames::enu_to_geodetic(mission_origin, point);
         let ned = frames::geodetic_to_ned(self.kind?.projection(), &self.ekf_origin?, &geodetic);

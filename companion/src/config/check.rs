@@ -1,4 +1,4 @@
-//! Whether settings can be flown.
+//! Checks whether a companion's settings can be flown.
 
 use planner_core::Point;
 
@@ -7,7 +7,8 @@ use crate::autopilot::AutopilotKind;
 use crate::guidance::limits::Settings;
 
 impl<const V: usize> Config<V> {
-    /// The settings, if they can be flown.
+    /// The settings as [`CheckedConfig`], with the vehicle's start, if [`Self::check`] accepts
+    /// them.
     ///
     /// # Errors
     /// As [`Self::check`].
@@ -17,7 +18,8 @@ impl<const V: usize> Config<V> {
         Ok(CheckedConfig { start: own.start, config: self })
     }
 
-    /// Whether it can be flown.
+    /// Checks ids, order of the roster, ranges of all numbers, geofence, and limits with both
+    /// autopilot kinds' defaults; the first error found is returned.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.system_id == 0 || self.own_roster_entry().is_none() {
             return Err(ConfigError::NotInRoster);

@@ -1,29 +1,31 @@
-//! Which senders may command, and how often each of them is answered.
+//! Which senders may command the companion, and how often it answers each kind of sender.
 //!
-//! Three kinds of senders: a ground station that the mission file names, the own vehicle's
-//! autopilot side, and everybody else. Only a ground station commands, sets parameters and moves
-//! files. Others are answered too, but each kind of sender has its own rate for each kind of answer
-//! on each link. So a flood of one request starves neither another kind of answer nor the answers
-//! to a ground station. What a rate holds back is not answered: clients ask again.
+//! Senders are of three kinds: a ground station that the mission file names, a component of the
+//! vehicle's own system on the autopilot's link, and everybody else. Only a ground station may
+//! command, set parameters and move files. Each kind of sender has a token bucket for each kind of
+//! answer on each link. So a flood of one request starves neither other kinds of answer nor the
+//! answers to a ground station. A request without a token left is not answered: clients request
+//! again.
 //!
-//! A system id is not a proof. What a forged one can do is in `SECURITY.md`.
+//! A system id proves no identity; `SECURITY.md` says what a forged one can do.
 
 use crate::events::Link;
 use crate::time::{Duration, Instant};
 
-/// The kind of sender of a frame.
+/// The kind of sender of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SenderKind {
-    /// Named by the mission file.
+    /// A system id that the mission file names as a ground station.
     GroundStation,
-    /// A component of the own system, on the autopilot's link.
+    /// A component of the vehicle's own system, heard on the autopilot's link.
     Autopilot,
-    /// Any other.
+    /// Any other sender.
     Other,
 }
 
 impl SenderKind {
-    /// The kind of sender by the system id of a frame, to the vehicle of system `own`.
+    /// The kind of sender with the system id `system`, heard on `link` by the vehicle of system id
+    /// `own`.
     pub(crate) fn from_system_id(link: Link, system: u8, own: u8, ground_stations: &[u8]) -> Self {
         if system != 0 && ground_stations.contains(&system) {
             Self::GroundStation
@@ -35,7 +37,7 @@ impl SenderKind {
     }
 }
 
-/// Kinds of answers.
+/// Kinds of answers, each with token buckets of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AnswerKind {
     /// COMMAND_ACK.
@@ -46,7 +48,7 @@ pub(crate) enum AnswerKind {
     Parameter,
     /// The message that a REQUEST_MESSAGE requests.
     Message,
-    /// STATUSTEXT that names a sender.
+    /// STATUSTEXT about something that a sender did.
     Text,
 }
 
@@ -54,7 +56,8 @@ const SENDER_COUNT: usize = 3;
 const KIND_COUNT: usize = 5;
 const LINK_COUNT: usize = 2;
 
-/// A token bucket: `burst` answers at once, then one each `every_ms`.
+/// Settings of a token bucket: it allows `burst` answers at once, then one each `every_ms`
+/// milliseconds.
 #[derive(Clone, Copy, Debug)]
 struct TokenBucketConfig {
     every_ms: u64,
@@ -65,24 +68,25 @@ const fn rate(every_ms: u64, burst: u64) -> TokenBucketConfig {
     TokenBucketConfig { every_ms, burst }
 }
 
-/// Rate limits for each sender, in the order of [`SenderKind`], and each kind in the order of
-/// [`AnswerKind`]. Others can request by radio at most 22 + 30 + 19 + 20 + 6 bytes a second, of the
-/// 250 that the radio rate limit leaves in the air. A list of all parameters is one burst. PX4
-/// sends TIMESYNC at 10 Hz, and needs no answer to fly.
+/// Token buckets for each kind of sender, in the order of [`SenderKind`], and each kind of answer,
+/// in the order of [`AnswerKind`]. Senders of kind `Other` can cause at most 22 + 30 + 19 + 20 + 6
+/// bytes a second by radio, of the 250 that the radio's rate limit allows in flight. A burst of
+/// `Parameter` holds a list of all parameters. PX4 sends TIMESYNC at 10 Hz, and flies without an
+/// answer.
 const RATES: [[TokenBucketConfig; KIND_COUNT]; SENDER_COUNT] = [
     [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
     [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],
     [rate(1000, 2), rate(1000, 3), rate(2000, 10), rate(2000, 2), rate(10_000, 1)],
 ];
 
-/// For each link, sender and kind the time at which its bucket is full again.
+/// The time at which each token bucket (link, kind of sender, kind of answer) is full again.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AnswerTokenBuckets {
     full_at: [[[Instant; KIND_COUNT]; SENDER_COUNT]; LINK_COUNT],
 }
 
 impl AnswerTokenBuckets {
-    /// Takes a token for an answer. Returns false if the bucket is empty.
+    /// Takes a token for an answer; returns false, and takes none, if the bucket is empty.
     pub fn take_token(
         &mut self,
         now: Instant,

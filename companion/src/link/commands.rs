@@ -1,11 +1,12 @@
-//! Commands to the companion: COMMAND_LONG and COMMAND_INT, read by field, since the crate refuses
-//! a whole message whose command it does not know and UNSUPPORTED must still be answered.
+//! Commands to the companion, by COMMAND_LONG or COMMAND_INT. They are decoded field by field: the
+//! crate rejects a whole message whose command it does not know, and that must still be answered
+//! UNSUPPORTED.
 //!
-//! Obeyed on either link, from a ground station that the mission names (`answer_limits`), when
-//! addressed to our system or to all (0), and to our component or to all (0). From others a command
-//! that acts is DENIED. Answered only when addressed to our system: a broadcast to the swarm acts
-//! on each and is answered by none. A command to all components that we do not know belongs to
-//! another component and stays unanswered.
+//! A command counts on either link, if it is addressed to this vehicle's system id or to all (0),
+//! and to this component or to all (0). One that changes something counts only from a ground
+//! station that the mission names (`answer_limits`); from other senders it is DENIED. It is
+//! answered only if it names this system id: a broadcast acts on every vehicle, and none answers.
+//! An unknown command to all components belongs to another component and stays unanswered.
 
 use crate::link::frame::Frame;
 use crate::mission::{Guard, GuardInputs, MAX_POSITION_AGE, State, has_row_for};
@@ -16,37 +17,39 @@ const COMMAND_LONG: u32 = 76;
 
 /// `MAV_RESULT` of an accepted command.
 pub const ACCEPTED: u8 = 0;
-/// `MAV_RESULT` of a command that is not possible in this state.
+/// `MAV_RESULT` of a command that the companion cannot obey in its current state.
 pub const TEMPORARILY_REJECTED: u8 = 1;
-/// `MAV_RESULT` of a command whose parameters make no sense.
+/// `MAV_RESULT` of a command with invalid parameters, or from a sender without authority.
 pub const DENIED: u8 = 2;
-/// `MAV_RESULT` of an unknown command.
+/// `MAV_RESULT` of a command that the companion does not know.
 pub const UNSUPPORTED: u8 = 3;
 
-/// NAV_RETURN_TO_LAUNCH.
+/// NAV_RETURN_TO_LAUNCH: fly back to the start and land there.
 pub const RETURN: u16 = 20;
-/// NAV_LAND.
+/// NAV_LAND: land where the vehicle is.
 pub const LAND: u16 = 21;
-/// DO_PAUSE_CONTINUE.
+/// DO_PAUSE_CONTINUE: `param1` 0 pauses on the path, 1 resumes.
 pub const PAUSE_CONTINUE: u16 = 193;
-/// MISSION_START.
+/// MISSION_START: arm, take off and fly the mission.
 pub const START: u16 = 300;
-/// NAV_FENCE_CIRCLE_EXCLUSION, as COMMAND_INT: a sphere to keep out of, of radius `param1` metres.
+/// NAV_FENCE_CIRCLE_EXCLUSION as COMMAND_INT: adds an obstacle, a sphere of radius `param1` metres
+/// about the command's place; radius 0 revokes it.
 pub const EXCLUDE: u16 = 5004;
-/// REQUEST_MESSAGE.
+/// REQUEST_MESSAGE: send the message whose id is `param1`.
 pub const REQUEST: u16 = 512;
-/// PREFLIGHT_REBOOT_SHUTDOWN.
+/// PREFLIGHT_REBOOT_SHUTDOWN: restart the companion.
 pub const RESTART: u16 = 246;
 
-/// `MAV_FRAME_GLOBAL`.
+/// `MAV_FRAME_GLOBAL`: altitude above mean sea level.
 const GLOBAL: u8 = 0;
-/// `MAV_FRAME_GLOBAL_INT`.
+/// `MAV_FRAME_GLOBAL_INT`: altitude above mean sea level.
 const GLOBAL_INT: u8 = 5;
 
-/// Time within which the same frame is a repetition, not a new command.
+/// Time after a command frame within which an identical frame counts as its repetition, not as a
+/// new command.
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(5);
 
-/// A command addressed to this companion or to all.
+/// A command addressed to this companion, to all components or to all vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// `MAV_CMD`.
@@ -55,27 +58,28 @@ pub struct Command {
     pub param1: f32,
     /// Second parameter.
     pub param2: f32,
-    /// COMMAND_INT in a frame of altitudes above mean sea level: latitude and longitude, 1e-7
-    /// degrees, and altitude, metres. None in any other frame: where a relative altitude counts
-    /// from is not known to every vehicle alike.
+    /// Place of a COMMAND_INT whose frame has altitudes above mean sea level: latitude and
+    /// longitude, 1e-7 degrees, and altitude, metres. `None` for any other frame: vehicles do not
+    /// agree where a relative altitude counts from.
     pub place: Option<(i32, i32, f32)>,
-    /// Sender: system and component.
+    /// Sender: system and component id.
     pub from: (u8, u8),
-    /// Whether our system was named, so that an answer is due.
+    /// Whether the command names this vehicle's system id, so that it is answered.
     pub to_us: bool,
-    /// Whether our component was named.
+    /// Whether the command names the companion's component id.
     pub to_component: bool,
 }
 
 impl Command {
-    /// Whether it is one of those that change something, and so counts only from a ground station
-    /// of the mission.
+    /// Whether the command changes something (mission, obstacles, a restart), and so counts only
+    /// from a ground station that the mission names.
     pub(crate) fn needs_authority(&self) -> bool {
         let restarts = self.command == RESTART && (self.to_component || self.param2 == 1.0);
         restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
     }
 
-    /// The text reported once the command took effect: its numbers name the sender.
+    /// The STATUSTEXT sent once the command took effect; its two `#` stand for the sender's system
+    /// and component id.
     pub(crate) fn log_text(&self) -> &'static str {
         match self.command {
             START => "Start from #/#",
@@ -91,13 +95,15 @@ impl Command {
     }
 }
 
-/// Reads a command addressed to `system` or to all; `None` for other frames and other addressees.
+/// Decodes a command for the vehicle of system id `system`. `None` for a frame that is no command,
+/// is addressed to others, or was sent by this companion itself.
 pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
     let p = frame.padded();
     if frame.message_id != COMMAND_INT && frame.message_id != COMMAND_LONG {
         return None;
     }
-    // Both lay out 28 bytes of parameters, then command, target system, target component.
+    // COMMAND_INT and COMMAND_LONG both have 28 bytes of parameters, then command, target system,
+    // target component.
     let (target_system, target_component) = (p[30], p[31]);
     let for_system = target_system == 0 || target_system == system;
     let for_component = target_component == 0 || target_component == crate::COMPANION_COMPONENT;
@@ -119,11 +125,11 @@ pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
     })
 }
 
-/// Bytes of a command that are compared: parameters, command, addressee, and the frame's further
-/// fields.
+/// Number of leading payload bytes by which two command frames are compared: all fields of either
+/// message (COMMAND_LONG has 33 bytes, COMMAND_INT 35).
 const COMPARED_LEN: usize = 35;
 
-/// A command frame and its answer.
+/// A received command frame and the `MAV_RESULT` it was answered with.
 #[derive(Clone, Copy, Debug)]
 struct AnsweredCommand {
     from: (u8, u8),
@@ -134,8 +140,8 @@ struct AnsweredCommand {
     at: Instant,
 }
 
-/// Remembers the last few command frames, so that a repeated one acts once and is answered alike.
-/// The same sequence number with other parameters is another command.
+/// The last four command frames with their answers: a repeated frame gets the same answer and does
+/// not act again. The same sequence number with other parameters is another command.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommandHistory {
     seen: [Option<AnsweredCommand>; 4],
@@ -143,8 +149,8 @@ pub struct CommandHistory {
 }
 
 impl CommandHistory {
-    /// The answer that this very frame got lately, `Some(None)` if none yet; `None` for a frame not
-    /// seen.
+    /// The `MAV_RESULT` that this same frame was answered with in the last 5 s; `Some(None)` if it
+    /// was received but not answered. `None` for a frame not received before.
     pub fn previous_answer(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
         let same = |seen: &&AnsweredCommand| {
             seen.from == (frame.system, frame.component)
@@ -155,7 +161,7 @@ impl CommandHistory {
         self.seen.iter().flatten().find(same).map(|seen| seen.result)
     }
 
-    /// Remembers a frame and its answer.
+    /// Stores a frame and its answer in place of the oldest one.
     pub fn remember(&mut self, frame: &Frame, result: Option<u8>, at: Instant) {
         let mut payload = [0; COMPARED_LEN];
         payload.copy_from_slice(&frame.padded()[..COMPARED_LEN]);
@@ -167,24 +173,26 @@ impl CommandHistory {
     }
 }
 
-/// Commands of the operator that are not done yet.
+/// Commands of the operator that the mission table has not carried out yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PendingCommands {
     /// MISSION_START, until the mission ends.
     pub start: bool,
-    /// DO_PAUSE_CONTINUE 0, until it is resumed or the vehicle lands: on the pad it holds the
-    /// take-off back.
+    /// DO_PAUSE_CONTINUE 0, until the operator resumes or the vehicle lands. On the pad it prevents
+    /// the take-off.
     pub pause: bool,
-    /// DO_PAUSE_CONTINUE 1, until a row uses it or the state changes.
+    /// DO_PAUSE_CONTINUE 1, until the mission changes its state.
     pub resume: bool,
-    /// NAV_LAND, until a row uses it.
+    /// NAV_LAND, until the vehicle stops to land, lands, or is flown by its pilot or a failsafe.
     pub land: bool,
-    /// NAV_RETURN_TO_LAUNCH, until a row uses it.
+    /// NAV_RETURN_TO_LAUNCH, until the vehicle turns back, lands, or is flown by its pilot or a
+    /// failsafe.
     pub turn_back: bool,
 }
 
 impl PendingCommands {
-    /// Forgets what a row used, and all of it when the mission `ends`.
+    /// Clears the commands that the row with this guard has carried out by entering `to`; all of
+    /// them if the mission `ends`.
     pub(crate) fn state_changed(&mut self, guard: Guard, to: State, ends: bool) {
         use State::*;
         self.resume = false;
@@ -207,7 +215,8 @@ impl PendingCommands {
     }
 }
 
-/// Applies a mission command and returns its MAV_RESULT; `None` for any other command.
+/// Stores a mission command for the mission table and returns its `MAV_RESULT`. `None` for a
+/// command that is not one of the mission's.
 pub fn apply_command(
     pending: &mut PendingCommands,
     state: State,
@@ -216,13 +225,13 @@ pub fn apply_command(
 ) -> Option<u8> {
     use State::*;
     let (flag, guard, already): (_, _, &[State]) = match command.command {
-        // A start in time for the plan is kept; a repeated one changes nothing.
+        // MISSION_START before the plan has come is stored; a repeated one changes nothing.
         START if state == Planning => {
             pending.start = true;
             return Some(ACCEPTED);
         }
-        // A vehicle flies the rest of an area, which others left, from the pad that it came back
-        // to.
+        // After its flight over an area, a vehicle starts again from its pad: it photographs
+        // waypoints that other vehicles left.
         START if state == Done && inputs.area => {
             pending.start = true;
             return Some(ACCEPTED);
@@ -247,8 +256,8 @@ pub fn apply_command(
             ],
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => {
-            // Before the climb, and while something else interrupts the mission, the pause waits
-            // for its row.
+            // Before the climb, and while the mission is interrupted, the pause is stored until a
+            // row can act on it.
             let waits = matches!(
                 state,
                 Planning
@@ -268,7 +277,7 @@ pub fn apply_command(
             (&mut pending.pause, Guard::PauseCommanded, &[Paused])
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
-            // A place to continue from has to be known.
+            // Continuing needs a known position to continue from.
             if state == PilotReturned && inputs.position_age >= MAX_POSITION_AGE {
                 return Some(TEMPORARILY_REJECTED);
             }
@@ -283,8 +292,8 @@ pub fn apply_command(
         }
         PAUSE_CONTINUE => return Some(DENIED),
         LAND if matches!(state, Failsafe | Aborted) => {
-            // With motors off there is nothing to do. Otherwise the row acts, or a pilot or
-            // failsafe flies the vehicle.
+            // With motors off a landing needs nothing. With motors on the row acts only in Offboard
+            // or Guided; else a pilot or a failsafe flies the vehicle.
             let acts = inputs.armed && inputs.offboard;
             pending.land = acts;
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });

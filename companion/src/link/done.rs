@@ -1,70 +1,70 @@
-//! Which waypoints of an area a companion knows to be photographed: the payload of TUNNEL under a
-//! third private payload type.
+//! A companion's report of photographed waypoints of an area: TUNNEL's payload under a private
+//! payload type.
 //!
-//! Little-endian, at most 128 bytes; more than 19 ranges take several messages, in turn:
+//! Little-endian, at most 128 bytes; more than 19 ranges take several messages, sent in turn:
 //!
 //! | byte | type | field |
 //! |---|---|---|
 //! | 0 | u8 | version, 1 |
 //! | 1 | u8 | system id |
-//! | 2 | u8 | round: how often the area was begun again |
-//! | 3 | u8 | bit 0: the sender flies, so that what it knows still grows; bit 1: the ranges are all that its plan leaves out, not what it knows |
+//! | 2 | u8 | round: how often the area was begun again from its first waypoint |
+//! | 3 | u8 | bit 0: the sender flies, so that it may photograph more; bit 1: the ranges are all that the sender's plan leaves out, and not what it knows to be photographed |
 //! | 4 | u8 | number of ranges n, 0…19 |
 //! | 5 | u8 | 0 |
 //! | 6 | u32 | CRC-32 of the mission file |
-//! | 10 | 6 × n | ranges: u24 first waypoint, by its number on the path along all lanes; u24 how many |
+//! | 10 | 6 × n | ranges: u24 first waypoint, by its number on the path along all lanes of the area; u24 number of waypoints |
 //!
-//! A receiver refuses another version, and a system id that is not the sender's.
+//! A receiver rejects another version, and a system id that is not the sender's.
 
 use heapless::Vec;
 use planner_core::flight::WaypointRange;
 
 use crate::time::Duration;
 
-/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+/// Private payload type of TUNNEL, in the range 32768…65535 that MAVLink leaves free.
 pub const PAYLOAD_TYPE: u16 = 0xF10F;
-/// Version of the message's layout.
+/// Version of the payload's layout.
 pub const VERSION: u8 = 1;
-/// Most ranges of one message.
+/// Most ranges in one message.
 pub const MAX_RANGES: usize = 19;
-/// Bytes of a range.
+/// Bytes of an encoded range.
 pub(crate) const RANGE_LEN: usize = 6;
-/// Period of the message on the ground.
+/// Period of the report while the vehicle is on the ground.
 pub(crate) const PERIOD_ON_GROUND: Duration = Duration::from_millis(1000);
-/// Period of the message in flight.
+/// Period of the report while the vehicle flies.
 pub(crate) const PERIOD_IN_FLIGHT: Duration = Duration::from_millis(5000);
 const TUNNEL_HEAD: usize = 5;
 const HEAD: usize = 10;
-/// Longest TUNNEL payload, bytes.
+/// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEAD + HEAD + MAX_RANGES * RANGE_LEN;
 
-/// The message.
+/// The report of photographed waypoints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DoneReport {
     /// MAVLink system id of the sender.
     pub system_id: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
-    /// Number of times that the area was begun again.
+    /// How often the area was begun again from its first waypoint.
     pub round: u8,
-    /// Whether the sender flies.
+    /// Whether the sender flies, so that it may photograph more.
     pub flies: bool,
-    /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of
-    /// that.
+    /// Whether the ranges are all the waypoints that the sender's plan leaves out. If false, they
+    /// are waypoints that it knows to be photographed, or a part of them.
     pub is_left_out_by_plan: bool,
-    /// Waypoints that are photographed, as ranges of their numbers.
+    /// Photographed waypoints, as ranges of their numbers along all lanes of the area.
     pub ranges: Vec<WaypointRange, MAX_RANGES>,
 }
 
-/// A range as it is sent and kept: what three bytes cannot hold is left out, and photographed
-/// again.
+/// Encodes a range as it is sent and stored: u24 first waypoint, u24 number. A range too large for
+/// that becomes empty, so its waypoints are photographed again.
 pub(crate) fn encode_range(range: &WaypointRange) -> [u8; RANGE_LEN] {
     let [a, b, c, over] = range.first.to_le_bytes();
     let [d, e, f, many] = range.end.saturating_sub(range.first).to_le_bytes();
     if over == 0 && many == 0 { [a, b, c, d, e, f] } else { [0; RANGE_LEN] }
 }
 
-/// The range of these bytes: the inverse of the encoding above.
+/// Decodes what [`encode_range`] wrote.
 pub(crate) fn decode_range(bytes: &[u8; RANGE_LEN]) -> WaypointRange {
     let [a, b, c, d, e, f] = *bytes;
     let first = u32::from_le_bytes([a, b, c, 0]);
@@ -72,7 +72,7 @@ pub(crate) fn decode_range(bytes: &[u8; RANGE_LEN]) -> WaypointRange {
 }
 
 impl DoneReport {
-    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    /// Writes TUNNEL's whole payload, addressed to all. Returns its length.
     pub fn encode(&self, out: &mut [u8; MAX_LEN]) -> usize {
         let len = HEAD + RANGE_LEN * self.ranges.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
@@ -94,8 +94,8 @@ impl DoneReport {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no such report,
-    /// or not a sound one.
+    /// Decodes TUNNEL's payload, zero-padded, from the system id `sender`. `None` if it is no
+    /// report of photographed waypoints, or an invalid one.
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);

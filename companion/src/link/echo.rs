@@ -1,37 +1,39 @@
-//! How long the radio takes: a vehicle's intent echoes the sequence number of another one's.
+//! Delay of the swarm's radio: a vehicle's intent echoes the sequence number of another vehicle's
+//! intent.
 //!
-//! A vehicle that gets its own number back knows the round trip: since it sent that intent, without
-//! the time that the other one held it. Half of that is what a message takes, if both ways are
-//! alike. Clocks need not agree.
+//! A vehicle that receives an echo of its own sequence number knows the round trip: the time since
+//! it sent that intent, minus the time for which the other vehicle held it. A message's one-way
+//! delay is half of that, if both ways take equally long. The vehicles' clocks need not agree.
 
 use crate::time::{Duration, Instant};
 
-/// Intents remembered: three seconds of them.
+/// Number of sent intents that are stored: those of three seconds at the default rate.
 const MAX_SENT_INTENTS: usize = 16;
-/// Unit of the time for which a message was held before its echo.
+/// Unit of [`IntentEcho::held`], the time between reception of an intent and its echo.
 const HELD_TICK: Duration = Duration::from_millis(10);
-/// Greatest delay that a message counts with, seconds: no vehicle can make another one useless by
-/// echoes that are wrong.
+/// Greatest delay that an echo can show, seconds: a wrong echo cannot make a vehicle's messages
+/// count as arbitrarily late.
 const MAX_DELAY_S: f32 = 1.0;
-/// Delay of the radio that is assumed before the first echo, seconds.
+/// One-way delay of a neighbour's messages that is assumed before the first echo, seconds.
 const ASSUMED_DELAY_S: f32 = 0.2;
-/// Weight of a new delay that is shorter than the known one; a longer delay replaces the known one
-/// at once.
+/// Weight of a newly measured delay that is shorter than the estimate; a longer one replaces the
+/// estimate at once.
 const FALLING_DELAY_GAIN: f32 = 0.125;
 
-/// The part of an intent that acknowledges another vehicle's last intent.
+/// Echo of another vehicle's last intent, sent within this vehicle's intent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IntentEcho {
-    /// Rank of that vehicle in the roster, below 255.
+    /// Rank of the other vehicle in the roster, below 255.
     pub rank: u8,
-    /// Sequence number of its frame.
+    /// MAVLink sequence number of the other vehicle's intent.
     pub sequence: u8,
-    /// Since when it has been here, in 10 ms; at most 254.
+    /// Time from the reception of that intent to its echo, in 10 ms, at most 254.
     pub held: u8,
 }
 
 impl IntentEcho {
-    /// The echo of a frame that was heard `held` ago; `None` if that is too long.
+    /// The echo of the intent with this sequence number, received `held` ago. `None` from a rank of
+    /// 255 or a time of 2.55 s on.
     pub(crate) fn new(rank: u16, sequence: u8, held: Duration) -> Option<Self> {
         let rank = u8::try_from(rank).ok().filter(|rank| *rank < u8::MAX)?;
         let held = u8::try_from(held.as_micros() / HELD_TICK.as_micros())
@@ -41,8 +43,8 @@ impl IntentEcho {
     }
 }
 
-/// An own intent: its number, when it was sent, and the place along the path to which its points
-/// led, metres.
+/// An intent that this vehicle sent: sequence number, time of sending, and the place along its path
+/// to which the intent's points led, metres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentIntent {
     sequence: u8,
@@ -50,12 +52,12 @@ pub(crate) struct SentIntent {
     pub(crate) ends_m: f32,
 }
 
-/// The own intents sent last, a ring.
+/// Ring of the intents that this vehicle sent last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SentIntents {
     ring: [Option<SentIntent>; MAX_SENT_INTENTS],
     count: usize,
-    /// When the last one was sent that is known to have arrived.
+    /// When the newest intent was sent that is known to have arrived.
     arrived: Instant,
 }
 
@@ -65,7 +67,7 @@ impl SentIntents {
         self.count = self.count.wrapping_add(1);
     }
 
-    /// Number of intents that were sent.
+    /// Number of intents that this vehicle has sent.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
@@ -74,14 +76,16 @@ impl SentIntents {
         self.ring.iter().flatten().find(|sent| sent.sequence == echo.sequence).copied()
     }
 
-    /// The own intent that an echo shows to have arrived; `None` for an echo that was overtaken.
+    /// The sent intent whose arrival this echo shows, now stored as the newest that arrived. `None`
+    /// if a newer one has arrived before, or if the intent is no longer stored.
     pub(crate) fn arrived(&mut self, echo: &IntentEcho) -> Option<SentIntent> {
         let sent = self.find(echo).filter(|sent| sent.at > self.arrived)?;
         self.arrived = sent.at;
         Some(sent)
     }
 
-    /// Time that a message takes one way, seconds, by an echo of an own intent.
+    /// One-way delay of messages, seconds, by an echo of an intent of this vehicle; `None` if that
+    /// intent is no longer stored.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
         let round_s = (now - self.find(echo)?.at).as_secs_f32()
             - f32::from(echo.held) * HELD_TICK.as_secs_f32();
@@ -89,10 +93,10 @@ impl SentIntents {
     }
 }
 
-/// Estimated one-way delay of a neighbour's messages.
+/// Estimated one-way delay of the messages between this vehicle and a neighbour.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MessageDelay {
-    /// Seconds.
+    /// The estimate, seconds.
     pub(crate) delay_s: f32,
     known: bool,
 }

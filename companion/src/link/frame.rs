@@ -1,20 +1,19 @@
-//! MAVLink framing: bytes in, checked frames out, and messages back into bytes.
+//! MAVLink framing: checked frames from received bytes, and bytes to send from messages.
 //!
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing". The `mavlink` crate gives
-//! the message types and their CRC seeds; framing is ours, because its reader drops unknown ids and
-//! then searches their payload for a start byte: one false 0xFD there holds back every frame behind
-//! it.
+//! the message types and their CRC seeds. Framing is our own: the crate's reader drops a frame of
+//! unknown id and then searches its payload for a start byte, and one false 0xFD there holds back
+//! every frame behind it.
 //!
-//! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible
-//! and whose id the dialect knows. Of candidates that overlap, the first whose checksum is right is
-//! the frame; a candidate with a wrong checksum costs its start byte only, and the search continues
-//! behind that byte. So no garbage, whatever it is, hides a whole frame behind it. What no checksum
-//! covers is searched too: a frame of unknown id and a signature, which is not checked here. Their
-//! bytes are not counted as noise.
+//! One rule finds the frames of any stream. A candidate is a start byte with a plausible header
+//! whose message id the dialect knows. Of candidates that overlap, the first one with a correct
+//! checksum is the frame. A candidate with a wrong checksum costs only its start byte: the search
+//! continues with the next byte. So no garbage hides a whole frame behind it. Bytes without a
+//! checksum of ours are searched too: a frame of unknown id, and a signature, which is not
+//! verified. They do not count as noise.
 //!
-//! A candidate that is not complete holds back what follows it, for [`PARTIAL_LIFETIME`] after its
-//! own first byte and an eighth of that at most. Each byte costs O(1), and O(267) where starts are
-//! false.
+//! An incomplete candidate holds back the bytes behind it for at most [`PARTIAL_LIFETIME`] after
+//! its own first byte and an eighth of that. Each byte costs O(1), after false start bytes O(267).
 
 use crc::{CRC_16_MCRF4XX, Crc, Table};
 use heapless::Vec;
@@ -23,29 +22,30 @@ use mavlink::{MavlinkVersion, Message, MessageData};
 
 use crate::time::{Duration, Instant};
 
-/// Time after its first byte at which an incomplete frame is dropped.
+/// Time after its first byte was received at which an incomplete frame is dropped.
 pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
 /// Longest frame without its signature, bytes: 10 of header, 255 of payload, 2 of CRC.
 pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
-/// A deprecated message; the only one whose CRC seed is 0.
+/// A deprecated message, the only one of the dialect whose CRC seed is 0.
 const COMPONENT_INFORMATION: u32 = 395;
 const FLAG_SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
-/// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one
-/// step count as received with the last of them.
+/// Resolution of the times of arrival, microseconds: bytes received within one step count as
+/// received with the last of them.
 const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.as_micros() / 8;
-/// Most arrival steps within [`PARTIAL_LIFETIME`], and one.
+/// Most different times of arrival in the buffer: the steps within [`PARTIAL_LIFETIME`], and two
+/// more.
 const MAX_ARRIVALS: usize = 10;
 
-/// A frame whose CRC is right.
+/// A received frame with a correct CRC.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Wire version.
+    /// MAVLink version of the frame, 1 or 2.
     pub version: MavlinkVersion,
-    /// Sequence number of the sender's link.
+    /// Sequence number that the sender gave it on its link.
     pub sequence: u8,
     /// System id of the sender.
     pub system: u8,
@@ -53,7 +53,7 @@ pub struct Frame {
     pub component: u8,
     /// Message id.
     pub message_id: u32,
-    /// Whether a signature followed; it is not checked.
+    /// Whether the frame has a signature; it is not verified.
     pub signed: bool,
     len: u8,
     payload: [u8; 255],
@@ -65,13 +65,14 @@ impl Frame {
         &self.payload[..usize::from(self.len)]
     }
 
-    /// The payload with the zeros that were cut put back, at any length up to 255.
+    /// The payload filled up with zeros to 255 bytes: V2 senders cut trailing zeros.
     pub fn padded(&self) -> &[u8; 255] {
         &self.payload
     }
 
-    /// Writes it as a V2 frame with the sender and sequence number it came with, to pass it on; the
-    /// bytes written, or 0 where `out` is too small. A signature is left out.
+    /// Writes the frame as V2 with its original sender and sequence number, to forward it, without
+    /// its signature. Returns the bytes written, 0 if `out` is too small or the dialect does not
+    /// know the message id.
     pub fn encode(&self, out: &mut [u8]) -> usize {
         let Some(extra) = extra_crc(self.message_id) else { return 0 };
         let header =
@@ -79,7 +80,7 @@ impl Frame {
         encode_raw(header, self.message_id, extra, self.payload(), out)
     }
 
-    /// The message, if the frame is one of type `M` and its enum values are known to the crate.
+    /// The message, if the frame has the message id of `M` and the crate knows all its enum values.
     pub fn decode<M: MessageData>(&self) -> Option<M> {
         if self.message_id != M::ID {
             return None;
@@ -88,55 +89,56 @@ impl Frame {
     }
 }
 
-/// Counters of a [`Framer`].
+/// Counters of a [`Framer`] since it was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Frames given out.
+    /// Frames returned by [`Framer::next`].
     pub frames: u32,
-    /// Candidates of a known id whose CRC was wrong; a false start byte in noise may count here
-    /// too.
+    /// Candidates with a wrong CRC; a false start byte in noise may count here too.
     pub bad_crc: u32,
-    /// Candidates of unknown id; a false start byte in noise may count here too.
+    /// Candidates with an unknown message id; a false start byte in noise may count here too.
     pub unknown: u32,
-    /// Partial frames given up after [`PARTIAL_LIFETIME`].
+    /// Incomplete frames dropped after [`PARTIAL_LIFETIME`].
     pub expired: u32,
-    /// Bytes that belonged to no frame.
+    /// Bytes that belong to no frame, of known or unknown id, and to no signature.
     pub noise_bytes: u32,
 }
 
-/// The bytes before `until` in the buffer were received at `at` or earlier.
+/// Time of arrival: the bytes before `until` in the buffer were received at `at` or earlier.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     until: usize,
     at: Instant,
 }
 
-/// The decoder of one link. At most 480 bytes; all zero when new, so it may live in .bss.
+/// Framer of one link's received bytes. At most 480 bytes, all zero when new, so that it may live
+/// in .bss.
 #[derive(Clone, Debug)]
 pub struct Framer {
     buf: [u8; MAX_FRAME_LEN],
     len: usize,
-    /// When the bytes of the buffer were received, oldest first; the last one covers the whole
+    /// Times of arrival of the bytes in the buffer, oldest first; the last one covers the whole
     /// buffer.
     arrivals: Vec<Arrival, MAX_ARRIVALS>,
-    /// Number of the next bytes that belong to a frame of unknown id or to a signature.
+    /// Number of the next bytes that belong to a frame of unknown id or to a signature, so that
+    /// they are not noise.
     uncounted: usize,
     counters: Counters,
 }
 
 const _: () = assert!(size_of::<Framer>() <= 480);
 
-/// What the buffer begins with.
+/// What the bytes at the front of the buffer are.
 enum ParseStatus {
-    /// Too few bytes to decide; this many are needed in all.
+    /// An incomplete candidate; it needs this many bytes in all for the next decision.
     NeedsBytes(usize),
-    /// Bytes that are not a frame.
+    /// No frame begins at the first byte.
     FalseStart,
-    /// A checked frame of this many bytes, without its signature.
+    /// A frame of this many bytes with a correct CRC, its signature not counted.
     ValidFrame(usize),
-    /// Whole, of known id, wrong CRC.
+    /// A complete candidate of known id with a wrong CRC.
     BadCrc,
-    /// The header of an unknown id; this many bytes with the signature, if it is a frame.
+    /// A header with an unknown id; the frame would have this many bytes, its signature counted.
     Unknown(usize),
 }
 
@@ -147,7 +149,7 @@ impl Default for Framer {
 }
 
 impl Framer {
-    /// An empty decoder.
+    /// A framer with an empty buffer.
     pub const fn new() -> Self {
         Self {
             buf: [0; MAX_FRAME_LEN],
@@ -158,19 +160,19 @@ impl Framer {
         }
     }
 
-    /// Counters of the frames so far.
+    /// Counters of frames, errors and noise so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// When the partial frame held now expires, if one is held.
+    /// When the incomplete frame at the front of the buffer expires; `None` if the buffer is empty.
     pub fn expires_at(&self) -> Option<Instant> {
         self.arrivals.first().map(|oldest| oldest.at + PARTIAL_LIFETIME)
     }
 
-    /// The next frame. Takes bytes off the front of `input` (all received at `now`) until a frame
-    /// is whole or `input` is empty; call until `None`. With an empty `input` it lets a partial
-    /// frame expire.
+    /// The next frame. Takes bytes off the front of `input`, all received at `now`, until a frame
+    /// is complete. `None` once `input` is empty; call it until then. A call with an empty `input`
+    /// lets an incomplete frame expire.
     pub fn next(&mut self, now: Instant, input: &mut &[u8]) -> Option<Frame> {
         loop {
             let needed = match self.parse_front() {
@@ -252,7 +254,7 @@ impl Framer {
         }
     }
 
-    /// Copies the good frame at the front out and removes it.
+    /// Removes the checked frame of `total` bytes at the front of the buffer, and returns it.
     fn take_frame(&mut self, total: usize) -> Frame {
         let b = &self.buf;
         let len = b[1];
@@ -271,12 +273,12 @@ impl Framer {
         Frame { version, sequence, system, component, message_id, signed, len, payload }
     }
 
-    /// Drops a false start byte and everything up to the next start byte in the buffer.
+    /// Drops the false start byte at the front, and the bytes behind it up to the next start byte.
     fn drop_start(&mut self) {
         self.drop_to_start(1);
     }
 
-    /// Drops everything up to the next start byte at `from` or later.
+    /// Drops the bytes up to the next start byte that is at `from` or later.
     fn drop_to_start(&mut self, from: usize) {
         let rest = &self.buf[from..self.len];
         let next = from + rest.iter().position(|&b| is_start(b)).unwrap_or(rest.len());
@@ -284,7 +286,8 @@ impl Framer {
         self.remove_front(next);
     }
 
-    /// Counts bytes that belong to no frame.
+    /// Counts `count` dropped bytes as noise, without those that belong to a frame of unknown id or
+    /// to a signature.
     fn count_noise(&mut self, count: usize) {
         let noise = count.saturating_sub(self.uncounted);
         self.uncounted = self.uncounted.saturating_sub(count);
@@ -300,7 +303,7 @@ impl Framer {
         });
     }
 
-    /// Bytes up to the end of the buffer were received at `now`.
+    /// Notes that the bytes up to the end of the buffer were received at `now`.
     fn note_arrival(&mut self, now: Instant) {
         let arrival = Arrival { until: self.len, at: now };
         let step = |at: Instant| at.as_micros() / ARRIVAL_STEP_US;
@@ -318,9 +321,9 @@ fn is_start(byte: u8) -> bool {
     byte == V1_START || byte == V2_START
 }
 
-/// The X.25 checksum of MAVLink over a frame without its start byte, closed by the seed of its
-/// message. By table, 16 bytes at a time (8 kB): checking is most of what a crowded radio costs,
-/// and the `mavlink` crate goes byte by byte.
+/// CRC-16/MCRF4XX of a frame without its start byte, then of its message's CRC seed. By a table of
+/// 8 kB, 16 bytes at a time: on a crowded radio the CRC is most of the work, and the `mavlink`
+/// crate computes it byte by byte.
 fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
     const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
     let mut digest = CRC.digest();
@@ -329,34 +332,34 @@ fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
     digest.finalize()
 }
 
-/// The CRC seed of a message id, or `None` where the dialect does not know the id. The crate
-/// answers 0 for those, which is also the true seed of COMPONENT_INFORMATION.
+/// The CRC seed of a message id; `None` if the dialect does not know the id. The crate returns 0
+/// for unknown ids, which is also the true seed of COMPONENT_INFORMATION.
 pub fn extra_crc(message_id: u32) -> Option<u8> {
     let extra = MavMessage::extra_crc(message_id);
     (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
 }
 
-/// Sender of a frame.
+/// Sender and sequence number of a frame to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// System id of the sender.
     pub system: u8,
     /// Component id of the sender.
     pub component: u8,
-    /// Sequence number of the link.
+    /// Sequence number of the frame on its link.
     pub sequence: u8,
 }
 
-/// Writes one message as a V2 frame, trailing zeros cut; the bytes written, or 0 where `out` is too
-/// small ([`MAX_FRAME_LEN`] is always enough).
+/// Writes a message as a V2 frame without trailing zeros. Returns the bytes written, 0 if `out` is
+/// too small; [`MAX_FRAME_LEN`] is always enough.
 pub fn encode<M: MessageData>(header: Header, message: &M, out: &mut [u8]) -> usize {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
     encode_raw(header, M::ID, M::EXTRA_CRC, &payload[..len], out)
 }
 
-/// As [`encode`], for a message of the whole dialect. Pulls in every message's encoder: not for the
-/// board.
+/// As [`encode`], for any message of the dialect. It links every message's encoder, so it is not
+/// for boards.
 pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> usize {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
@@ -364,8 +367,8 @@ pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> u
     encode_raw(header, id, MavMessage::extra_crc(id), &payload[..len], out)
 }
 
-/// As [`encode`], for a payload laid out by the caller: what the crate's enums cannot hold (TUNNEL
-/// with a private payload type). `payload` is at most 255 bytes; its trailing zeros are cut.
+/// As [`encode`], for a payload of at most 255 bytes that the caller has laid out: the crate's
+/// enums cannot hold it, as TUNNEL's private payload types. Trailing zeros are cut.
 pub fn encode_raw(
     header: Header,
     message_id: u32,

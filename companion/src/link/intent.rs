@@ -1,5 +1,5 @@
-//! What a companion reports to the swarm of its intent: the payload of TUNNEL under a private
-//! payload type.
+//! The intent that a companion reports to the swarm, at `FLK_SWARM_HZ` (by default five times a
+//! second): TUNNEL's payload under a private payload type.
 //!
 //! Little-endian, at most 128 bytes (`README.md` prints the same layout):
 //!
@@ -7,89 +7,94 @@
 //! |---|---|---|
 //! | 0 | u8 | version, 6 |
 //! | 1 | u8 | system id |
-//! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
-//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where no other vehicle hears it |
+//! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies a detour |
+//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these the sender flies to only if no other vehicle hears it |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
-//! | 12 | f32 | progress along the own path, metres; negative while climbing |
-//! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears no other vehicle; −1e6 where it may stop at once |
-//! | 20 | u32 | vehicles that it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
-//! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
-//! | 28 | u8 | 1: it climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; the upper seven bits: seconds by which those gates and its climb delay it, at most, beyond a flight at 0.4 of the nominal speed from that progress |
-//! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
-//! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where no other vehicle hears it |
+//! | 12 | f32 | progress along the sender's own path, metres; negative while climbing |
+//! | 16 | f32 | place along the sender's path up to which its gates are open or will be, metres: it flies on to there though no other vehicle hears it; −1e6 if it may stop at once |
+//! | 20 | u32 | vehicles that the sender heard in the last seconds: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
+//! | 24 | f32 | height of the ground below the sender, as far as it knows, metres up in the mission frame |
+//! | 28 | u8 | bit 0: the sender climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; bits 1–7: greatest delay, seconds, of the flight to the place at byte 16, by its gates and its climb, compared with a flight from its progress at 0.4 of the nominal speed |
+//! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long the sender held it in 10 ms; 0 for none |
+//! | 32 | 12 × n | points that the sender flies along next: f32 east, north, up in the mission frame. They begin at its setpoint and lead to where it will stop for now. No points while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area corners of its path follow, as far as it flies on if no other vehicle hears it |
 //!
-//! A receiver refuses another version, NaN, and a system id that is not the sender's.
+//! A receiver rejects another version, NaN, and a system id that is not the sender's.
 
 use heapless::Vec;
 use planner_core::Point;
 
 use crate::link::echo::IntentEcho;
 
-/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+/// Private payload type of TUNNEL, in the range 32768…65535 that MAVLink leaves free.
 pub const PAYLOAD_TYPE: u16 = 0xF10C;
-/// Most path points reported.
+/// Most path points in one intent.
 pub const MAX_POINTS: usize = 8;
-/// Version of the message's layout.
+/// Version of the payload's layout.
 pub const VERSION: u8 = 6;
 const HEADER_LEN: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
-/// Flag of a vehicle that stands on the ground.
+/// Flag: the sender stands on the ground.
 pub const GROUNDED: u8 = 1;
-/// Flag of a vehicle that flies under its companion's setpoints.
+/// Flag: the sender is in the air.
 pub const FLYING: u8 = 2;
-/// Flag of a vehicle that landed after its mission.
+/// Flag: the sender has landed after its mission.
 pub const LANDED: u8 = 4;
-/// Flag of a vehicle whose progress counts on the shared plan.
+/// Flag: the sender follows the shared plan, so its progress opens gates of other vehicles.
 pub const ON_PLAN: u8 = 8;
-/// Flag of a vehicle that has left the plan and rests where it is, or that a pilot keeps: this
-/// vehicle opens all gates and is an obstacle.
+/// Flag: the sender has left the plan for good, at rest where it is or flown by its pilot. It
+/// passes no further gate: other vehicles open all gates that wait for it, and count it as an
+/// obstacle.
 pub const OUT_OF_PLAN: u8 = 16;
-/// Flag of a vehicle that stands, and will stand until another vehicle moves.
+/// Flag: the sender stands, and will stand until another vehicle moves.
 pub const WAITING: u8 = 32;
-/// Flag of a vehicle whose path is blocked; it waits until all others stand, then flies a detour.
+/// Flag: the sender's path is blocked; it waits until all other vehicles stand, then flies a
+/// detour.
 pub const BLOCKED: u8 = 64;
-/// Flag of a vehicle that flies a detour, or will; its reported progress is the place where it left
-/// the plan.
+/// Flag: the sender flies a detour, or will; its reported progress is then the place along its path
+/// where it left the plan.
 pub const ON_DETOUR: u8 = 128;
 
-/// One vehicle's intent.
+/// The intent of one vehicle, the sender.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Intent {
-    /// MAVLink system id.
+    /// MAVLink system id of the sender.
     pub system_id: u8,
-    /// [`GROUNDED`] and its kin.
+    /// Bits [`GROUNDED`], [`FLYING`], [`LANDED`], [`ON_PLAN`], [`OUT_OF_PLAN`], [`WAITING`],
+    /// [`BLOCKED`], [`ON_DETOUR`].
     pub flags: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
     /// CRC-32 of the swarm's plan.
     pub plan_crc: u32,
-    /// Progress along the own path, metres.
+    /// Progress along the sender's own path, metres; negative while it climbs.
     pub progress_m: f32,
-    /// Place along the own path up to which the sender's gates are open, metres: the sender flies
-    /// on to there even when it hears no vehicle.
+    /// Place along the sender's path up to which its gates are open or will be, metres: it flies on
+    /// to there though no other vehicle hears it.
     pub gates_open_up_to_m: f32,
-    /// Seconds by which gates and climb delay that flight, at most 127.
+    /// Greatest delay of the flight to there, seconds, by gates and climb, compared with a flight
+    /// at 0.4 of the nominal speed; at most 127.
     pub unheard_delay_s: u8,
-    /// Whom it heard lately, a bit for each rank.
+    /// Vehicles that the sender heard in the last seconds: bit i for rank i in the roster.
     pub heard_bits: u32,
-    /// Height of the ground below it, as far as it knows, metres.
+    /// Height of the ground below the sender, as far as it knows, metres up in the mission frame.
     pub ground_m: f32,
-    /// Whether it may come down from its place: it climbs, descends or lands, or a pilot or
+    /// Whether the sender may come down from its place: it climbs, descends or lands, or a pilot or
     /// failsafe flies it.
     pub may_come_down: bool,
-    /// Echo of another vehicle's intent, for that vehicle's measure of the delay.
+    /// Echo of another vehicle's intent, by which that vehicle measures the radio's delay.
     pub echo: Option<IntentEcho>,
-    /// Points that it flies along next: as far as it will go for now, then as far as it flies on
-    /// unheard; none while somebody else flies it.
+    /// Points that the sender flies along next, in the mission frame: first to where it will stop
+    /// for now, then as far as it flies on if no other vehicle hears it. Empty while a pilot or a
+    /// failsafe flies it.
     pub points: Vec<Point, MAX_POINTS>,
-    /// Number of the last of those points beyond where it will stop for now.
+    /// How many of the last of these points lie beyond where it will stop for now.
     pub first_unheard_point: u8,
 }
 
 impl Intent {
-    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    /// Writes TUNNEL's whole payload, addressed to all. Returns its length.
     pub fn encode(&self, out: &mut [u8; 133]) -> usize {
         let len = HEADER_LEN + 12 * self.points.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
@@ -123,8 +128,8 @@ impl Intent {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not an intent, or
-    /// not a sound one.
+    /// Decodes TUNNEL's payload, zero-padded, from the system id `sender`. `None` if it is no
+    /// intent, or an invalid one.
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);

@@ -1,5 +1,6 @@
-//! What waits to be sent on one link. Setpoints, heartbeats, positions and intents never wait here:
-//! they are made fresh when the link is polled. A full queue refuses the newest and counts it.
+//! Queue of the messages to be sent on one link. Setpoints, heartbeats, positions and intents are
+//! not queued: they are composed when the link is polled. A full queue drops the newest message and
+//! counts it.
 
 use core::fmt::Write as _;
 
@@ -12,95 +13,95 @@ use mavlink::dialects::ardupilotmega::{
 
 use crate::link::frame::{self, Header};
 
-/// Entries that a link's queue holds.
+/// Most messages in a link's queue.
 pub const QUEUE_DEPTH: usize = 32;
 
-/// A message that waits in the queue.
+/// A message in the queue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outgoing {
-    /// SET_MESSAGE_INTERVAL: message id, microseconds or −1.
+    /// SET_MESSAGE_INTERVAL to the autopilot: message id, and interval in microseconds, −1 for off.
     Interval(u16, f32),
-    /// REQUEST_MESSAGE: message id.
+    /// REQUEST_MESSAGE to the autopilot: message id.
     Request(u16),
-    /// DO_SET_MODE: parameters 2 and 3.
+    /// DO_SET_MODE to the autopilot: parameters 2 and 3.
     Mode(f32, f32),
-    /// NAV_TAKEOFF to a height above home, metres.
+    /// NAV_TAKEOFF to the autopilot: target height above home, metres.
     TakeOff(f32),
-    /// PARAM_REQUEST_READ by name.
+    /// PARAM_REQUEST_READ to the autopilot, by name.
     ReadParameter(&'static str),
-    /// PARAM_SET of a REAL32.
+    /// PARAM_SET to the autopilot of a REAL32: name and value.
     Parameter(&'static str, f32),
-    /// The answer to a TIMESYNC.
+    /// TIMESYNC that answers a request.
     Timesync {
-        /// Our clock, nanoseconds.
+        /// This companion's clock, nanoseconds.
         tc1: i64,
-        /// The sender's, nanoseconds.
+        /// The requester's time stamp, nanoseconds, sent back as it came.
         ts1: i64,
-        /// Whom: system and component. An autopilot does not forward what is addressed to itself.
+        /// Addressee, the requester: system and component id. With it the autopilot does not
+        /// forward the answer to others.
         to: (u8, u8),
     },
-    /// PARAM_VALUE of one of ours.
+    /// PARAM_VALUE of one of the companion's own parameters.
     ParameterValue {
-        /// Index of the parameter.
+        /// Index of the parameter in the companion's table.
         index: usize,
-        /// Number of parameters.
+        /// Number of parameters in the companion's table.
         count: u16,
         /// Name of the parameter.
         name: &'static str,
         /// Value of the parameter.
         value: f32,
     },
-    /// PARAM_ERROR.
+    /// PARAM_ERROR: the companion has no such parameter, or rejects its value.
     ParameterError {
-        /// Index asked for; −1 if it was the name.
+        /// Index that was requested; −1 if the request had a name.
         index: i16,
-        /// Name asked for.
+        /// Name that was requested.
         id: [u8; 16],
         /// `MAV_PARAM_ERROR`.
         why: u8,
-        /// Whom: system and component.
+        /// Addressee, the requester: system and component id.
         to: (u8, u8),
     },
-    /// COMPONENT_ARM_DISARM.
+    /// COMPONENT_ARM_DISARM to the autopilot: true arms, false disarms.
     Arm(bool),
-    /// DO_SET_CAM_TRIGG_DIST: pictures so far apart, metres, 0 for none; and whether one is taken
-    /// at once.
+    /// DO_SET_CAM_TRIGG_DIST to the autopilot: from now on it takes a picture each `step_m` metres.
     TriggerEvery {
-        /// Distance from one picture to the next.
+        /// Distance from one picture to the next, metres; 0 stops taking pictures.
         step_m: f32,
-        /// A picture now.
+        /// Whether one picture is taken at once.
         at_once: bool,
     },
-    /// DO_DIGICAM_CONTROL: a picture now.
+    /// DO_DIGICAM_CONTROL to the autopilot: it takes one picture at once.
     Picture,
-    /// COMMAND_ACK.
+    /// COMMAND_ACK that answers a command to the companion.
     Ack {
-        /// The command answered.
+        /// `MAV_CMD` that is answered.
         command: u16,
         /// `MAV_RESULT`.
         result: u8,
-        /// Whom: system and component.
+        /// Addressee, the command's sender: system and component id.
         to: (u8, u8),
     },
     /// STATUSTEXT.
     Text {
-        /// Warning, else information.
+        /// Severity WARNING if true, INFO if false.
         warning: bool,
         /// At most 50 bytes.
         text: &'static str,
     },
-    /// STATUSTEXT with numbers: each `#` of the text stands for one.
+    /// STATUSTEXT with numbers: each `#` of the text is replaced by the next number.
     Count {
-        /// Warning, else information.
+        /// Severity WARNING if true, INFO if false.
         warning: bool,
-        /// At most 50 bytes with the numbers in it.
+        /// The text, at most 50 bytes with its numbers.
         text: &'static str,
         /// Numbers that replace the text's `#`, in order.
         numbers: [u32; 3],
     },
 }
 
-/// The queue of one link.
+/// The queue of one link, and the sequence number of the link's frames.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
     queue: Deque<Outgoing, QUEUE_DEPTH>,
@@ -109,32 +110,33 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Puts a message at the end; a full queue drops and counts it. What is asked for again by
-    /// itself (streams, modes, arming) is asked for again; a dropped text or ack is lost.
+    /// Puts a message at the end of the queue; a full queue drops it and counts it. Requests for
+    /// streams, modes and arming are repeated anyway; a dropped text or ack is lost.
     pub fn push(&mut self, message: Outgoing) {
         if self.queue.push_back(message).is_err() {
             self.dropped = self.dropped.wrapping_add(1);
         }
     }
 
-    /// Messages dropped since the start.
+    /// Number of messages dropped since the start.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// Free entries.
+    /// Number of free entries in the queue.
     pub fn free_entries(&self) -> usize {
         QUEUE_DEPTH - self.queue.len()
     }
 
-    /// The header of the next frame of this link.
+    /// The MAVLink header of the link's next frame; counts the sequence number up.
     pub fn next_header(&mut self, system: u8) -> Header {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
         Header { system, component: crate::COMPANION_COMPONENT, sequence }
     }
 
-    /// Writes the first queued message as a frame; 0 if the queue is empty.
+    /// Removes the first queued message and writes it as a frame. Returns its length, 0 if the
+    /// queue is empty.
     pub fn write_first(&mut self, system: u8, out: &mut [u8]) -> usize {
         let Some(message) = self.queue.pop_front() else { return 0 };
         let header = self.next_header(system);
@@ -199,7 +201,7 @@ impl Outbox {
                 return frame::encode(header, &told, out);
             }
             Outgoing::ParameterError { index, id, why, to } => {
-                // Encoded field by field: the name may be anything.
+                // Encoded field by field: the requested name may be any bytes.
                 let mut payload = [0; PARAM_ERROR_DATA::ENCODED_LEN];
                 payload[..2].copy_from_slice(&index.to_le_bytes());
                 (payload[2], payload[3]) = to;
@@ -214,7 +216,7 @@ impl Outbox {
                 );
             }
             Outgoing::Timesync { tc1, ts1, to } => {
-                // Encoded field by field: the crate's type lacks the addressee.
+                // Encoded field by field: the crate's type lacks the target fields.
                 let mut payload = [0; TIMESYNC_DATA::ENCODED_LEN + 2];
                 payload[..8].copy_from_slice(&tc1.to_le_bytes());
                 payload[8..16].copy_from_slice(&ts1.to_le_bytes());
@@ -231,8 +233,8 @@ impl Outbox {
                 command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)
             }
             Outgoing::Ack { command, result, to } => {
-                // Encoded field by field: the command may be unknown to the crate, and its type
-                // lacks the addressee.
+                // Encoded field by field: the crate may not know the command, and its type lacks
+                // the target fields.
                 let [low, high] = command.to_le_bytes();
                 let payload = [low, high, result, 0, 0, 0, 0, 0, to.0, to.1];
                 return frame::encode_raw(
@@ -268,7 +270,7 @@ fn text_severity(warning: bool) -> MavSeverity {
     if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO }
 }
 
-/// A text with its numbers filled in, cut to 50 bytes.
+/// The text with each `#` replaced by the next number, cut to 50 bytes.
 fn format_text(text: &str, numbers: [u32; 3]) -> String<50> {
     let mut out = String::new();
     let mut numbers = numbers.iter();
@@ -277,7 +279,7 @@ fn format_text(text: &str, numbers: [u32; 3]) -> String<50> {
             Some(words) => (words, numbers.next()),
             None => (piece, None),
         };
-        // Full: what is left out is the end.
+        // An error means that the text is full: its end is left out.
         let _ = match number {
             Some(number) => write!(out, "{words}{number}"),
             None => out.write_str(words),

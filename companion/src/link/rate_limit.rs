@@ -1,36 +1,39 @@
-//! How many bytes go to the swarm's radio, which all vehicles share: the state that keeps them
-//! apart always goes out, what is asked for beside it only as far as [`ARMED_BYTES_PER_S`] or
-//! [`DISARMED_BYTES_PER_S`] let it.
+//! How many bytes a vehicle sends to the radio, which the whole swarm shares. The vehicle's state,
+//! which keeps vehicles apart, is always sent. Everything else is sent only as far as
+//! [`ARMED_BYTES_PER_S`] or [`DISARMED_BYTES_PER_S`] allow.
 //!
-//! State is made at a fixed rate ([`state_bytes_per_s`]). All else (acks, texts, parameters, files,
-//! and what a REQUEST_MESSAGE asks for) spends from an account that fills with time. So in any span
-//! of t seconds the radio gets at most t times both, and [`MAX_SAVED_BYTES`] and a frame more,
-//! whatever is asked.
+//! State is sent at a fixed rate ([`state_bytes_per_s`]). Everything else (acks, texts, parameters,
+//! files, messages requested by REQUEST_MESSAGE) takes tokens from a bucket that fills with time.
+//! So in any t seconds the radio gets at most t times the sum of both rates, plus
+//! [`MAX_SAVED_BYTES`], plus one frame, whatever is requested.
 
 use crate::link::frame::MAX_FRAME_LEN;
 use crate::time::Instant;
 
-/// Bytes a second beside the vehicle's state while it is armed: 32 vehicles add a quarter to their
-/// state.
+/// Bytes a second that an armed vehicle may send beside its state; for 32 vehicles that adds a
+/// quarter to their state.
 pub const ARMED_BYTES_PER_S: u32 = 250;
-/// Bytes a second beside the vehicle's state while it is disarmed, when a person reads and writes
-/// files: with one vehicle's state it is a radio of 57 600 baud.
+/// Bytes a second that a disarmed vehicle may send beside its state, when an operator reads and
+/// writes files; with the state of one vehicle this fills a radio of 57 600 baud.
 pub const DISARMED_BYTES_PER_S: u32 = 4500;
-/// Most bytes that the token bucket saves up: a list of all parameters, or five texts.
+/// Capacity of the token bucket, bytes: a list of all parameters, or five texts.
 pub const MAX_SAVED_BYTES: u32 = 1000;
-/// Bytes of a position with its frame; no other message that is requested and made fresh is longer.
+/// Bytes of a GLOBAL_POSITION_INT with its frame; no other requested message that is composed when
+/// polled is longer.
 pub(crate) const POSITION_BYTES: usize = 40;
-/// Bytes of a position and of the longest intent, each with its frame.
+/// Bytes of a GLOBAL_POSITION_INT and of the longest intent, each with its frame.
 const STATE_BYTES: u32 = POSITION_BYTES as u32 + 145;
-/// Bytes of a heartbeat with its frame.
+/// Bytes of a HEARTBEAT with its frame.
 const HEARTBEAT_BYTES: u32 = 21;
 
-/// Most bytes a second of one vehicle's state, sent so many times a second.
+/// Most bytes a second of one vehicle's state: position and intent `swarm_hz` times, and one
+/// HEARTBEAT.
 pub const fn state_bytes_per_s(swarm_hz: u8) -> u32 {
     STATE_BYTES * swarm_hz as u32 + HEARTBEAT_BYTES
 }
 
-/// The account. In millionths of a byte, so that no time is too short to count.
+/// The token bucket of the radio. Its tokens are millionths of a byte, so that a microsecond adds
+/// some.
 #[derive(Clone, Debug)]
 pub(crate) struct RateLimit {
     tokens: i64,
@@ -46,11 +49,11 @@ impl Default for RateLimit {
 }
 
 impl RateLimit {
-    /// Whether another frame may go out by now. It may be longer than what is left; then it is
-    /// owed.
+    /// Fills the bucket up to `now` and returns whether another frame may be sent: whether any
+    /// token is left. The frame may take more tokens than there are; the bucket is then negative.
     pub fn may_send(&mut self, now: Instant, armed: bool) -> bool {
         let rate = i64::from(if armed { ARMED_BYTES_PER_S } else { DISARMED_BYTES_PER_S });
-        // An hour fills it in any case.
+        // An hour fills the bucket in any case; the cap keeps the product below from overflowing.
         let passed_us = (now - self.at).as_micros().min(3_600_000_000) as i64;
         self.at = now;
         self.tokens =
@@ -58,13 +61,12 @@ impl RateLimit {
         self.tokens > 0
     }
 
-    /// Whether half of what may be saved up is left, as of the last question whether a frame may go
-    /// out.
+    /// Whether the bucket is more than half full, as of the last call of [`Self::may_send`].
     pub(crate) fn is_half_full(&self) -> bool {
         self.tokens > i64::from(MAX_SAVED_BYTES / 2) * MICROBYTES_PER_BYTE
     }
 
-    /// Counts the bytes of a sent frame.
+    /// Takes the tokens of a sent frame.
     pub fn count_bytes(&mut self, bytes: usize) {
         self.tokens -= bytes.min(MAX_FRAME_LEN) as i64 * MICROBYTES_PER_BYTE;
     }

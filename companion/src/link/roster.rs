@@ -1,5 +1,5 @@
-//! What a companion of a coverage mission reports of all vehicles: the payload of TUNNEL under a
-//! second private payload type.
+//! A companion's report of the state of all vehicles of a coverage mission: TUNNEL's payload under
+//! a private payload type.
 //!
 //! Little-endian, at most 128 bytes; more than 22 vehicles take two messages:
 //!
@@ -7,43 +7,45 @@
 //! |---|---|---|
 //! | 0 | u8 | version, 1 |
 //! | 1 | u8 | system id |
-//! | 2 | u8 | divisions that count |
+//! | 2 | u8 | number of committed divisions: those on whose hash all that take part agreed |
 //! | 3 | u8 | rank of the first vehicle below |
 //! | 4 | u8 | number of vehicles n, 1…22 |
 //! | 5 | u8 | 0 |
 //! | 6 | u32 | CRC-32 of the mission file |
-//! | 10 | u32 | hash of the last division that counts; 0 for none |
+//! | 10 | u32 | hash of the last committed division; 0 for none |
 //! | 14 | u32 | hash of the division under way, as the sender computed it; 0 for none |
-//! | 18 | 5 × n | the vehicles: flags (bits 0–1 standing, 2 whether the promise is stated, 3 whether it has stopped there, 4 whether it computed the sender's hash too, 5–7 incarnation), u16 done and u16 promised, dm along its path |
+//! | 18 | 5 × n | the vehicles by rank: flags (bits 0–1 status, 2 whether its commitment is stated, 3 whether it holds there, 4 whether it computed the sender's hash too, 5–7 incarnation), u16 progress and u16 commitment, dm along its path |
 //!
-//! A receiver refuses another version, and a system id that is not the sender's.
+//! A receiver rejects another version, and a system id that is not the sender's.
 
 use heapless::Vec;
 
-/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+/// Private payload type of TUNNEL, in the range 32768…65535 that MAVLink leaves free.
 pub const PAYLOAD_TYPE: u16 = 0xF10E;
-/// Version of the message's layout.
+/// Version of the payload's layout.
 pub const VERSION: u8 = 1;
-/// Most vehicles of one message.
+/// Most vehicles in one message.
 pub const MAX_ENTRIES: usize = 22;
 const TUNNEL_HEAD: usize = 5;
 const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
-/// Longest TUNNEL payload, bytes.
+/// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
 
-/// Whether a vehicle takes part. What comes later in this list outlasts what comes before.
+/// Whether a vehicle takes part in the coverage mission. Of two reports about a vehicle, the status
+/// that is later in this list counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum MemberStatus {
-    /// The vehicle flies its share, or will.
+    /// The vehicle flies its share of the area, or will.
     #[default]
     Alive,
-    /// The others have not heard it for so long that its part is theirs.
+    /// The other vehicles have not heard it for so long that they divide its share among them.
     Lost,
-    /// The vehicle reports that it flies no further: the rest of its share is the others'.
+    /// The vehicle reports that it flies its share no further: the others divide what is left of
+    /// it.
     Left,
-    /// The vehicle reports that it flies no further, and nothing of its share is left.
+    /// The vehicle reports that it flies no further and that its whole share is photographed.
     Finished,
 }
 
@@ -51,45 +53,46 @@ impl MemberStatus {
     const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
 }
 
-/// State of one vehicle of the roster as the sender knows it.
+/// State of one vehicle of the roster, as the sender of the report knows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RosterReportEntry {
-    /// Counts its flights: what is known of an earlier one does not count. 0…7, then 0 again.
+    /// Number of this vehicle's flight, 0…7, then 0 again: reports of an earlier flight do not
+    /// count.
     pub incarnation: u8,
-    /// Whether it takes part.
+    /// Whether the vehicle takes part.
     pub status: MemberStatus,
-    /// Progress of the vehicle along its path, decimetres.
+    /// Progress of the vehicle along its own path, decimetres.
     pub progress_dm: u16,
-    /// Place along its path up to which the vehicle flies before it waits for a division,
-    /// decimetres; 0 on its pad.
+    /// The vehicle's commitment: place along its path up to which it flies before it holds for the
+    /// division, decimetres, 0 on its pad. `None` while it has not stated one.
     pub commitment_dm: Option<u16>,
-    /// Whether it stands there.
+    /// Whether the vehicle holds at its commitment.
     pub holds: bool,
-    /// Whether it computed the sender's hash of the division under way.
+    /// Whether the vehicle computed the same hash of the division under way as the sender.
     pub agrees: bool,
 }
 
-/// The message.
+/// The roster report, with at most [`MAX_ENTRIES`] vehicles.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RosterReport {
     /// MAVLink system id of the sender.
     pub system_id: u8,
-    /// Divisions that count, as the sender knows.
+    /// Number of committed divisions, on whose hash all that take part agreed, as the sender knows.
     pub divisions: u8,
-    /// Rank of the first entry.
+    /// Rank of the vehicle of the first entry.
     pub first: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
-    /// Hash of the last division that counts.
+    /// Hash of the last committed division; 0 for none.
     pub committed_hash: u32,
-    /// Hash of the division under way; 0 for none.
+    /// Hash of the division under way, as the sender computed it; 0 for none.
     pub hash: u32,
-    /// The vehicles by rank.
+    /// States of consecutive vehicles of the roster, by rank.
     pub entries: Vec<RosterReportEntry, MAX_ENTRIES>,
 }
 
 impl RosterReport {
-    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    /// Writes TUNNEL's whole payload, addressed to all. Returns its length.
     pub fn encode(&self, out: &mut [u8; MAX_LEN]) -> usize {
         let len = HEADER_LEN + ENTRY_LEN * self.entries.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
@@ -113,8 +116,8 @@ impl RosterReport {
         TUNNEL_HEAD + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no roster, or not
-    /// a sound one.
+    /// Decodes TUNNEL's payload, zero-padded, from the system id `sender`. `None` if it is no
+    /// roster report, or an invalid one.
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);

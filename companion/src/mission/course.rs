@@ -1,4 +1,5 @@
-//! Where the mission is: its state and what that interrupts, what was commanded, and the plan.
+//! State of one vehicle's mission: the table's state and the states that it interrupted, pending
+//! commands, and the vehicle's plan.
 
 use planner_core::detour::Goal;
 use planner_core::flight::{Path, Task, VehiclePlan, WaypointRange};
@@ -16,52 +17,57 @@ use crate::mission::{
 };
 use crate::time::{Duration, Instant};
 
-/// Greatest distance between the start of a path and the vehicle, metres.
+/// Greatest distance between the first point of a path and the place where it must begin, metres; a
+/// plan beyond it is refused.
 const PATH_BEGIN_M: f32 = 0.1;
-/// A picture no further than this before the place where the vehicle comes back to its path is
-/// taken there, metres.
+/// A picture at most this far along the path before the place where the vehicle comes back to its
+/// path is taken at that place, metres.
 const TAKEN_M: f32 = 0.05;
 
-/// One vehicle's mission: at most `W` waypoints and `G` gates.
+/// The mission of one vehicle, whose plan has at most `W` waypoints and `G` gates.
 #[derive(Clone, Debug)]
 pub(crate) struct Mission<const W: usize, const G: usize> {
     state: State,
     entered_at: Instant,
-    /// When MISSION_START was taken: the schedule counts from it.
+    /// When MISSION_START was accepted: the schedule's times count from there.
     started_at: Instant,
-    /// When the pilot took the vehicle.
+    /// When a pilot last took the vehicle over.
     pilot_since: Instant,
     interrupted: InterruptedStates,
     pending: PendingCommands,
-    /// The autopilot's mode at the start.
+    /// The autopilot's `custom_mode` when the mission was started.
     mode_before: u32,
-    /// First point of the path, above the pad.
+    /// First point of the vehicle's path, above its pad.
     start: Point,
     plan: Option<VehiclePlan<W, G>>,
-    /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
+    /// Once the vehicle has left the path of its plan: whether it had taken all pictures of its
+    /// share before. `None` while it is on that path.
     left_with_all_pictures: Option<bool>,
-    /// Pictures of its path up to where it last came back from a detour: those taken before that
-    /// were noted when it left.
+    /// Number of pictures of the path up to the place where the vehicle last came back from a
+    /// detour: those taken before were noted when it left the path.
     pictures_before_rejoin: u32,
-    /// Place where the plan ends, the height in which the plan leads there, and the descent,
-    /// metres.
+    /// Where the vehicle's plan ends: the place above the pad, the height of the path that leads
+    /// there, and the length of the descent there, metres.
     home: (Point, f32, f32),
     failure: Option<PlanFailure>,
-    /// Since when the estimate is worse than the margin leaves at a crawl.
+    /// Since when the estimate's error bound has exceeded what the margin leaves for it even at
+    /// crawl speed; `None` while it fits.
     imprecise_since: Option<Instant>,
     waits: Waits,
     tasks: Tasks,
     photographed: PhotographedWaypoints,
-    /// Divisions that count for the plan.
+    /// Number of the fleet's committed divisions that the plan takes into account.
     division: usize,
-    /// Whether the part that the last one gives has come and is not flown yet.
+    /// Whether the plan after the last division has come and is not flown yet.
     division_plan_ready: bool,
-    /// The division that the shell was requested to compute, and when.
+    /// Open request to the shell for a division: hash of the division's inputs, and when it was
+    /// made.
     division_requested: Option<(u32, Instant)>,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
-    /// Before the autopilot was heard; the path is to begin at `path_start`.
+    /// A mission whose autopilot was not heard yet; `start` is the first point of the vehicle's
+    /// path, above its pad.
     pub(crate) fn new(start: Point) -> Self {
         Self {
             state: State::WaitAutopilot,
@@ -92,106 +98,110 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.state
     }
 
-    /// Time at which this state was entered.
+    /// When the state was entered.
     pub(crate) fn entered_at(&self) -> Instant {
         self.entered_at
     }
 
-    /// Time in this state.
+    /// Time since the state was entered.
     pub(crate) fn time_in_state(&self, now: Instant) -> Duration {
         now - self.entered_at
     }
 
-    /// When the mission was started.
+    /// When MISSION_START was accepted.
     pub(crate) fn started_at(&self) -> Instant {
         self.started_at
     }
 
-    /// Time for which the pilot has had the vehicle.
+    /// Time since a pilot last took the vehicle over.
     pub(crate) fn time_with_pilot(&self, now: Instant) -> Duration {
         now - self.pilot_since
     }
 
-    /// The state of the flight itself, beneath pause and loss.
+    /// The state of the flight without pause and loss: the current state or the one that they
+    /// interrupted.
     pub(crate) fn uninterrupted_state(&self) -> State {
         self.interrupted.uninterrupted_state(self.state)
     }
 
-    /// Commands that are not done yet.
+    /// Commands of the operator that have not been carried out yet.
     pub(crate) fn pending(&self) -> &PendingCommands {
         &self.pending
     }
 
-    /// The autopilot's mode at the start.
+    /// The autopilot's `custom_mode` when the mission was started.
     pub(crate) fn mode_before(&self) -> u32 {
         self.mode_before
     }
 
-    /// First point of the path, above the pad.
+    /// First point of the vehicle's path, above its pad.
     pub(crate) fn path_start(&self) -> Point {
         self.start
     }
 
-    /// The place of the vehicle on the ground before it starts.
+    /// Place of the vehicle on its pad: the climb's height below the first point of the path.
     pub(crate) fn pad_position(&self) -> Point {
         self.start - Point::new(0.0, 0.0, self.climb_m())
     }
 
-    /// The plan.
+    /// The vehicle's plan; `None` until the shell has returned one.
     pub(crate) fn plan(&self) -> Option<&VehiclePlan<W, G>> {
         self.plan.as_ref()
     }
 
-    /// Height of its climb, metres.
+    /// Height of the climb from the pad to the path, metres; 0 without a plan.
     pub(crate) fn climb_m(&self) -> f32 {
         self.plan.as_ref().map_or(0.0, |plan| plan.climb_m)
     }
 
-    /// Reason why the plan requested last did not come.
+    /// Why the shell did not return the last plan or detour requested; `None` if it has, or not yet
+    /// answered.
     pub(crate) fn plan_failure(&self) -> Option<PlanFailure> {
         self.failure
     }
 
-    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in
-    /// the air.
+    /// Whether the plan's departure time has come. Until then the vehicle waits on its pad; later
+    /// waits are at gates in the air.
     pub(crate) fn departure_due(&self, now: Instant) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
         (now - self.started_at).as_secs_f32() >= depart_s
     }
 
-    /// Time for which the bound of the position estimate has exceeded the part that the margin
-    /// leaves for it.
+    /// Time for which the estimate's error bound has exceeded what the margin leaves for it even at
+    /// crawl speed.
     pub(crate) fn estimate_imprecise_for(&self, now: Instant) -> Duration {
         self.imprecise_since.map_or(Duration::default(), |since| now - since)
     }
 
-    /// Notes whether the estimate is precise enough.
+    /// Notes whether the estimate's error bound fits into the margin, at crawl speed at least.
     pub(crate) fn note_estimate(&mut self, usable: bool, now: Instant) {
         self.imprecise_since = if usable { None } else { self.imprecise_since.or(Some(now)) };
     }
 
-    /// The vehicle waits for the vehicle `id`, which has not started, or for none (0). Returns
-    /// whether `id` is to be reported.
+    /// To be called each step with the vehicle that has not started and that this one waits for, 0
+    /// for none. Returns whether the wait is to be reported now.
     pub(crate) fn should_report_wait(&mut self, id: u8, now: Instant) -> bool {
         self.waits.report.update(id, now)
     }
 
-    /// Notes whether something bars the start of the vehicle.
+    /// To be called each step: whether a vehicle or an obstacle bars the start now.
     pub(crate) fn note_start_barred(&mut self, barred: bool, now: Instant) {
         self.waits.barred_start.update(barred, now);
     }
 
-    /// Time for which the start has been barred.
+    /// Time for which the start of this vehicle has been barred.
     pub(crate) fn start_barred_for(&self, now: Instant) -> Duration {
         self.waits.barred_start.lasts_for(now)
     }
 
-    /// Takes a command in and says the result; `None` for one that is not the mission's.
+    /// Stores an operator's command for the mission table. Returns its `MAV_RESULT`; `None` for a
+    /// command that is not one of the mission's.
     pub(crate) fn handle_command(&mut self, inputs: &GuardInputs, command: &Command) -> Option<u8> {
         commands::apply_command(&mut self.pending, self.state, inputs, command)
     }
 
-    /// Changes the state as a row of the table says. Returns it before and after.
+    /// Changes the state as a row says: `lands` while a place to land is sought. Returns the states
+    /// before and after.
     pub(crate) fn enter_state(
         &mut self,
         row: &TransitionRow,
@@ -218,12 +228,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         (from, to)
     }
 
-    /// The text for a change of state that interrupts another.
+    /// The STATUSTEXT that names the interrupted state; `None` if the change interrupts none.
     pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
         self.interrupted.interruption_text(from, to)
     }
 
-    /// A plan is requested: there is none, and no failure.
+    /// Forgets plan and failure, since a plan of the whole mission is requested.
     pub(crate) fn forget_plan(&mut self) {
         (self.plan, self.failure, self.division, self.left_with_all_pictures) =
             (None, None, 0, None);
@@ -232,12 +242,14 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.tasks.reset();
     }
 
-    /// A detour is requested: the plan stays until it comes.
+    /// Forgets the last failure, since a detour is requested; the plan stays until the detour
+    /// comes.
     pub(crate) fn forget_failure(&mut self) {
         self.failure = None;
     }
 
-    /// Stores the requested plan.
+    /// Stores the plan that the shell returned; one that is invalid or does not begin at the
+    /// vehicle's path start is stored as a failure.
     pub(crate) fn set_plan(&mut self, plan: &VehiclePlan<W, G>) {
         match self.starts_at(plan, &self.start) {
             true => self.begin_plan(plan),
@@ -245,7 +257,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    // Copies of it would take a kilobyte of flash each.
+    // Not inlined: each copy would take a kilobyte of flash.
     #[inline(never)]
     fn begin_plan(&mut self, plan: &VehiclePlan<W, G>) {
         self.plan = Some(plan.clone());
@@ -255,25 +267,26 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Place where the vehicle's plan ends, as a goal that is reached without a roadmap, and the
-    /// descent there, metres.
+    /// Where the vehicle's plan ends, as a goal that is reached without a roadmap, and the length
+    /// of the descent there, metres.
     pub(crate) fn home_goal(&self) -> (Goal, f32) {
         let (over, layer_m, descent_m) = self.home;
         (Goal::Home { over, layer_m }, descent_m)
     }
 
-    /// Whether the part that the last division gives has come and is not flown yet.
+    /// Whether the plan after the last division has come and is not flown yet.
     pub(crate) fn has_division(&self) -> bool {
         self.division_plan_ready
     }
 
-    /// Begins to fly the division's path.
+    /// Notes that the vehicle flies the plan after the last division from now on.
     pub(crate) fn fly_division(&mut self) {
         self.division_plan_ready = false;
     }
 
-    /// Whether the shell is to be asked for this division now; true at most once within `again`
-    /// until it answers: an answer does not say which request it is for.
+    /// Whether the shell is to be asked for the division with this hash now; if so, stores the
+    /// request. Another request is made after `again` at the earliest, or once the shell has
+    /// answered: an answer does not name its request.
     pub(crate) fn should_request_division(
         &mut self,
         fingerprint: u32,
@@ -287,18 +300,18 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         !waits
     }
 
-    /// Ends the open request; whether it was for this division.
+    /// Closes the open request for a division. Returns whether it was for the one with this hash.
     pub(crate) fn take_division_request(&mut self, fingerprint: u32) -> bool {
         self.division_requested.take().is_some_and(|(of, _)| of == fingerprint)
     }
 
-    /// Divisions that count for the plan.
+    /// Number of the fleet's committed divisions that the plan takes into account.
     pub(crate) fn division_count(&self) -> usize {
         self.division
     }
 
-    /// Takes the plan after so many divisions; it is to begin at `place`. Returns whether it does.
-    /// In the air it is flown from the next row of the table on.
+    /// Stores the plan after `division` divisions if it is valid and begins at `place`; returns
+    /// whether it does. With `in_air` the vehicle flies it once a row of the table says so.
     pub(crate) fn accept_division(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -315,12 +328,13 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         begins
     }
 
-    /// Flies on as planned after so many divisions: the last one could not be planned.
+    /// Keeps the present plan although `division` divisions count now: the last one could not be
+    /// planned.
     pub(crate) fn keep_plan_after_division(&mut self, division: usize) {
         (self.division, self.division_plan_ready) = (division, false);
     }
 
-    /// Commands what the task wants at this place of the path.
+    /// Sends the task's commands to the autopilot that are due at this place of the path.
     pub(crate) fn step_task(&mut self, along: PathProgress, now: Instant, links: &mut Links) {
         if let Some(plan) = &self.plan {
             self.tasks.step(&plan.task, &plan.path, along, now, links);
@@ -337,7 +351,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         &mut self.photographed
     }
 
-    /// Notes the pictures that it has passed, `along_m` metres along its path.
+    /// Notes as photographed the pictures of the plan that the vehicle has passed, `along_m` metres
+    /// along its path.
     pub(crate) fn note_photographed(&mut self, along_m: f32) {
         let Some(plan) = &self.plan else { return };
         if let Task::Photograph(photographs) = &plan.task {
@@ -347,25 +362,26 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// The vehicle leaves its pad to fly its plan.
+    /// Notes in the record of photographed waypoints that the vehicle leaves its pad to fly its
+    /// plan.
     pub(crate) fn leave_pad(&mut self) {
         if let Some(VehiclePlan { task: Task::Photograph(photographs), .. }) = &self.plan {
             self.photographed.leave_pad(photographs);
         }
     }
 
-    /// Takes the autopilot's answer to a command of the task's.
+    /// Handles the autopilot's COMMAND_ACK of a command of the task.
     pub(crate) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
         self.tasks.handle_ack(ack, links);
     }
 
-    /// Notes why the requested plan did not come.
+    /// Stores why the shell did not return the requested plan or detour.
     pub(crate) fn set_failure(&mut self, failure: PlanFailure) {
         self.failure = Some(failure);
     }
 
-    /// Whether all pictures of its part were taken, `along_m` metres along its path or before it
-    /// left that. A stretch is not all.
+    /// Whether all pictures of the vehicle's share are taken: `along_m` metres along its path, or
+    /// before it left that path. False where the path is only a stretch of its route.
     pub(crate) fn has_all_pictures(&self, along_m: f32) -> bool {
         self.left_with_all_pictures.unwrap_or_else(|| {
             match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
@@ -379,8 +395,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         })
     }
 
-    /// The vehicle leaves its path `along_m` metres along it: from now on places are those of
-    /// another path.
+    /// Notes pictures, and whether all are taken, as the vehicle leaves the path of its plan
+    /// `along_m` metres along it: from now on distances are along another path.
     fn leave_path(&mut self, along_m: f32) {
         if self.left_with_all_pictures.is_none() {
             self.note_photographed(along_m);
@@ -388,8 +404,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies along another path, beside the shared plan, `along_m` metres along that, above the
-    /// same ground.
+    /// Puts the detour `way` in place of the plan's path, which the vehicle leaves `along_m` metres
+    /// along it. Without gates and departure time; the climb becomes the height above the ground at
+    /// `ground_m`.
     pub(crate) fn switch_to_detour(
         &mut self,
         way: &VehiclePlan<W, G>,
@@ -408,9 +425,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies along its own path again, as it was planned, from `back_m` metres along it; it left
-    /// that at `left_m`. Returns the number of pictures between, which do not count as taken: they
-    /// show another place.
+    /// Puts the vehicle's own plan in place again, after a detour that left its path at `left_m`
+    /// and came back at `back_m` metres along it. Returns the number of pictures between: they
+    /// count as not taken, since the detour's show another place.
     pub(crate) fn resume_own_path(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -420,13 +437,14 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.begin_plan(plan);
         let Task::Photograph(photographs) = &plan.task else { return 0 };
         let taken = |along_m: f32| photographs.taken_count(&plan.path, along_m);
-        // The one at the very place is taken.
+        // The picture at the place of the return is still taken.
         self.pictures_before_rejoin = taken(back_m - TAKEN_M);
         self.pictures_before_rejoin.saturating_sub(taken(left_m))
     }
 
-    /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan:
-    /// neighbours keep clear of it as of a stranger.
+    /// Replaces the path by the one that `turn` makes of it, back to the start, as the vehicle
+    /// leaves it `along_m` metres along it. That path is not of the shared plan: neighbours keep
+    /// clear of this vehicle as of a stranger.
     pub(crate) fn reverse_path(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
@@ -436,7 +454,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Finite, from `place`, and a path wherever there is a goal.
+    /// Whether the plan's numbers are finite and its path begins at `place`; a plan that does not
+    /// leave the pad needs no path.
     pub(crate) fn starts_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
         let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)

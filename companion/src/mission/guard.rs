@@ -1,241 +1,260 @@
-//! What the rows of the table ask of a snapshot.
+//! The guards: conditions of the rows of the mission table.
 
 use super::inputs::GuardInputs;
 use crate::time::Duration;
 
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500); // Age up to which a position is known.
 
-/// Condition of a row. Every guard is a field, or a comparison of fields, of [`GuardInputs`].
+/// Condition of a row: a field of [`GuardInputs`], or a comparison of fields. "Limit" is the row's
+/// minimum duration. "MISSION_START" and other commands mean that the command is pending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
-    /// HEARTBEAT was heard within the last second and a half.
+    /// HEARTBEAT is younger than 1.5 s.
     AutopilotHeard,
     /// HEARTBEAT is older than the limit.
     NoHeartbeat,
-    /// A position is known, not older than half a second.
+    /// The position is younger than 0.5 s.
     PositionKnown,
     /// The position is older than the limit.
     NoPosition,
-    /// The position jumped, or the EKF origin moved, within the last second.
+    /// The position jumped, or the EKF origin changed, within the last second.
     PositionJumped,
-    /// Motors on and off the ground.
+    /// Motors armed, and the landing detector reports flight.
     FoundFlying,
-    /// The plan has come.
+    /// The shell has returned the vehicle's plan.
     PlanReady,
-    /// No plan will come.
+    /// The shell has answered that there is no plan.
     PlanFailed,
-    /// No plan will come, for want of the mission's roadmap.
+    /// The shell has no plan, since the roadmap is missing or not the mission's.
     RoadmapBad,
-    /// MISSION_START was commanded, there is a goal, and the estimate's bound fits into the margin.
+    /// MISSION_START, the plan leaves the pad, and the estimate's error bound fits into the margin
+    /// at cruise speed.
     StartCommanded,
-    /// MISSION_START was commanded.
+    /// MISSION_START.
     StartAgain,
     /// MISSION_START in a coverage mission.
     StartOverField,
-    /// MISSION_START, and no goal is left for this vehicle.
+    /// MISSION_START, but the plan does not leave the pad; in a coverage mission all others heard
+    /// have the same plan.
     StartWithoutGoal,
-    /// MISSION_START, but not at the start point.
+    /// MISSION_START, but the vehicle is not at its pad.
     StartElsewhere,
-    /// MISSION_START, but the motors are armed.
+    /// MISSION_START, but the motors are already armed.
     StartArmed,
-    /// MISSION_START, but the battery charge is below the configured limit.
+    /// MISSION_START, but the battery's charge is below the configured limit.
     StartBatteryLow,
-    /// MISSION_START, but outside the configured volume.
+    /// MISSION_START, but the vehicle is outside the geofence.
     StartOutside,
-    /// A fresh position, away from the start point.
+    /// The position is younger than 0.5 s, and not at the vehicle's pad.
     AwayFromStart,
-    /// Battery charge below the configured limit.
+    /// The battery's charge is below the configured limit.
     ChargeLow,
-    /// Outside the configured volume.
+    /// The vehicle is outside the geofence, or stands at it.
     Outside,
-    /// MISSION_START, and for the limit, in which it may first be reported, the estimate's bound is
-    /// worse than the margin leaves.
+    /// MISSION_START, but the estimate's error bound does not fit into the margin at cruise speed,
+    /// and the state has lasted for the limit: time for the first report of the accuracy.
     StartVague,
-    /// The estimate's bound has been worse than the margin leaves at a crawl for the limit.
+    /// The estimate's error bound has not fitted into the margin, even at crawl speed, for longer
+    /// than the limit.
     EstimateVague,
-    /// The EKF origin moved while armed.
+    /// The EKF origin moved while the motors were armed.
     OriginMoved,
-    /// The schedule's take-off is due, and the neighbours leave room.
+    /// The vehicle may take off: departure is due, and advice and safety filter leave it room.
     GatesOpen,
-    /// The state has lasted as long as the limit.
+    /// The state has lasted for the limit.
     Elapsed,
-    /// The mode is the one that follows setpoints: Offboard (PX4) or Guided (ArduCopter).
+    /// The autopilot's mode is the one that follows setpoints: Offboard (PX4) or Guided
+    /// (ArduCopter).
     Offboard,
-    /// The mode is neither the one before nor the one we asked for, and the autopilot reports no
-    /// failsafe.
+    /// The autopilot's mode is neither the one before the start nor one that the companion set, and
+    /// the autopilot reports no failsafe: the pilot changed it.
     ModeTaken,
-    /// The mode is not ours, and the autopilot reports `MAV_STATE_CRITICAL`.
+    /// The autopilot's mode is not one that the companion set, and HEARTBEAT reports
+    /// `MAV_STATE_CRITICAL` or worse.
     FailsafeActs,
-    /// Motors on.
+    /// The motors are armed.
     Armed,
-    /// Motors off.
+    /// The motors are disarmed.
     Disarmed,
-    /// Motors off, at the goal.
+    /// The motors are disarmed, and the vehicle is at its goal.
     DisarmedAtGoal,
-    /// Motors on, and the state has lasted as long as the limit.
+    /// The motors are armed, and the state has lasted for the limit.
     StaysArmed,
-    /// Motors off, the autopilot is heard, and the state has lasted as long as the limit.
+    /// The motors are disarmed, HEARTBEAT is younger than 1.5 s, and the state has lasted for the
+    /// limit.
     StaysDisarmed,
-    /// As [`Guard::StaysDisarmed`], and the start is only paused.
+    /// As [`Guard::StaysDisarmed`], while MISSION_START and DO_PAUSE_CONTINUE 0 are pending: the
+    /// start is paused, not cancelled.
     StaysDisarmedPaused,
-    /// Arming was accepted, but the armed bit did not come.
+    /// The autopilot accepted arming, but HEARTBEAT has not shown the armed bit for 2.5 s.
     ArmedUnseen,
     /// As [`Guard::ColumnBlocked`], and arming was not requested yet.
     ArmingHeld,
-    /// Arming was requested and not answered.
+    /// Arming was requested as often as allowed, and the autopilot did not answer.
     ArmingUnanswered,
-    /// Motors on, and off the ground or moving up or down.
+    /// The motors are armed, and the vehicle is in flight or moves up or down.
     InAir,
-    /// In the air, in Offboard or Guided that this companion entered, without setpoints.
+    /// The vehicle is in flight, in the Offboard or Guided that the companion entered, in a state
+    /// that sends no setpoints.
     Unattended,
-    /// Disarming was refused, and no mode lands the vehicle.
+    /// The autopilot refused to disarm, and is not in its landing mode.
     DisarmRefused,
-    /// In the air, or of an autopilot that needs no command to take off.
+    /// The landing detector reports flight; always met for an autopilot that takes off without a
+    /// command.
     LiftedOff,
-    /// At the altitude of the start point.
+    /// The vehicle has climbed to the start of its path.
     ClimbDone,
-    /// At the end of the path, and the neighbours leave room to land.
+    /// The vehicle is at the end of its path and may land there.
     PathDone,
-    /// No progress along the path for the limit.
+    /// The vehicle has made no progress along its path for the limit.
     Stalled,
-    /// For the limit the vehicle has not come to its setpoint: something holds it, or carries it
-    /// away.
+    /// For the limit the vehicle has not come to its setpoint, nor has the setpoint moved on:
+    /// something holds the vehicle, or carries it away.
     Unfollowed,
-    /// DO_PAUSE_CONTINUE 0.
+    /// DO_PAUSE_CONTINUE 0 (pause).
     PauseCommanded,
-    /// DO_PAUSE_CONTINUE 1.
+    /// DO_PAUSE_CONTINUE 1 (resume).
     ResumeCommanded,
-    /// A fresh position, and the way back to the path is free.
+    /// The position is younger than 0.5 s, and near enough to the path to fly back to it.
     BackOnPath,
-    /// A fresh position, but elsewhere than where it stopped on the path.
+    /// The position is younger than 0.5 s, and too far from the path to fly back to it.
     BackOffPath,
-    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, and the way back to the interrupted state is free.
+    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, and the vehicle is near enough to its path to fly
+    /// back to it.
     ResumedOnPath,
-    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, but too far from the path.
+    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, and the vehicle is too far from its path.
     ResumedOffPath,
-    /// DO_PAUSE_CONTINUE 0, and the state has lasted as long as the limit.
+    /// DO_PAUSE_CONTINUE 0, and the state has lasted for the limit.
     PausedOnPad,
     /// NAV_LAND.
     LandCommanded,
-    /// NAV_LAND, motors on, in Offboard or Guided.
+    /// NAV_LAND, motors armed, and Offboard or Guided.
     LandUnattended,
     /// NAV_RETURN_TO_LAUNCH.
     ReturnCommanded,
-    /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
+    /// NAV_RETURN_TO_LAUNCH before the climb is done.
     ReturnInClimb,
-    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the path home is planned.
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home over the field can be planned.
     ReturnOverField,
-    /// In a coverage mission the path has been blocked for the limit, and the path home can be
+    /// In a coverage mission: the path has been blocked for the limit, and a path home can be
     /// planned.
     BlockedOverField,
-    /// As [`Guard::BlockedOverField`], and the vehicle may fly around what blocks it and back to
-    /// its path.
+    /// In a coverage mission: the path has been blocked for the limit, and the vehicle may fly
+    /// around the obstacle and back to its path.
     AroundOverField,
-    /// The vehicle stands where its detour comes back to its path.
+    /// The vehicle stands at the end of its detour, back on its path.
     AroundFlown,
-    /// The vehicle stands where its detour comes back to its path, and its own plan has come.
+    /// As [`Guard::AroundFlown`], and the rest of the vehicle's own plan has come.
     OwnPlanReady,
-    /// The vehicle stands where its detour comes back to its path, and no own plan will come.
+    /// As [`Guard::AroundFlown`], but the rest of the vehicle's own plan could not be planned.
     OwnPlanLost,
-    /// As [`Guard::BlockedOverField`], but the safety filter has made the vehicle yield for the
-    /// limit.
+    /// In a coverage mission: the safety filter has made the vehicle yield for the limit, and a
+    /// path home can be planned.
     YieldedOverField,
-    /// As [`Guard::BlockedOverField`], but the safety filter has hindered the vehicle for the
-    /// limit.
+    /// In a coverage mission: the safety filter has kept the vehicle from moving on for the limit,
+    /// and a path home can be planned.
     HinderedOverField,
-    /// As [`Guard::Stalled`] where the path home can be planned.
+    /// In a coverage mission: no progress along the path for the limit, and a path home can be
+    /// planned.
     StalledOverField,
-    /// The vehicle is to fly home, and stands.
+    /// The vehicle seeks a path home, stands, and may request it from the shell.
     StandsToReturn,
-    /// The way home has come.
+    /// The path home has come.
     WayHomeReady,
-    /// No way home was found for the limit, and the vehicle can fly back as it came.
+    /// No path home was found for the limit, and the vehicle can turn back along the path that it
+    /// flew.
     NoWayHome,
-    /// The safety filter finds another vehicle in the column to the ground.
+    /// Another vehicle is, or may be, in the column below, and nothing forces this vehicle to land.
     LandingBlocked,
-    /// No vehicle was in the column for the limit.
+    /// The column below has been free of other vehicles for the limit.
     LandingClear,
-    /// The column was occupied for the limit (5 s by a vehicle that rests), and the path leads to
-    /// the pad.
+    /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and the
+    /// vehicle can turn back along its path to the pad.
     NoRoomToLand,
-    /// Before the take-off: the column above has not been free for the limit.
+    /// Before take-off: the column above the pad has not been free for the limit.
     ColumnBlocked,
-    /// Over an area, on the pad: another vehicle has been above it, or something on the path, for
-    /// the limit, and others fly on.
+    /// In a coverage mission, on the pad: a vehicle above the pad or an obstacle on the path has
+    /// barred the start for the limit, and another vehicle that takes part flies.
     StartBarred,
-    /// The safety filter has made this vehicle yield for the limit, and it does not seek its path
+    /// The safety filter has made this vehicle yield for the limit, and the vehicle seeks no path
     /// home.
     Yielded,
-    /// The safety filter has kept this vehicle from continuing for the limit, and it does not seek
-    /// its path home.
+    /// The safety filter has kept this vehicle from moving on for the limit, and the vehicle seeks
+    /// no path home.
     Hindered,
-    /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be
-    /// sought.
+    /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and a
+    /// place aside to land at may be sought.
     NoRoomHere,
-    /// The way back to its pad, or the end of a path over an area, has been barred for the limit by
-    /// a vehicle that rests, or the descent of one that flies back by any.
+    /// For the limit the descent to its pad on the way home was blocked by any vehicle, or the way
+    /// home, or the end of a coverage path, by one that rests for good.
     PadTaken,
-    /// No place aside to land at exists, or the answer has not come within the limit.
+    /// A place aside to land at was sought, but none exists, or the shell has not answered within
+    /// the limit.
     NoPlaceAside,
     /// The vehicle stands at the place aside where it is to land.
     AsideReached,
-    /// Battery charge below half of the configured limit.
+    /// The battery's charge is below half of the configured limit.
     BatteryCritical,
-    /// Battery charge below the configured limit, no neighbour below, and no place aside to land at
-    /// sought or flown to.
+    /// The battery's charge is below the configured limit, no neighbour is below, and the vehicle
+    /// neither seeks nor flies to a place aside to land at.
     BatteryLow,
-    /// Outside the configured volume, and no neighbour below.
+    /// The vehicle is outside the geofence or stands at it, and no neighbour is below.
     OutsideGeofence,
-    /// None of the neighbours that fly was heard for the limit.
+    /// For longer than the limit no neighbour that flies was heard, or none reported that it hears
+    /// this vehicle.
     NeighboursSilent,
-    /// The vehicle's next gate is open, or none is left.
+    /// The vehicle may fly on unheard: its next gate is open, or none is left.
     WayFree,
-    /// All others are out of radio range, and the state has lasted for the limit.
+    /// All others were last heard near the edge of the radio range, and the state has lasted for
+    /// the limit.
     OutOfRange,
-    /// A neighbour was heard within the last second.
+    /// In the last second a neighbour was heard, and one reported that it hears this vehicle.
     NeighbourHeard,
-    /// On the ground after a flight or in the mode that lands, and at rest.
+    /// The landing detector reports ground after a flight or in the landing mode, and the vehicle
+    /// does not move up or down.
     OnGround,
-    /// A vehicle that left the plan, or an obstacle, blocks the path, or this vehicle left the plan
-    /// itself.
+    /// An obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle seeks a
+    /// path home.
     PathBlocked,
-    /// No keep-out zone blocks the path any more.
+    /// No obstacle or vehicle that left the plan is on the path ahead any more.
     PathClear,
-    /// The path is blocked, all others stand, and it is this vehicle's turn.
+    /// The path is blocked, all others stand, and it is this vehicle's turn to fly a detour.
     OurTurn,
-    /// The detour has come.
+    /// The shell has returned the requested detour.
     DetourReady,
-    /// No detour exists.
+    /// The shell found no detour.
     DetourFailed,
-    /// Several searches found no detour, and no neighbour is below.
+    /// Several searches found no detour, and no neighbour is below: the vehicle can land.
     NoWayAround,
-    /// Several searches found no detour, a neighbour lies below, and the path leads back to the
-    /// pad.
+    /// Several searches found no detour, and the vehicle can turn back along its path to the pad.
     NoWayOn,
-    /// For the limit the vehicle waited below one that lands without looking, and its path led
-    /// nowhere better.
+    /// For longer than the limit the vehicle has waited below one that lands, with no better place
+    /// along its path.
     Underneath,
-    /// Standing still.
+    /// Setpoint and vehicle stand.
     Standing,
-    /// Others have divided the share of this vehicle, or count it as lost.
+    /// Others have divided this vehicle's share of the area, or count this vehicle as lost.
     Excluded,
-    /// Others on the ground know of more photographed waypoints than the plan leaves out.
+    /// The waypoints that this vehicle's plan is to leave out have changed since the plan was
+    /// requested.
     MoreIsDone,
-    /// A vehicle that follows another plan of this mission is heard.
+    /// A vehicle that follows another plan of this mission has been heard, and the state has lasted
+    /// for the limit.
     PlansDiffer,
-    /// The vehicle stands as far along its path as it promised to fly before the division.
+    /// The vehicle stands at its commitment, as far as it was to fly before the division.
     HoldsToDivide,
-    /// The division counts, and its part of that has come.
+    /// The division is committed, and this vehicle's plan after it has come.
     DivisionReady,
-    /// No division is under way any more.
+    /// No division is under way or outstanding any more.
     NothingToDivide,
 }
 
-/// Age up to which HEARTBEAT counts as heard: it comes at 1 Hz, and one late is not yet silence.
+/// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
+/// and one late is not yet silence.
 pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
-    /// Whether the condition is met and has been met for `limit`.
+    /// Whether the condition is met, and where it has a duration, has been met for `limit`.
     pub fn is_met(self, i: &GuardInputs, limit: Duration) -> bool {
         match self {
             Self::AutopilotHeard => i.heartbeat_age < MAX_HEARTBEAT_AGE,

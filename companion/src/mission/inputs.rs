@@ -1,198 +1,222 @@
-//! What the guards of the table are asked of: a snapshot.
+//! The inputs of the guards of the mission table.
 
 use crate::time::Duration;
 
-/// Inputs of the guards: a snapshot of the vehicle, the commands and the plan.
+/// Snapshot of the vehicle, of pending commands, of neighbours and of the plan, by which the guards
+/// are evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuardInputs {
-    /// Time in the state.
+    /// Time since the mission state was entered.
     pub in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
     pub heartbeat_age: Duration,
     /// Time since the last usable position.
     pub position_age: Duration,
-    /// The position jumped lately.
+    /// Whether the position jumped, or the EKF origin changed, within the last second.
     pub jumped: bool,
-    /// Time without progress along the path.
+    /// Time since this vehicle last made progress along its path; zero in states other than
+    /// `Follow` and `Blocked`.
     pub stalled_for: Duration,
-    /// Time for which the vehicle has not come to its setpoint, and the setpoint has not gone on.
+    /// Time for which this vehicle has neither come to its setpoint nor its setpoint moved on.
     pub unfollowed_for: Duration,
-    /// Time since its path was first blocked, short of where it has come no further; clear in
-    /// between or not.
+    /// Time since this vehicle's path was first found blocked at the place beyond which it has not
+    /// come since, even if the path was clear meanwhile.
     pub blocked_for: Duration,
-    /// Time in the state without any neighbour heard; zero when all have landed.
+    /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
+    /// vehicle, in this state; zero once all have landed or left the plan.
     pub neighbour_age: Duration,
-    /// Whether its next gate is open, so that it flies on unheard.
+    /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
+    /// gate is open or none is left.
     pub way_free: bool,
-    /// All others are out of radio range.
+    /// Whether all other vehicles that still fly were last heard near the edge of the radio range.
     pub out_of_range: bool,
-    /// A neighbour was heard within the last second.
+    /// Whether in the last second a neighbour was heard, and one reported that it hears this
+    /// vehicle; in a coverage mission a majority of them.
     pub neighbour_heard: bool,
-    /// Others have divided the share of this vehicle, or count it as lost.
+    /// Whether other vehicles have divided this vehicle's share of the area, or count this vehicle
+    /// as lost.
     pub excluded: bool,
-    /// More is photographed than its plan leaves out.
+    /// Whether the waypoints that this vehicle's plan is to leave out have changed since the plan
+    /// was requested.
     pub more_is_done: bool,
-    /// Another plan of this mission is heard.
+    /// Whether a neighbour that follows another plan of this mission was heard lately.
     pub plans_differ: bool,
-    /// The vehicle stands where it promised to wait for a division.
+    /// Whether this vehicle stands at its commitment: where it is to wait for the division under
+    /// way.
     pub holds_to_divide: bool,
-    /// The part that the last division gives has come.
+    /// Whether this vehicle's plan after the last division has come and is not flown yet.
     pub division_ready: bool,
-    /// No division is under way.
+    /// Whether no division is under way or outstanding, nor this vehicle's own plan after a detour.
     pub undivided: bool,
-    /// A plan is held.
+    /// Whether the shell has returned the requested plan.
     pub plan_ready: bool,
-    /// The shell has none.
+    /// Whether the shell answered the request for a plan or detour with a failure.
     pub plan_failed: bool,
-    /// The shell has none because the roadmap is missing or not the mission's.
+    /// Whether the shell has no plan because the roadmap is missing or not the mission's.
     pub roadmap_bad: bool,
-    /// The plan has a goal.
+    /// Whether the plan makes this vehicle leave its pad.
     pub has_goal: bool,
-    /// In a coverage mission: all vehicles heard have this one's plan, and had time to report
-    /// otherwise.
+    /// In a coverage mission: whether all neighbours heard have this vehicle's plan, after time
+    /// enough to report another one. True in other missions.
     pub plans_as_others: bool,
-    /// Near the pad below the start point, in height too.
+    /// Whether the position is within the start tolerance of the pad, horizontally and in height.
     pub at_start: bool,
-    /// On the pad: the estimate's bound does not fit into the margin at cruise speed.
+    /// Whether, in `Ready`, the position estimate's error bound exceeds what the margin leaves for
+    /// it at cruise speed.
     pub imprecise: bool,
-    /// Time for which it has not even fitted at a crawl.
+    /// Time for which that bound has exceeded what the margin leaves for it even at crawl speed.
     pub imprecise_for: Duration,
-    /// The EKF origin moved while armed.
+    /// Whether the EKF origin moved while the motors were armed.
     pub origin_moved: bool,
-    /// MISSION_START holds.
+    /// Whether MISSION_START is pending.
     pub start: bool,
-    /// DO_PAUSE_CONTINUE 0 holds.
+    /// Whether DO_PAUSE_CONTINUE 0 is pending.
     pub pause: bool,
-    /// DO_PAUSE_CONTINUE 1 holds.
+    /// Whether DO_PAUSE_CONTINUE 1 is pending.
     pub resume: bool,
-    /// NAV_LAND holds.
+    /// Whether NAV_LAND is pending.
     pub land: bool,
-    /// NAV_RETURN_TO_LAUNCH holds.
+    /// Whether NAV_RETURN_TO_LAUNCH is pending and this vehicle does not fly back yet.
     pub turn_back: bool,
-    /// The mission is a coverage mission.
+    /// Whether the mission is a coverage mission.
     pub area: bool,
-    /// In a coverage mission: the path home can be planned from here.
+    /// Whether, in a coverage mission, a path home over the field of heights can be requested from
+    /// here.
     pub over_field: bool,
-    /// It is on the last descent of its path, above its pad.
+    /// Whether this vehicle is on the last descent of its path, above its pad.
     pub descends: bool,
-    /// The vehicle may fly around what blocks its path, and back to its path.
+    /// Whether this vehicle stands and may fly around the obstacle on its path and back to its
+    /// path.
     pub may_fly_beside: bool,
-    /// The vehicle stands where its detour comes back to its path.
+    /// Whether this vehicle stands at the end of its detour, back on its path.
     pub around_flown: bool,
-    /// The vehicle's own plan has come there.
+    /// Whether the rest of its own plan has come there.
     pub own_plan_ready: bool,
-    /// The vehicle's own plan will not come there.
+    /// Whether the rest of its own plan could not be planned there.
     pub own_plan_lost: bool,
-    /// The vehicle is to fly home, or does.
+    /// Whether this vehicle flies its path home over the field, or seeks one.
     pub homeward: bool,
-    /// Time for which the vehicle has sought its path home, if it does.
+    /// Time for which this vehicle has sought its path home; `None` if it seeks none.
     pub seeking_home_for: Option<Duration>,
-    /// The vehicle stands, and may request its path home.
+    /// Whether this vehicle stands, seeks its path home, and may request it from the shell now.
     pub stands_to_return: bool,
-    /// The climb is not done: it continues after the interruption.
+    /// Whether the flight, apart from interruptions, is still in the take-off or the climb.
     pub in_climb: bool,
-    /// Motors on.
+    /// Whether the autopilot reports the motors armed.
     pub armed: bool,
-    /// Arming was accepted, and the armed bit is overdue.
+    /// Whether the autopilot accepted arming 2.5 s ago or more, so that HEARTBEAT should show it.
     pub armed_unseen: bool,
-    /// Arming was not requested yet.
+    /// Whether arming has not been requested yet.
     pub arming_unrequested: bool,
-    /// Arming was requested as often as allowed, and not answered.
+    /// Whether arming has failed for want of an answer from the autopilot.
     pub arming_unanswered: bool,
-    /// Disarming was refused.
+    /// Whether the autopilot refused to disarm in this state.
     pub disarm_refused: bool,
-    /// The setpoint mode was entered for this mission and not left since.
+    /// Whether the autopilot is still in Offboard or Guided as entered for this mission, or in the
+    /// landing mode after it.
     pub own_mode: bool,
-    /// The mode is the one that lands.
+    /// Whether the autopilot's mode is the landing mode.
     pub landing: bool,
-    /// The mode is Offboard or Guided.
+    /// Whether the autopilot's mode is Offboard or Guided.
     pub offboard: bool,
-    /// The mode is neither the one before nor the one asked for.
+    /// Whether the autopilot's mode is neither the one before the start nor one that the companion
+    /// set, so that a pilot or a failsafe has changed it.
     pub mode_foreign: bool,
-    /// `MAV_STATE_CRITICAL` or worse.
+    /// Whether HEARTBEAT reports `MAV_STATE_CRITICAL` or worse.
     pub critical: bool,
-    /// The landing detector reports ground.
+    /// Whether the landing detector reports the vehicle on the ground.
     pub on_ground: bool,
-    /// The landing detector reported flight since the motors were armed.
+    /// Whether the landing detector has reported flight since arming was requested.
     pub has_flown: bool,
-    /// Moves up or down.
+    /// Whether the vehicle moves up or down by more than 0.5 m/s.
     pub vertical: bool,
-    /// Motors on, and the landing detector reports flight.
+    /// Whether the motors are armed and the landing detector reports flight.
     pub airborne: bool,
-    /// The landing detector reports flight, or no row waits for that report.
+    /// Whether the landing detector reports flight; always true for an autopilot that takes off
+    /// without a command.
     pub lifted_off: bool,
-    /// The neighbours leave room to go.
+    /// Whether the vehicle may take off: its departure is due, advice and safety filter leave it
+    /// room, the battery's charge is known, and it is heard.
     pub gates_open: bool,
-    /// At the altitude of the start.
+    /// Whether the vehicle has climbed to the start of its path.
     pub climb_done: bool,
-    /// At the end of the path with room to land.
+    /// Whether the vehicle is at the end of its path and may land there, or is on the ground in its
+    /// last descent.
     pub path_done: bool,
-    /// The path was flown to the goal.
+    /// Whether the vehicle is at the goal of its plan.
     pub at_goal: bool,
-    /// The way back to the path is free.
+    /// Whether the vehicle is near enough to its path to fly back to it, in the states that wait
+    /// for that.
     pub near_path: bool,
-    /// Time for which another vehicle has been in the column to the ground, or before take-off in
-    /// the column to its top.
+    /// Time for which the column below the vehicle, before take-off the column above its pad, has
+    /// not been free of other vehicles.
     pub column_blocked_for: Duration,
-    /// Time for which a vehicle that stands for good, or is lost, has been in that column.
+    /// Time for which a vehicle that rests for good, or is lost, has been in that column.
     pub column_blocked_for_good_for: Duration,
-    /// Time for which the column, or the path, has kept the vehicle on its pad.
+    /// Time for which another vehicle in that column, or an obstacle on the path, has kept this
+    /// vehicle on its pad.
     pub start_barred_for: Duration,
-    /// Over an area another vehicle is in flight that takes part.
+    /// Whether, in a coverage mission, another vehicle that takes part is in flight.
     pub others_fly: bool,
-    /// Time for which that column has been free.
+    /// Time for which that column has been free of other vehicles.
     pub column_clear_for: Duration,
-    /// On its path, and not on the way back yet; over a field only while it finds no way home.
+    /// Whether the vehicle can turn back along the path flown so far: it is on that path and does
+    /// not fly back yet. In a coverage mission only while it seeks a path home.
     pub can_turn_back: bool,
-    /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the
-    /// way, and at the end of a path over an area the descent, by one that stands for good.
+    /// Time for which the last leg of this vehicle has been blocked: the descent to its pad on a
+    /// way home by any vehicle, the way home itself, and at the end of a coverage path the descent,
+    /// by one that rests for good.
     pub pad_blocked_for: Duration,
-    /// A place aside to land at may be sought.
+    /// Whether a place aside to land at may be sought.
     pub can_land_aside: bool,
-    /// A place aside to land at is sought.
+    /// Whether a place aside to land at is being sought.
     pub seeks_landing: bool,
-    /// Such a place is sought, or flown to.
+    /// Whether a place aside to land at is being sought or flown to.
     pub lands_aside: bool,
-    /// The vehicle stands at the end of the path aside.
+    /// Whether the vehicle stands at the end of its path to a place aside where it is to land.
     pub aside_reached: bool,
-    /// The vehicle must land: the battery is nearly empty, or the place to hold at is unknown.
+    /// Whether the vehicle must land whatever is below it: the battery is nearly empty, or the
+    /// position is not known.
     pub must_land: bool,
-    /// Time for which the safety filter has made it yield.
+    /// Time for which the safety filter has made this vehicle yield to another.
     pub yielded_for: Duration,
-    /// Time for which the safety filter has kept it from moving on.
+    /// Time for which the safety filter has kept this vehicle from moving on.
     pub hindered_for: Duration,
-    /// Battery charge below the configured limit.
+    /// Whether the battery's charge is below the configured limit.
     pub battery_low: bool,
-    /// Battery charge below half of it.
+    /// Whether the battery's charge is below half of the configured limit.
     pub battery_critical: bool,
-    /// No neighbour is in the column to the ground.
+    /// Whether no neighbour was last heard below this vehicle, near its vertical.
     pub room_below: bool,
-    /// Outside the geofence.
+    /// Whether the vehicle is outside its geofence, or stands at it.
     pub outside: bool,
-    /// An obstacle or a vehicle out of the plan is on the path ahead.
+    /// Whether an obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle
+    /// seeks its path home.
     pub blocked: bool,
-    /// All others stand, and it is this vehicle's turn to fly around.
+    /// Whether all others stand and it is this vehicle's turn to fly a detour.
     pub our_turn: bool,
-    /// The detour has come.
+    /// Whether the requested detour has come.
     pub detour_ready: bool,
-    /// No detour was found, often enough.
+    /// Whether the search for a detour has been given up after several failures.
     pub no_way_around: bool,
-    /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
+    /// Time for which the vehicle has waited below one that lands, without a place along its path
+    /// to evade to.
     pub time_below_landing: Duration,
-    /// The vehicle moves more slowly than a hovering vehicle sways.
+    /// Whether setpoint and vehicle stand: the vehicle is slower than a hovering one that sways.
     pub standing: bool,
 }
 
-/// Longest wait above a vehicle that rests: a vehicle that rests makes no room.
+/// Longest time that a vehicle waits above one that rests for good, which will not leave.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
 impl GuardInputs {
-    /// Whether it may turn home over a field, and has not yet.
+    /// Whether the vehicle can request a path home over the field, and does not seek one yet.
     pub(super) fn may_turn_home(&self) -> bool {
         self.over_field && self.seeking_home_for.is_none()
     }
 
-    /// Whether the column has not been free for `limit`, or a vehicle stands in it for good.
+    /// Whether the column below has not been free for `limit`, or a vehicle that rests for good has
+    /// been in it for 5 s (`MAX_WAIT_ABOVE_RESTING`).
     pub(super) fn is_landing_blocked_for(&self, limit: Duration) -> bool {
         self.column_blocked_for >= limit
             || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING

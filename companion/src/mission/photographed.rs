@@ -1,12 +1,12 @@
-//! Which waypoints of an area are photographed: over flights, restarts and vehicles, so that a new
-//! start flies the rest.
+//! The waypoints of an area that are known to be photographed, by any vehicle, in earlier flights
+//! and before restarts, so that a new start flies the rest.
 //!
-//! A set of numbers that only grows: lost, repeated and reordered reports do no harm. Before it
-//! starts a vehicle takes in what all others on the ground know, so that all plan the rest of the
-//! same set; where others fly already it takes the set of theirs. A start waits while another plan
-//! is heard. In flight it notes what it photographs, and what it hears of others, for the start
-//! after. An area that is whole is begun again: that is another round, and what is known of a round
-//! before does not count.
+//! It is a set that only grows, so lost, repeated and reordered reports do no harm. Before it
+//! starts, a vehicle adds what all others on the ground know, so that all plan the rest of the same
+//! set. Where others already fly, it takes the set that their plans leave out. A start waits while
+//! another plan is heard. In flight the vehicle notes what it photographs and what others report,
+//! for its next start. An area that is photographed as a whole is begun again: that is another
+//! round, and waypoints of earlier rounds do not count.
 
 use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
@@ -14,45 +14,45 @@ use crate::link::done::{DoneReport, MAX_RANGES, RANGE_LEN, decode_range, encode_
 use crate::storage::store::{self, MAX_PROGRAM};
 use crate::time::{Duration, Instant};
 
-/// Most ranges of waypoints that are known to be photographed; a waypoint outside them is
+/// Most ranges of waypoints known to be photographed; a waypoint that fits into none is
 /// photographed again.
 pub const MAX_DONE_RANGES: usize = 40;
-/// Newly photographed waypoints after which the ranges are stored in flash again.
+/// Number of newly photographed waypoints after which the ranges are written to flash again.
 const STORE_EVERY_WAYPOINTS: u32 = 10;
-/// Time for which the ranges reported by vehicles in flight count, instead of what vehicles on the
-/// ground know: reports in flight come at least this often.
+/// Time for which a set reported by vehicles in flight, as what their plans leave out, has priority
+/// over reports from vehicles on the ground. Vehicles in flight report more often than this.
 const FLIGHT_REPORT_LIFETIME: Duration = Duration::from_secs(25);
-/// Bytes before the ranges: mission CRC and round.
+/// Bytes of a flash record before its ranges: mission CRC and round.
 const HEADER_LEN: usize = 5;
 const _: () = assert!(HEADER_LEN + MAX_DONE_RANGES * RANGE_LEN <= MAX_PROGRAM);
 
 /// The photographed waypoints of an area.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PhotographedWaypoints {
-    /// Number of times that the area was begun again.
+    /// Number of times that the area was begun again from its first waypoint.
     round: u8,
-    /// Waypoints that the plan leaves out, or will.
+    /// Waypoints that this vehicle's plan leaves out, or its next plan will.
     left_out_by_plan: WaypointSet<MAX_DONE_RANGES>,
-    /// All that is known.
+    /// Waypoints of this round that are known to be photographed.
     known: WaypointSet<MAX_DONE_RANGES>,
-    /// Number of waypoints that the flash has.
+    /// Number of known waypoints in the last flash record.
     stored_count: u32,
-    /// Whether `before` has changed since a plan was requested.
+    /// Whether `left_out_by_plan` has changed since the plan was requested.
     outdated: bool,
-    /// Round of the plan.
+    /// Round for which the plan was requested.
     planned_round: u8,
-    /// Whether it has flown since.
+    /// Whether the vehicle has left its pad since the plan was requested.
     has_flown: bool,
-    /// When one in flight last reported what its plan leaves out.
+    /// When a vehicle in flight last reported what its plan leaves out.
     followed_at: Option<Instant>,
-    /// With this range the next report begins.
+    /// Index of the first range of the next report.
     next_range: usize,
-    /// Whether that is of what its plan leaves out.
+    /// Whether the last report was of the waypoints that the plan leaves out.
     reports_plan: bool,
 }
 
 impl PhotographedWaypoints {
-    /// Restores the record of this mission from flash.
+    /// Restores the waypoints from a flash record, if that is of this mission.
     pub(crate) fn restore(&mut self, kept: &[u8], mission_crc: u32) {
         let Some((head, ranges)) = kept.split_at_checked(HEADER_LEN) else { return };
         if head[..4] != mission_crc.to_le_bytes() {
@@ -65,7 +65,8 @@ impl PhotographedWaypoints {
         self.left_out_by_plan = self.known.clone();
     }
 
-    /// The record for the flash, if it is worth one: at once where no further waypoint is to come.
+    /// The flash record to be written now. `None` unless 10 more waypoints are known than in the
+    /// last record (`STORE_EVERY_WAYPOINTS`), with `at_once` one more, or fewer.
     pub(crate) fn record_to_store(
         &mut self,
         mission_crc: u32,
@@ -74,13 +75,13 @@ impl PhotographedWaypoints {
         let count = self.known.count();
         let least =
             if at_once { self.stored_count + 1 } else { self.stored_count + STORE_EVERY_WAYPOINTS };
-        // Fewer than before: another round.
+        // Fewer waypoints than in the last record belong to another round.
         if (self.stored_count..least).contains(&count) {
             return None;
         }
         self.stored_count = count;
         let mut kept = store::Photographed::new();
-        // Both fit: `HEADER_LEN` and `MAX_DONE_RANGES` ranges are no more than a block.
+        // Both fit: mission CRC, round and the most ranges are no longer than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
         self.known
@@ -90,7 +91,8 @@ impl PhotographedWaypoints {
         Some(kept)
     }
 
-    /// A plan is requested: it leaves out what is known, or nothing.
+    /// Prepares the request for a plan: with `resumes` it leaves out the known waypoints, else
+    /// none, in a new round.
     pub(crate) fn begin_plan(&mut self, resumes: bool) {
         if !resumes {
             self.begin_round();
@@ -101,23 +103,25 @@ impl PhotographedWaypoints {
         (self.planned_round, self.has_flown, self.outdated) = (self.round, false, false);
     }
 
-    /// Waypoints that the plan leaves out.
+    /// Waypoints that the vehicle's plan leaves out.
     pub(crate) fn waypoints_left_out(&self) -> &[WaypointRange] {
         self.left_out_by_plan.ranges()
     }
 
-    /// Whether more is known to be done than the plan leaves out.
+    /// Whether the waypoints that the plan is to leave out have changed since the plan was
+    /// requested.
     pub(crate) fn is_outdated(&self) -> bool {
         self.outdated
     }
 
-    /// Number of waypoints that are known to be photographed.
+    /// Number of waypoints known to be photographed.
     pub(crate) fn count(&self) -> u32 {
         self.known.count()
     }
 
-    /// The vehicle leaves its pad. Where the area was whole the plan is for all of it again:
-    /// another round, unless one that left before has said so.
+    /// Notes that the vehicle leaves its pad. If the known set was the whole area, the plan is for
+    /// all of it again and a new round begins, unless a vehicle that left before has reported that
+    /// round.
     pub(crate) fn leave_pad(&mut self, photographs: &PicturePlan) {
         self.has_flown = true;
         let whole = photographs.area() > 0 && self.left_out_by_plan.count() >= photographs.area();
@@ -126,25 +130,25 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// Begins a new round: waypoints of an earlier round do not count any more.
+    /// Begins a new round: the known waypoints, of the earlier round, no longer count.
     fn begin_round(&mut self) {
         self.round = self.round.wrapping_add(1);
         self.known.clear();
     }
 
-    /// Notes these pictures of the path.
+    /// Adds the waypoints that these pictures of the path show.
     pub(crate) fn note_pictures<const W: usize>(
         &mut self,
         photographs: &PicturePlan,
         path: &Path<W>,
         pictures: WaypointRange,
     ) {
-        // A waypoint that does not fit is photographed again.
+        // A waypoint for which no range is left is photographed again.
         photographs.shown_waypoints(path, pictures).for_each(|range| _ = self.known.insert(range));
     }
 
-    /// Handles a report of photographed waypoints from another vehicle. `waits`: this one stands on
-    /// the ground, and is to plan as others do.
+    /// Handles another vehicle's report of photographed waypoints. `waits`: this vehicle stands on
+    /// the ground and must plan as others do.
     pub(crate) fn handle_report(&mut self, report: &DoneReport, waits: bool, now: Instant) {
         if report.is_left_out_by_plan {
             if waits {
@@ -174,7 +178,7 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// Adopts the plan inputs of a vehicle that has already started.
+    /// Leaves out of the next plan what the plan of a vehicle leaves out that has already started.
     fn adopt_plan_of(&mut self, report: &DoneReport, now: Instant) {
         self.followed_at = Some(now);
         if self.left_out_by_plan.ranges() != &report.ranges[..] {
@@ -184,8 +188,9 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// The report to other vehicles, one part after the other; in flight, in turn, the waypoints
-    /// that the plan leaves out, if one report holds them.
+    /// This vehicle's next report: 19 ranges (`MAX_RANGES`) of the known waypoints in turn. In
+    /// flight every other report has the waypoints that the plan leaves out, if one report holds
+    /// them.
     pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
         let plan =
             flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;

@@ -1,92 +1,96 @@
-//! A row of the mission's table, and what it does.
+//! A row of the mission table, and the actions that rows have.
 
 use super::guard::Guard;
 use super::state::{State, TargetState};
 use crate::time::Duration;
 
-/// Action of a row, in addition to the change of state.
+/// What the companion does when a row is taken, in addition to the change of state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// No effect.
+    /// Nothing.
     None,
-    /// Ask for the streams and the EKF origin.
+    /// Request streams and limit parameters from the autopilot.
     Connect,
-    /// Ask the shell for a plan.
+    /// Request the vehicle's plan from the shell.
     RequestPlan,
-    /// Forget MISSION_START.
+    /// Clear all pending commands, MISSION_START among them.
     ForgetStart,
-    /// Hold here, from now on.
+    /// Hold the current position from now on.
     HoldHere,
-    /// Ask for Offboard or Guided, again every second.
+    /// Request Offboard or Guided from the autopilot, every second.
     RequestOffboard,
-    /// Ask to arm, again every second.
+    /// Request arming from the autopilot; a denied request is repeated after a second.
     RequestArming,
-    /// Ask for NAV_TAKEOFF to the height of the climb, again every four seconds.
+    /// Request NAV_TAKEOFF from the autopilot, to the height of the climb, every four seconds.
     RequestTakeOff,
-    /// Begin the climb.
+    /// Let the setpoint climb from the current position to the start of the path.
     BeginClimb,
-    /// Hold where the landing was stopped, and ask for Offboard or Guided, again every second.
+    /// Hold where the landing was stopped, and request Offboard or Guided, every second.
     HoldOver,
-    /// Let the reference run along the path.
+    /// Let the reference move on along the path.
     FollowPath,
-    /// Brake the reference along the path.
+    /// Brake the reference to a stop along the path.
     BrakeOnPath,
-    /// Continue in the interrupted state: from the nearest point of the path, from here in a climb
-    /// or a descent.
+    /// Resume the interrupted state: from the nearest point of the path, in a climb or a descent
+    /// from the current position.
     Rejoin,
-    /// Fly the path flown so far back to the start.
+    /// Reverse the path flown so far, and fly it back to the start.
     TurnBack,
-    /// Ask for AUTO.LAND or LAND, again every second.
+    /// Request the landing mode from the autopilot (AUTO.LAND or LAND), every second.
     RequestLandMode,
-    /// Ask the shell for a detour, from here.
+    /// Request a detour to the goal from the shell, from where the vehicle stands.
     RequestDetour,
-    /// Brake the reference along the path, to fly home from there.
+    /// Brake the reference to a stop along the path, to request a path home from there.
     TurnHome,
-    /// Ask the shell for the path home over a field, from here.
+    /// Request a path home over the field of heights from the shell, from where the vehicle stands.
     RequestPathHome,
-    /// Ask the shell for a detour and back to its own path over a field, from here.
+    /// Request from the shell a detour over the field of heights that leads back to the vehicle's
+    /// own path.
     RequestDetourBackToPath,
-    /// Ask the shell for a way aside, from here.
+    /// Brake, and request from the shell a path to a place aside, out of the column of a vehicle
+    /// that lands.
     RequestDetourAside,
-    /// Ask the shell for a way aside, from here, to land there.
+    /// Request from the shell a path to a place aside where the vehicle can land.
     RequestLanding,
-    /// Give the shell up, this time.
+    /// Count the request for a detour as failed: the shell has not answered in time.
     NoteDetourFailure,
-    /// Fly it.
+    /// Fly the detour that the shell has returned.
     FlyDetour,
-    /// Fly the part of the area that the division gives.
+    /// Fly the path that the last division of the area gives this vehicle, or its own path again
+    /// after a detour.
     FlyDivision,
-    /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so
-    /// in four seconds.
+    /// Request disarming from the autopilot: at once before take-off; after landing only if the
+    /// autopilot has not disarmed by itself in four seconds.
     RequestDisarming,
-    /// Forget MISSION_START, and ask to disarm, again every second.
+    /// Clear all pending commands, and request disarming from the autopilot, every second.
     CancelStart,
 }
 
-/// One row of the table.
+/// One row of the mission table.
 #[derive(Clone, Copy, Debug)]
 pub struct TransitionRow {
-    /// States it applies to.
+    /// States to which the row applies.
     pub from: &'static [State],
-    /// States of the row, a bit for each.
+    /// `from` as a bit mask, one bit for each state.
     pub(crate) states: u32,
-    /// Condition of the row.
+    /// Condition under which the row is taken.
     pub guard: Guard,
-    /// How long it must have held; zero: at once.
+    /// How long the guard's condition must have lasted; zero for at once. Guards without a duration
+    /// ignore it.
     pub min_duration: Duration,
-    /// The next state.
+    /// State after the row.
     pub to: TargetState,
-    /// Effect of the row.
+    /// What the companion does when the row is taken.
     pub action: Action,
-    /// STATUSTEXT for a person, at most 50 bytes; empty: none.
+    /// STATUSTEXT for the operator, at most 50 bytes; empty for none.
     pub text: &'static str,
-    /// Whether the text is a warning rather than information.
+    /// Whether the text has severity WARNING; else INFO.
     pub warning: bool,
 }
 
 pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);
 
-/// Bit mask of the states.
+/// Bit mask with one bit for each of these states.
 pub(crate) const fn state_mask(states: &[State]) -> u32 {
     let (mut bits, mut i) = (0, 0);
     while i < states.len() {

@@ -1,75 +1,79 @@
-//! Where the mission is, and what was interrupted.
+//! States of the mission, and which state an interruption resumes.
 
-/// State of the mission.
+/// State of one vehicle's mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
-    /// No HEARTBEAT of the autopilot yet.
+    /// No HEARTBEAT of an autopilot was received yet.
     #[default]
     WaitAutopilot,
-    /// Connected; no position or no EKF origin yet.
+    /// Connected to the autopilot; its position or its EKF origin is not known yet.
     WaitPosition,
-    /// The shell was asked for a plan.
+    /// The shell was asked for the vehicle's plan.
     Planning,
-    /// Planned; waits for MISSION_START.
+    /// The plan has come; waits for MISSION_START.
     Ready,
-    /// Started; waits on the ground for its gates, disarmed (PX4 disarms after 10 s on the ground).
+    /// Started; waits on the pad, disarmed, for departure time and gates (PX4 would disarm after 10
+    /// s on the ground).
     Scheduled,
-    /// Setpoints at the current position, before Offboard or Guided is asked for.
+    /// Sends setpoints at the current position, before Offboard or Guided is requested.
     Streaming,
-    /// Offboard or Guided was asked for.
+    /// Offboard or Guided was requested.
     Engaging,
-    /// Arming was asked for.
+    /// Arming was requested.
     Arming,
-    /// NAV_TAKEOFF was asked for, of an autopilot that lifts off by command only; the others pass
-    /// at once.
+    /// NAV_TAKEOFF was requested from an autopilot that takes off by command only; with another
+    /// autopilot the state is left at once.
     TakeOff,
-    /// Straight up to the start of the path.
+    /// Climbs straight up to the start of the path.
     Climb,
-    /// Along the path, slowed and stopped by the neighbours.
+    /// Flies along the path; advice and safety filter slow and stop it for neighbours.
     Follow,
-    /// Stopped by DO_PAUSE_CONTINUE, on the path or in the climb.
+    /// Stands after DO_PAUSE_CONTINUE 0, on the path or in the climb.
     Paused,
-    /// Stopped on the path: no neighbour is heard.
+    /// Stands on the path, since no neighbour hears this vehicle or none is heard.
     Alone,
-    /// No HEARTBEAT in flight: stopped.
+    /// HEARTBEAT is missing in flight; the setpoint stops on the path.
     AutopilotSilent,
-    /// No position in flight.
+    /// The position is missing in flight, or jumped; the setpoint stops.
     PositionLost,
-    /// Landing, by the autopilot.
+    /// The autopilot lands the vehicle.
     Land,
-    /// On the ground; waits until the motors are off.
+    /// On the ground; waits until the motors are disarmed.
     Disarm,
-    /// A mode that we did not ask for: only the current position goes out.
+    /// A pilot set a mode that the companion did not request; setpoints sent are the current
+    /// position.
     PilotControl,
-    /// The autopilot's own failsafe acts: no setpoints until landed.
+    /// The autopilot's own failsafe acts: no setpoints are sent until it has landed.
     Failsafe,
     /// Landed and disarmed.
     Done,
-    /// Given up; MISSION_START plans again.
+    /// The mission was given up; MISSION_START plans again.
     Aborted,
-    /// Stopped on the path: what left the plan is in its way. Waits until all others stand.
+    /// Stands on the path, since a vehicle that left the plan, or an obstacle, blocks it; waits
+    /// until all others stand.
     Blocked,
-    /// Hovers; the shell was asked for a detour.
+    /// Holds its place; the shell was asked for a detour, a path home or a place to land.
     Replanning,
-    /// Replanning on the ground, before the take-off.
+    /// Waits on the pad, disarmed; the shell was asked for a detour.
     PadReplanning,
-    /// Brakes along the path, then lands.
+    /// Brakes along the path to a stop, then lands.
     Stopping,
-    /// Offboard or Guided again after the pilot: holds the point where the mode came back until
-    /// DO_PAUSE_CONTINUE 1.
+    /// The autopilot is in Offboard or Guided again after its pilot: holds the position at which
+    /// that was seen, until DO_PAUSE_CONTINUE 1.
     PilotReturned,
     /// The start was cancelled or paused after arming was requested: holds on the pad until the
-    /// motors are surely off.
+    /// motors are certain to be disarmed.
     CancelStart,
-    /// A landing was stopped since another vehicle is below, or may be: holds until the column is
-    /// free.
+    /// The landing was stopped, since another vehicle is below or may be: holds its place until the
+    /// column below is free.
     LandingHeld,
-    /// Holds on its path, in a coverage mission, until what a lost vehicle left is divided.
+    /// Holds on its path, in a coverage mission, until the rest of the area is divided among the
+    /// vehicles again.
     Dividing,
 }
 
 impl State {
-    /// Every state, in the order of the numbers that HEARTBEAT carries.
+    /// Every state, in the order of its number, which HEARTBEAT carries as `custom_mode`.
     pub const ALL: &'static [Self] = &[
         Self::WaitAutopilot,
         Self::WaitPosition,
@@ -102,8 +106,8 @@ impl State {
         Self::Dividing,
     ];
 
-    /// Whether setpoints go out: from before Offboard until the motors are off, never in a
-    /// failsafe, nor while an autopilot takes off by a command.
+    /// Whether setpoints are sent in this state: from before Offboard or Guided until the motors
+    /// are disarmed, but not in a failsafe nor in a take-off by command.
     pub fn streams_setpoints(self) -> bool {
         use State::*;
         matches!(
@@ -130,32 +134,32 @@ impl State {
         )
     }
 
-    /// Whether a vehicle in this state flies on over an area as long as its lease allows, or is
-    /// about to take off.
+    /// Whether a vehicle in this state will fly on along its coverage path as long as its lease
+    /// lasts, unheard too, or is about to take off.
     pub(crate) fn flies_on_lease(self) -> bool {
         use State::*;
         self.holds_place() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
     }
 
-    /// Whether a vehicle that stands in this state stays there until it decides otherwise.
+    /// Whether a vehicle that stands in this state stays there until its own mission moves it on.
     pub(crate) fn holds_place(self) -> bool {
         use State::*;
         matches!(self, Follow | Paused | Alone | Blocked | Replanning | Dividing)
     }
 }
 
-/// Target of a row.
+/// Target state of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetState {
-    /// To this state.
+    /// This state.
     State(State),
-    /// Back to the state that was interrupted.
+    /// The state that was interrupted.
     Interrupted,
 }
 
-/// The states that were interrupted. The states that interrupt are [`State::Paused`] on the one
-/// hand, and on the other those in which autopilot, position or pilot take the vehicle: a pause may
-/// itself be interrupted.
+/// The interrupted states, to which the mission returns. A pause interrupts ([`State::Paused`]),
+/// and so does a loss: a silent autopilot, a lost position, or the pilot. There are two, as a loss
+/// may interrupt a pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InterruptedStates {
     /// The state that the pause interrupted.
@@ -171,16 +175,17 @@ impl Default for InterruptedStates {
 }
 
 impl InterruptedStates {
-    /// Target of [`TargetState::Interrupted`] from `state`.
+    /// The state to which [`TargetState::Interrupted`] leads from `state`.
     pub fn target(&self, state: State) -> State {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
 
-    /// Remembers what a change of state interrupts; `lands` if what it seeks is a place for a
-    /// landing that was under way.
+    /// Stores the state that a change from `from` to `to` interrupts. `lands`: the search under way
+    /// is for a place to land, so the landing is resumed.
     pub(crate) fn record_interruption(&mut self, from: State, to: State, lands: bool) {
         use State::*;
-        // A request to the shell, and a disarming, begin again.
+        // These states cannot be resumed half-way: a search begins again in the state before it, a
+        // disarming in the landing.
         let kept = match from {
             Replanning if lands => Land,
             Replanning => Blocked,
@@ -194,7 +199,8 @@ impl InterruptedStates {
         }
     }
 
-    /// The text for a change of state that interrupts another.
+    /// The STATUSTEXT that names the interrupted state; `None` if a change from `from` to `to`
+    /// interrupts none.
     pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
         use State::*;
         let kept = match to {
@@ -223,7 +229,8 @@ impl InterruptedStates {
         matches!(state, AutopilotSilent | PositionLost | PilotControl | PilotReturned)
     }
 
-    /// The state of the flight itself, beneath pause and loss.
+    /// The state of the flight without pause and loss: `state` itself or the one that they
+    /// interrupted.
     pub(crate) fn uninterrupted_state(&self, state: State) -> State {
         use State::*;
         let state = match state {

@@ -1,5 +1,5 @@
-//! The rows of the mission's transition table; [`crate::mission`] says what states, guards and
-//! actions are.
+//! The rows of the mission's transition table; [`crate::mission`] explains states, guards and
+//! actions.
 
 use super::guard::Guard;
 use super::row::{AT_ONCE, Action, TransitionRow, state_mask};
@@ -50,7 +50,7 @@ pub(crate) const fn warning_row(
     }
 }
 
-/// Back to the interrupted state.
+/// Row that resumes the interrupted state.
 pub(crate) const fn return_row(
     from: &'static [State],
     guard: Guard,
@@ -70,32 +70,32 @@ pub(crate) const fn return_row(
     }
 }
 
-/// Twice the time by which the armed bit lags behind the ack of arming.
+/// Twice the time by which HEARTBEAT's armed bit lags behind the COMMAND_ACK of arming.
 const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
-/// Time for which the column above the pad may be occupied between the last look at the gates and
-/// arming. Arming is not requested meanwhile.
+/// Time for which the column above the pad may be occupied after the gates have opened, before
+/// arming; then the start goes back to waiting. Meanwhile arming is not requested.
 const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
-/// A vehicle that does not come to its setpoint for this long is held by something, or carried
-/// away.
+/// Time for which a vehicle may neither come to its setpoint nor its setpoint move on; then
+/// something holds the vehicle or carries it away, and it lands.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
-/// A vehicle over an area that cannot start for this long leaves its part to those that fly: a lost
-/// vehicle that may come down above its pad takes less to be down.
+/// Time for which the start of a vehicle over an area may be barred; then it leaves its share to
+/// those that fly. A lost vehicle that may come down above its pad is down sooner.
 const START_BARRED_MOST: Duration = secs(180);
 
 use Action as A;
 use Guard as G;
 use State::*;
 
-/// States on the ground before arming.
+/// States on the ground in which the companion sends no setpoints yet.
 pub(crate) const WAITING_ON_GROUND: &[State] =
     &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
-/// States on the pad after the start command, before arming is requested.
+/// States on the pad after MISSION_START, before arming is requested.
 pub(crate) const STARTED_ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging];
-/// States on the pad after the start command.
+/// States on the pad after MISSION_START, before take-off.
 pub(crate) const ON_PAD: &[State] =
     &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
-/// States in the air, or about to be, under our setpoints.
+/// States in the air, or about to take off, in which the companion flies the vehicle by setpoints.
 pub(crate) const FLYING: &[State] = &[
     TakeOff,
     Climb,
@@ -110,18 +110,18 @@ pub(crate) const FLYING: &[State] = &[
     AutopilotSilent,
     PositionLost,
 ];
-/// States in the air in which links and position are as they should be.
+/// States of [`FLYING`] in which the autopilot is heard and its position is known.
 pub(crate) const FLYING_SOUND: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping, LandingHeld];
-/// States of [`FLYING_SOUND`] on the path, under way or stopped: the vehicle can stop along its
+/// States of [`FLYING_SOUND`] on the path, moving or standing: the vehicle can brake along its
 /// path.
 pub(crate) const SOUND_ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning, Dividing];
 
-/// States of [`FLYING_SOUND`] before the landing.
+/// States of [`FLYING_SOUND`] in which no landing has begun.
 pub(crate) const SOUND_BEFORE_LANDING: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping];
 
-/// States in the air in which the autopilot was heard.
+/// States of [`FLYING`] in which the autopilot was heard last.
 pub(crate) const IN_AIR_LINKED: &[State] = &[
     TakeOff,
     Climb,
@@ -136,10 +136,10 @@ pub(crate) const IN_AIR_LINKED: &[State] = &[
     PositionLost,
 ];
 
-/// The transition table of the mission.
+/// The transition table of the mission; earlier rows have priority.
 #[rustfmt::skip]
 pub static TABLE: &[TransitionRow] = &[
-    // The autopilot itself, the pilot and the failsafe: before everything else.
+    // The pilot's and the autopilot's own actions have priority over everything else.
     warning_row(FLYING,              G::Disarmed,        AT_ONCE,    Aborted,     A::ForgetStart,       "Disarmed in flight: mission over"),
     warning_row(FLYING,              G::FailsafeActs,    AT_ONCE,    Failsafe,    A::None,              "Autopilot failsafe: setpoints stopped"),
     warning_row(FLYING,              G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: mission stopped"),
@@ -147,10 +147,10 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Land, Disarm],     G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: landing stopped"),
     warning_row(ON_PAD,              G::FailsafeActs,    AT_ONCE,    Aborted,     A::ForgetStart,       "Failsafe before take-off: start cancelled"),
     warning_row(ON_PAD,              G::ModeTaken,       AT_ONCE,    Aborted,     A::ForgetStart,       "Mode changed by pilot: start cancelled"),
-    // Started again in the air: what flies the vehicle continues doing so; without setpoints that
-    // is the autopilot alone.
+    // The companion was restarted in the air: it sends no setpoints, and pilot or autopilot go on
+    // flying the vehicle.
     warning_row(WAITING_ON_GROUND,   G::FoundFlying,     AT_ONCE,    Failsafe,    A::ForgetStart,       "Found in flight: no mission"),
-    // Links and position.
+    // Loss of the autopilot's HEARTBEAT, of the position, or of the EKF origin.
     warning_row(WAITING_ON_GROUND,   G::NoHeartbeat,     secs(3),    WaitAutopilot, A::ForgetStart,     "Autopilot silent: start cancelled"),
     warning_row(&[Streaming, Engaging], G::NoHeartbeat,  secs(3),    Aborted,     A::ForgetStart,       "Autopilot silent: start cancelled"),
     warning_row(&[Arming],           G::NoHeartbeat,     secs(3),    CancelStart, A::CancelStart,       "Autopilot silent: start cancelled"),
@@ -162,7 +162,8 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Planning, Ready, Scheduled, PadReplanning], G::NoPosition, secs(2), WaitPosition, A::ForgetStart, "Position lost: start cancelled"),
     warning_row(&[Streaming, Engaging], G::NoPosition,   secs(1),    Aborted,     A::ForgetStart,       "Position lost: start cancelled"),
     warning_row(&[Arming],           G::NoPosition,      secs(1),    CancelStart, A::CancelStart,       "Position lost: start cancelled"),
-    // On the pad the pilot wins too, and what was checked at the start is checked until arming.
+    // On the pad: somebody else arms or moves the vehicle, or a condition of the start fails before
+    // arming.
     warning_row(STARTED_ON_PAD,      G::Armed,           AT_ONCE,    Aborted,     A::ForgetStart,       "Armed by someone else: start cancelled"),
     warning_row(STARTED_ON_PAD,      G::AwayFromStart,   AT_ONCE,    Aborted,     A::ForgetStart,       "Not at its start: start cancelled"),
     warning_row(STARTED_ON_PAD,      G::ChargeLow,       AT_ONCE,    Aborted,     A::ForgetStart,       "Battery low: start cancelled"),
@@ -174,7 +175,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[PilotReturned],    G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
     warning_row(FLYING_SOUND,        G::PositionJumped,  AT_ONCE,    PositionLost, A::BrakeOnPath,      "Position jumped: stopping"),
     warning_row(FLYING_SOUND,        G::NoPosition,      secs(1),    PositionLost, A::BrakeOnPath,      "Position lost: stopping"),
-    // Orders and limits in flight.
+    // Operator's commands and limits in flight.
     info_row(SOUND_ON_PATH,          G::LandCommanded,   AT_ONCE,    Stopping,    A::BrakeOnPath,       "Landing as commanded"),
     info_row(&[TakeOff, Climb, PositionLost, AutopilotSilent, PilotReturned], G::LandCommanded, AT_ONCE, Land, A::RequestLandMode, "Landing as commanded"),
     info_row(&[Failsafe, Aborted],   G::LandUnattended,  AT_ONCE,    Land,        A::RequestLandMode,   "Landing as commanded"),
@@ -184,7 +185,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[TakeOff, Climb, PilotReturned], G::BatteryLow, AT_ONCE, Land,   A::RequestLandMode,   "Battery low: landing"),
     warning_row(SOUND_BEFORE_LANDING, G::EstimateVague,  secs(30),   Land,        A::RequestLandMode,   "Estimate worse than margin for 30 s: landing"),
     warning_row(SOUND_BEFORE_LANDING, G::OutsideGeofence, AT_ONCE,   Land,        A::RequestLandMode,   "Geofence reached: landing"),
-    // The division that others decided while this vehicle was not heard.
+    // This vehicle's share was divided among the others while they did not hear it.
     warning_row(&[TakeOff, Climb, PilotReturned], G::Excluded, AT_ONCE, Land,     A::RequestLandMode,   "Its part was given away: landing"),
     warning_row(SOUND_ON_PATH,       G::Excluded,        AT_ONCE,    Stopping,    A::BrakeOnPath,       "Its part was given away: landing"),
     info_row(&[Stopping],            G::Standing,        AT_ONCE,    Land,        A::RequestLandMode,   ""),
@@ -193,7 +194,7 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(SOUND_ON_PATH,          G::ReturnOverField, AT_ONCE,    Blocked,     A::TurnHome,          "Planning the way home"),
     info_row(SOUND_ON_PATH,          G::ReturnCommanded, AT_ONCE,    Follow,      A::TurnBack,          "Flying back to the start"),
     info_row(&[TakeOff, Climb],      G::ReturnCommanded, AT_ONCE,    Land,        A::RequestLandMode,   "Landing on the pad"),
-    // The mission in order.
+    // The flight in its order.
     info_row(&[WaitAutopilot],       G::AutopilotHeard,  AT_ONCE,    WaitPosition, A::Connect,          "Autopilot found"),
     info_row(&[WaitPosition],        G::PositionKnown,   AT_ONCE,    Planning,    A::RequestPlan,       "Position known: planning"),
     warning_row(&[Planning],         G::RoadmapBad,      AT_ONCE,    Aborted,     A::ForgetStart,       "Roadmap or field missing or wrong: mission aborted"),
@@ -301,7 +302,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Disarm],           G::InAir,           AT_ONCE,    Land,        A::RequestLandMode,   "Still in the air: landing"),
     warning_row(&[Disarm],           G::DisarmRefused,   AT_ONCE,    Land,        A::RequestLandMode,   "Disarming refused: landing"),
     warning_row(&[Disarm],           G::Elapsed,         secs(30),   Aborted,     A::ForgetStart,       "On the ground, still armed"),
-    // After the pilot or a failsafe.
+    // A pilot or a failsafe flies the vehicle, or has given it back; a mission that is over.
     warning_row(&[PilotControl, PilotReturned], G::Disarmed, AT_ONCE, Aborted,    A::ForgetStart,       "Pilot landed: mission over"),
     warning_row(&[PilotControl, PilotReturned], G::FailsafeActs, AT_ONCE, Failsafe, A::None,            "Autopilot failsafe: setpoints stopped"),
     info_row(&[PilotControl],        G::Offboard,        AT_ONCE,    PilotReturned, A::HoldHere,        "Pilot gives back: holds, waits for resume"),

@@ -1,7 +1,7 @@
-//! What a task asks for beside its path: where the vehicle looks, and what the autopilot is
-//! commanded on the way.
+//! What a task adds to flying a path: the vehicle's heading, and commands to the autopilot along
+//! the path.
 //!
-//! The path is flown the same whatever the task is. A kind of task has a file here, an arm in each
+//! Every task's path is flown in the same way. A kind of task has a file in `task/`, an arm in each
 //! function below, and a variant of [`planner_core::flight::Task`].
 
 mod along;
@@ -15,19 +15,19 @@ use crate::autopilot::telemetry::Ack;
 use crate::link::Links;
 use crate::time::Instant;
 
-/// State of the tasks.
+/// State of the commands of the vehicle's task.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tasks {
     camera: CameraControl,
 }
 
 impl Tasks {
-    /// Forgets a former plan.
+    /// Forgets the commands of a former plan.
     pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }
 
-    /// Sends the task's commands that are due at this place of the path.
+    /// Sends the task's commands to the autopilot that are due at this place of the path.
     pub(crate) fn step<const W: usize>(
         &mut self,
         task: &Task,
@@ -42,14 +42,14 @@ impl Tasks {
         }
     }
 
-    /// Takes the autopilot's answer to a command.
+    /// Handles the autopilot's COMMAND_ACK of a command of the task.
     pub(crate) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
         self.camera.handle_ack(ack, links);
     }
 }
 
-/// Heading of the vehicle `along_m` metres along its path, radians from east to the left; any
-/// heading where absent.
+/// Heading that the task wants `along_m` metres along the path, radians from east,
+/// counter-clockwise; `None` if the task wants none.
 pub(crate) fn heading<const W: usize>(task: &Task, path: &Path<W>, along_m: f32) -> Option<f32> {
     match task {
         Task::Stay | Task::Goto(_) => None,

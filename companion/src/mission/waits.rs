@@ -1,27 +1,28 @@
-//! Waits that somebody is to know of: for a vehicle that never starts, which is named so that the
-//! operator sees why the swarm waits, and of this one, which something keeps on its pad.
+//! Two kinds of waits of a vehicle: for another one that has not started, reported so that the
+//! operator sees why the swarm waits; and on its own pad while something bars its start.
 //!
 //! Constant work.
 
 use crate::time::{Duration, Instant};
 
-/// Time for which a vehicle waits for one that has not started before it reports that, and time
-/// between two reports.
+/// Time for which a vehicle waits for one that has not started before it reports that, and between
+/// two reports.
 const REPORT_WAIT_AFTER: Duration = Duration::from_secs(30);
 
-/// Time without anything in its way after which a start was not barred.
+/// Time without an obstacle after which the start counts as no longer barred.
 const FREE_AFTER: Duration = Duration::from_secs(5);
 
 /// The waits of a mission.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Waits {
-    /// For a vehicle that has not started.
+    /// The wait for another vehicle that has not started.
     pub(crate) report: WaitReport,
-    /// On the pad.
+    /// How long the start of this vehicle has been barred.
     pub(crate) barred_start: BarredStart,
 }
 
-/// The vehicle that this one waits for, and since when, or since the wait was reported last.
+/// System id of the vehicle that this one waits for, 0 for none, and since when: since the wait
+/// began or was reported last.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WaitReport {
     id: u8,
@@ -29,8 +30,8 @@ pub(crate) struct WaitReport {
 }
 
 impl WaitReport {
-    /// After each step: it waits for the vehicle `id` that has not started, or for none (0).
-    /// Returns whether that is to be named.
+    /// To be called each step with the vehicle that has not started and that this one waits for, 0
+    /// for none. Returns whether the wait is to be reported now, every 30 s (`REPORT_WAIT_AFTER`).
     pub(crate) fn update(&mut self, id: u8, now: Instant) -> bool {
         if id != self.id || id == 0 {
             *self = Self { id, since: now };
@@ -43,8 +44,8 @@ impl WaitReport {
     }
 }
 
-/// Since when something has barred the start of this vehicle, and when it last did; short gaps do
-/// not count.
+/// Since when the start of this vehicle has been barred, and when it last was. Gaps of up to 5 s
+/// (`FREE_AFTER`) do not interrupt it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BarredStart {
     since: Option<Instant>,
@@ -52,7 +53,7 @@ pub(crate) struct BarredStart {
 }
 
 impl BarredStart {
-    /// One step; whether something bars the start.
+    /// To be called each step: whether a vehicle or an obstacle bars the start now.
     pub(crate) fn update(&mut self, barred: bool, now: Instant) {
         if barred {
             self.since.get_or_insert(now);
@@ -62,7 +63,7 @@ impl BarredStart {
         }
     }
 
-    /// Time for which the start has been barred.
+    /// Time for which the start has been barred, short gaps included; zero if it is not.
     pub(crate) fn lasts_for(&self, now: Instant) -> Duration {
         self.since.map_or(Duration::default(), |since| now - since)
     }

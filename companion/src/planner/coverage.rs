@@ -1,4 +1,5 @@
-//! A coverage mission: from the area in the mission file to the flights of all vehicles (CPP §3).
+//! The planner of coverage missions: from the area in the mission file to the flights of all
+//! vehicles (CPP §3).
 
 use core::fmt;
 
@@ -23,14 +24,15 @@ use crate::storage::mission_file::coverage::{CoverageView, HeadingRule, PartElig
 use crate::storage::mission_file::{MissionVehicle, MissionView};
 use crate::swarm::fleet::DivisionInput;
 
-/// Changes of the lanes' order that companions try: on a board a few million instructions.
+/// Most changes of the lanes' order that companions try when planning; on a board a few million
+/// instructions.
 pub const MAX_ORDER_CHANGES: u32 = 2000;
-/// Most rings of an area.
+/// Most rings of an area that a companion plans.
 pub const MAX_RINGS: usize = 128;
-/// Clearance that every leg over the fields is taken to have, metres: there are no walls.
+/// Clearance that every leg over an area is planned with, metres: there are no walls.
 const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 
-/// Memory for areas of at most `X` vertices, `L` lanes and `K` vehicles.
+/// Memory of the planner for areas of at most `X` vertices, `L` lanes and `K` vehicles.
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     vertices: Vec<Flat, X>,
     rings: Vec<Ring, MAX_RINGS>,
@@ -42,7 +44,7 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
 }
 
 impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
-    /// Creates it empty: all zeros.
+    /// An empty workspace, all zeros, so that it may live in .bss.
     pub const fn new() -> Self {
         Self {
             vertices: Vec::new(),
@@ -55,12 +57,12 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
         }
     }
 
-    /// The lanes planned last.
+    /// The lanes of the last plan.
     pub fn tracks(&self) -> &Tracks<L> {
         &self.tracks
     }
 
-    /// The routes planned last.
+    /// The routes of the last plan.
     pub fn routes(&self) -> &Plan<K> {
         &self.routes
     }
@@ -72,14 +74,14 @@ impl<const X: usize, const L: usize, const K: usize> Default for Workspace<X, L,
     }
 }
 
-/// Reason why there is no coverage plan.
+/// Why there is no coverage plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Error {
-    /// The area, or how it is to be photographed.
+    /// The area, or the settings for photographing it, cannot be planned.
     Coverage(CoverageError),
-    /// The flights.
+    /// The flights cannot be planned.
     Plan(PlanError),
-    /// The ground is not level, and the mission's field is not there.
+    /// The mission has uneven ground, and its field of heights is missing or another one.
     NoField,
 }
 
@@ -132,7 +134,7 @@ impl From<Error> for PlanFailure {
     }
 }
 
-/// A vehicle as the packing sees it: it takes off and lands on the same pad.
+/// Inputs of the packing for vehicle `i`, which takes off from and lands on the same pad.
 fn packing_vehicle(
     mission: &MissionView<'_>,
     vehicle: &MissionVehicle,
@@ -151,23 +153,23 @@ fn packing_vehicle(
     }
 }
 
-/// The mission to plan.
+/// Inputs of a coverage plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a, 'm> {
     /// The mission.
     pub mission: &'a MissionView<'m>,
-    /// Area of the mission.
+    /// The coverage block of the mission.
     pub view: &'a CoverageView<'m>,
-    /// The heights to fly above, where there are any: used if they are the mission's.
+    /// The field of heights on this computer, if any; it counts only if its CRC is the mission's.
     pub field: Option<FieldView<'m>>,
-    /// Most gates of one vehicle.
+    /// Most gates that one vehicle has room for.
     pub max_gates: usize,
-    /// Waypoints that were photographed before, by their numbers on the path along all lanes.
+    /// Waypoints that are photographed already, as ranges of their numbers along all lanes.
     pub photographed: &'a [WaypointRange],
 }
 
 impl<'m> Request<'_, 'm> {
-    /// The surface that lanes follow above the ground; none where it is level.
+    /// The surface above uneven ground that lanes follow; `None` for level ground.
     fn terrain_following(
         &self,
         vehicles: &[Vehicle],
@@ -183,7 +185,7 @@ impl<'m> Request<'_, 'm> {
     }
 }
 
-/// The area of a mission.
+/// The area of a coverage block, its vertices and rings copied into the given memory.
 fn read_area<'a, const X: usize>(
     view: &CoverageView<'_>,
     vertices: &'a mut Vec<Flat, X>,
@@ -200,11 +202,11 @@ fn read_area<'a, const X: usize>(
     Area::new(vertices, rings).map_err(CoverageError::Area)
 }
 
-/// Plans one vehicle's way home over the area, or aside, that keeps clear of all `obstacles`, above
-/// the field and out of no-fly zones, which may have `C` corners.
+/// Plans one vehicle's detour over the area: its way home, aside, or back to its path. It keeps
+/// clear of all `obstacles`, above the field, and out of no-fly zones, which may have `C` corners.
 ///
 /// # Errors
-/// Reason why there is none.
+/// [`PlanFailure`] says why there is no detour.
 pub fn plan_detour<
     const X: usize,
     const L: usize,
@@ -228,11 +230,11 @@ pub fn plan_detour<
         .map_err(|_| PlanFailure::Unreachable)
 }
 
-/// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been
-/// lost, division by division: the lots of all vehicles by the rank of their ids.
+/// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` has for each
+/// division so far the inputs of all vehicles, by the rank of their system ids.
 ///
 /// # Errors
-/// Reason why there is no plan.
+/// The error says why there is no plan.
 pub fn plan_flights<
     'l,
     const X: usize,
@@ -284,7 +286,7 @@ pub fn plan_flights<
         PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
         PartEligibility::Anyone => {
             let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
-            // The weights are parts of the work here, not the vehicles' own.
+            // Here weights are sizes of parts, which any vehicle may get.
             pack::binpat_by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
         }
     }

@@ -1,18 +1,17 @@
-//! MAVLink FTP server: `roadmap.bin` or `field.bin`, and `mission.bin` are listed, read, written,
-//! removed and summed.
+//! MAVLink FTP server for `roadmap.bin` or `field.bin`, and `mission.bin`: list, read, write,
+//! remove, CRC-32.
 //!
 //! Source: MAVLink guide, "File Transfer Protocol"; PX4, pymavlink's `mavftp` and MAVSDK for what
-//! clients rely on: an answer has the request's sequence number plus one, its session and its
-//! offset; the client names the session (`mavftp` writes to it before it heard that it is open);
-//! CRC-32 begins at 0 and is not inverted; a burst ends with its last packet marked.
+//! clients rely on: a reply has the request's sequence number plus one, its session and its offset;
+//! the client chooses the session id (`mavftp` writes to it before the reply to its open); CRC-32
+//! starts at 0 and is not inverted; the last packet of a burst is marked.
 //!
-//! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing,
-//! writing the same bytes to the same place) are simply done again. Those that would (opening,
-//! closing, removing, resetting) are remembered for a while and only answered again
-//! (`ftp/memory.rs`); a session that nothing was written to is not opened again for its client.
-//! What cannot be taken now is not answered: clients ask again. One session at a time; one request
-//! at a time, the others wait in a short queue. An answer that needs the flash is given when the
-//! flash is done.
+//! Requests may be lost, repeated and overtaken. Those that a repetition does no harm (read, list,
+//! write of the same bytes at the same offset) are executed again. Those that it would harm (open,
+//! close, remove, reset) are remembered and only answered again (`ftp/memory.rs`). A client that
+//! opens its session again before it wrote keeps that session. A request that cannot be executed
+//! now is not answered: the client repeats it. There is one session at a time, and one request at a
+//! time; others wait in a short queue. A reply that needs the flash is sent when the flash is done.
 
 mod memory;
 mod packet;
@@ -36,17 +35,17 @@ use crate::time::{Duration, Instant};
 
 /// Message id of FILE_TRANSFER_PROTOCOL.
 pub const MESSAGE: u32 = 110;
-/// Bytes of that message's payload: network, system, component, then the packet.
+/// Bytes of its payload: target network, system, component, then the FTP packet.
 pub const PAYLOAD_LEN: usize = 254;
 
-/// Whether a FILE_TRANSFER_PROTOCOL begins an upload or removes a file.
+/// Whether a FILE_TRANSFER_PROTOCOL is a request to begin an upload or to remove a file.
 pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {
     matches!(padded[6], op::CREATE | op::OPEN_WRITE | op::REMOVE)
 }
 
-/// Most requests that wait; `mavftp` has five under way.
+/// Most requests in the queue; `mavftp` has five under way.
 const MAX_QUEUED_REQUESTS: usize = 6;
-/// A session whose client was silent for this long may be taken over by another client.
+/// Time without a request after which another client may take over the session.
 const SESSION_IDLE: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
@@ -62,13 +61,13 @@ struct Session {
     client: (u8, u8),
     file: File,
     writes: bool,
-    /// No byte was written to the file yet.
+    /// Whether no byte was written to the file yet.
     fresh: bool,
     opened_by: Request,
     used_at: Instant,
 }
 
-/// Operation that the server executes.
+/// Operation that the server executes; the flag is whether the store has taken the read.
 #[derive(Clone, Copy, Debug)]
 enum FtpOperation {
     Nothing,
@@ -78,7 +77,7 @@ enum FtpOperation {
     Close(Request),
 }
 
-/// The server. 4 kB, most of it requests that wait.
+/// The FTP server. 4 kB, most of it queued requests.
 #[derive(Clone, Debug)]
 pub struct Ftp {
     queue: Deque<Request, MAX_QUEUED_REQUESTS>,
@@ -107,8 +106,8 @@ impl Default for Ftp {
 }
 
 impl Ftp {
-    /// Queues a request. One that is queued already, or finds the queue full, is dropped: the
-    /// client repeats it.
+    /// Queues a request. One that is queued or executed already, or finds the queue full, is
+    /// dropped: the client repeats it.
     pub fn queue_request(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
         let request = Request::read(link, frame);
@@ -121,12 +120,12 @@ impl Ftp {
             | FtpOperation::Close(held) => same(held),
         };
         if !at_work && !self.queue.iter().any(same) {
-            // Full: the client asks again.
+            // A full queue drops it: the client repeats it.
             let _ = self.queue.push_back(request);
         }
     }
 
-    /// The answer that waits for a link: the whole payload of a FILE_TRANSFER_PROTOCOL.
+    /// The reply to be sent on a link: the whole payload of a FILE_TRANSFER_PROTOCOL.
     pub fn poll_reply(&mut self, link: usize) -> Option<[u8; PAYLOAD_LEN]> {
         let Reply { to, packet, .. } = self.reply.take_if(|reply| reply.link == link)?;
         let mut payload = [0; PAYLOAD_LEN];
@@ -135,12 +134,13 @@ impl Ftp {
         Some(payload)
     }
 
-    /// Text for a person.
+    /// The STATUSTEXT for the operator, with its severity; each is returned once.
     pub fn take_text(&mut self) -> Option<Text> {
         self.text.take()
     }
 
-    /// Continues the current operation as far as flash and link allow.
+    /// Executes queued requests until a reply is to be sent, or the current one waits for the
+    /// flash.
     pub fn continue_work(&mut self, store: &mut Store, now: Instant, erasing: ErasePermission) {
         self.now = now;
         while self.reply.is_none() {
@@ -157,7 +157,7 @@ impl Ftp {
         }
     }
 
-    /// Handles the result of a flash read.
+    /// Handles the store's outcome of a read or CRC that the current operation requested.
     pub fn handle_read_outcome(&mut self, answer: ReadOutcome<'_>) {
         match (core::mem::replace(&mut self.operation, FtpOperation::Nothing), answer) {
             (FtpOperation::Read(request, true), ReadOutcome::Bytes(bytes)) => match self.burst {
@@ -179,8 +179,8 @@ impl Ftp {
         }
     }
 
-    /// Continues the current operation: requests the flash again, or checks the progress of an
-    /// upload.
+    /// Continues the current operation: requests its read from the store, or checks whether its
+    /// upload is open or ended.
     fn continue_operation(&mut self, store: &mut Store) {
         match &mut self.operation {
             FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Sum(_, true) => {}
@@ -213,8 +213,7 @@ impl Ftp {
                     Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
                     _ => {
                         self.operation = FtpOperation::Nothing;
-                        // The erasing for this session may have taken longer than a client may be
-                        // silent.
+                        // The erasure for this session may have taken longer than [`SESSION_IDLE`].
                         self.session =
                             self.session.map(|session| Session { used_at: self.now, ..session });
                         self.finish(&request, Ok(()));
@@ -247,7 +246,7 @@ impl Ftp {
             } else if let Some(session) =
                 self.session.filter(|session| session.opened_by.is_same_request(request))
             {
-                // The answer was lost; a file that was opened since then stays open.
+                // The first reply was lost. If another file was opened since, that one stays open.
                 self.repeat_open_ack(request, &session, store);
             }
             return;
@@ -339,7 +338,7 @@ impl Ftp {
         let held = File::ALL.iter().filter_map(|file| Some((file.name(), store.file_size(*file)?)));
         for (name, size) in held.skip(request.offset as usize) {
             let mut digits = [0; 10];
-            // Both names and sizes are short: there is room for all.
+            // Names and sizes are short: the packet has room for all.
             let _ = entries.push(b'F');
             let _ = entries.extend_from_slice(name.as_bytes());
             let _ = entries.push(b'\t');
@@ -400,7 +399,7 @@ impl Ftp {
         }
     }
 
-    /// Repeats the ACK with which a session was opened.
+    /// Sends again the ACK with which the session was opened.
     fn repeat_open_ack(&mut self, request: &Request, session: &Session, store: &Store) {
         match store.file_size(session.file) {
             Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
@@ -408,7 +407,7 @@ impl Ftp {
         }
     }
 
-    /// The session a request belongs to; a request from before it was opened belongs to none.
+    /// The client's open session; a request sent before that session was opened is refused.
     fn session_of(&mut self, request: &Request) -> Result<Session, NakError> {
         let now = self.now;
         match &mut self.session {
@@ -427,7 +426,8 @@ impl Ftp {
         self.now - session.used_at > SESSION_IDLE
     }
 
-    /// Opens a session. Sends a NAK if no session is free.
+    /// Opens a session in place of the client's own or an idle one. False, with a NAK, if another
+    /// client uses one.
     fn open_session(
         &mut self,
         request: &Request,
@@ -454,7 +454,7 @@ impl Ftp {
         }
     }
 
-    /// The next packet of a burst.
+    /// Reads the next packet of the burst, if one is under way.
     fn send_next_burst_packet(&mut self, store: &mut Store) {
         if let Some(stream) = self.burst {
             self.operation = FtpOperation::Read(stream.first_request(), false);
@@ -462,7 +462,7 @@ impl Ftp {
         }
     }
 
-    /// Sends the reply and remembers it for repeated requests.
+    /// Sends the reply, and remembers it for repetitions of the request.
     fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
         self.duplicates.remember(request, result, self.now);
         self.respond(request, result);

@@ -1,29 +1,29 @@
-//! The tunables of one vehicle, as MAVLink parameters: names, ranges, defaults, and how they are
-//! kept in flash.
+//! The tunables of one vehicle as MAVLink parameters: names, ranges, defaults, and their record in
+//! flash.
 //!
-//! All travel as REAL32, since ground tools decode parameters by the autopilot's firmware. What the
-//! whole swarm must agree on is in the mission file instead. A changed value counts as soon as the
-//! vehicle stands disarmed and idle, but for the system id: that counts from the next start.
+//! All are sent as REAL32, since ground tools decode parameters by the autopilot's kind. Settings
+//! that the whole swarm must share are in the mission file instead. A changed value takes effect
+//! once the vehicle is disarmed and idle; a changed system id only after a restart.
 
 use crate::config::{Config, REACHES_ALL_M};
 
 /// Longest name of a parameter, bytes.
 pub const NAME_LEN: usize = 16;
-/// Bytes of a stored parameter.
+/// Bytes of a parameter in flash: name and value.
 const ENTRY_LEN: usize = NAME_LEN + 4;
 
-/// A parameter.
+/// Declaration of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// At most 16 bytes of ASCII.
+    /// Name, at most 16 bytes of ASCII.
     pub name: &'static str,
-    /// Smallest value.
+    /// Least value that can be set.
     pub min: f32,
-    /// Largest value.
+    /// Greatest value that can be set.
     pub max: f32,
-    /// Value of a new board.
+    /// Value on a new board.
     pub default: f32,
-    /// Whether only whole numbers are allowed.
+    /// Whether only whole numbers can be set.
     pub whole: bool,
 }
 
@@ -37,7 +37,7 @@ const fn whole_parameter(name: &'static str, least: f32, most: f32, default: f32
 
 /// Number of parameters.
 pub const PARAMETER_COUNT: usize = 10;
-/// Bytes that all parameters take in flash.
+/// Bytes of all parameters in flash.
 pub const STORED_LEN: usize = PARAMETER_COUNT * ENTRY_LEN;
 
 /// All parameters, sorted by name; `companion/README.md` prints the same table.
@@ -70,11 +70,11 @@ const SYS_ID: usize = 9;
 pub enum ParameterError {
     /// No parameter has this name or index.
     Unknown,
-    /// NaN, infinite, out of range, or a fraction where a whole number is due.
+    /// The value is NaN, infinite, out of range, or a fraction where a whole number is required.
     Range,
 }
 
-/// The values.
+/// The values of all parameters, in the order of [`TABLE`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     values: [f32; PARAMETER_COUNT],
@@ -87,20 +87,20 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Index of a name.
+    /// Index of the parameter of this name; `None` if there is none.
     pub fn index_of(name: &[u8]) -> Option<usize> {
         TABLE.iter().position(|parameter| parameter.name.as_bytes() == name)
     }
 
-    /// Name and value at an index.
+    /// Name and value of the parameter at this index; `None` if there is none.
     pub fn get(&self, index: usize) -> Option<(&'static str, f32)> {
         Some((TABLE.get(index)?.name, *self.values.get(index)?))
     }
 
-    /// Sets a value; whether it changed.
+    /// Sets the value of the parameter at this index. Returns whether it changed.
     ///
     /// # Errors
-    /// An index that is none, or a value out of range: nothing changes.
+    /// No parameter has the index, or the value is out of range: nothing changes.
     pub fn set(&mut self, index: usize, value: f32) -> Result<bool, ParameterError> {
         let (Some(parameter), Some(held)) = (TABLE.get(index), self.values.get_mut(index)) else {
             return Err(ParameterError::Unknown);
@@ -112,12 +112,12 @@ impl Parameters {
         Ok(core::mem::replace(held, value) != value)
     }
 
-    /// The system id asked for; `None` for the autopilot's own.
+    /// The system id that the companion is to use; `None` (value 0) for the autopilot's.
     pub fn system_id(&self) -> Option<u8> {
         Some(self.values[SYS_ID] as u8).filter(|id| *id != 0)
     }
 
-    /// Puts this vehicle's values into the mission's settings.
+    /// Applies the values to the mission's settings; speeds only ever become lower.
     pub fn apply<const V: usize>(&self, config: &mut Config<V>) {
         config.accel_mps2 = self.values[ACCEL];
         config.battery_low_percent = self.values[BATT_LOW] as i8;
@@ -131,7 +131,8 @@ impl Parameters {
         config.swarm_hz = self.values[SWARM_HZ] as u8;
     }
 
-    /// The parameters as the flash keeps them: for each the name, padded with zeros, and the value.
+    /// The parameters as they are stored in flash: for each its name, padded with zeros, and its
+    /// value.
     pub fn to_bytes(&self) -> [u8; STORED_LEN] {
         let mut bytes = [0; STORED_LEN];
         for (entry, (parameter, value)) in
@@ -143,13 +144,13 @@ impl Parameters {
         bytes
     }
 
-    /// Takes one kept entry: an older or newer firmware's names and ranges may be others, so what
-    /// does not fit is left at its default.
+    /// Restores one parameter from flash. A firmware with other names or ranges may have written
+    /// it: one that is unknown or out of range here keeps its value.
     pub fn restore(&mut self, entry: &[u8; ENTRY_LEN]) {
         let name = entry[..NAME_LEN].split(|b| *b == 0).next().unwrap_or_default();
         let value = f32::from_le_bytes([entry[16], entry[17], entry[18], entry[19]]);
         if let Some(index) = Self::index_of(name) {
-            // Out of range it stays what it is.
+            // A value out of range here is ignored.
             let _ = self.set(index, value);
         }
     }

@@ -1,13 +1,14 @@
-//! The mission file: which vehicles fly, from where to which goals, how fast and how far apart;
-//! uploaded beside the roadmap.
+//! The mission file, uploaded beside the roadmap: the vehicles with their starts, their goals or
+//! their area, speeds and separations.
 //!
-//! Little-endian, versioned, closed by a CRC-32; byte by byte in `companion/README.md`. Lengths are
-//! metres, speeds m/s, points east, north, up in the mission frame. Its CRC is what companions
-//! compare on the radio: it covers the roadmap's, so vehicles that agree on it plan the same. What
-//! one vehicle alone decides (own speed limit, tolerances) is a parameter, not here.
+//! The file is little-endian, has a version, and ends with a CRC-32; `companion/README.md` lists it
+//! byte by byte. Lengths are metres, speeds m/s, points east, north, up in the mission frame.
+//! Companions compare its CRC by radio. It covers the roadmap's CRC, so vehicles with the same CRC
+//! compute the same plan. What each vehicle may choose for itself (own speed limit, tolerances) is
+//! a parameter instead.
 //!
-//! [`MissionView::parse`] checks everything once, in O(vehicles + goals); afterwards no accessor
-//! can meet a number that is not sound, whatever the bytes were.
+//! [`MissionView::parse`] checks the whole file once, in O(vehicles² + goals); afterwards every
+//! accessor returns numbers in range, whatever the bytes were.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -34,43 +35,45 @@ pub use records::{GOAL_LEN, MissionGoal, MissionVehicle, NO_GOAL, VEHICLE_LEN};
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
 /// Version of the mission file that this code writes. It also reads version 2, which has goals
-/// alone, and version 1, which names no ground station and means 255.
+/// only, and version 1, which names no ground station: then system id 255 is one.
 pub const VERSION: u16 = 3;
-/// Version 2, which does not state the kind of mission.
+/// Version 2, which has no kind of mission: its vehicles fly to goals.
 const VERSION_WITHOUT_KIND: u16 = 2;
-/// Version 1, which names no ground stations.
+/// Version 1, which names no ground stations: system id 255 is one.
 const VERSION_WITHOUT_GROUND_STATIONS: u16 = 1;
-/// Longest mission file that a board keeps, bytes.
+/// Longest mission file that a board stores, bytes.
 pub const MAX_BYTES: usize = 4096;
-/// Bytes before the first vehicle.
+/// Bytes of the file before its first vehicle.
 pub const HEADER_LEN: usize = 104;
 const CRC_LEN: usize = 4;
-/// Flag of a mission file whose six geofence numbers count.
+/// Flag of a mission file that has a geofence.
 const FLAG_FENCED: u8 = 1;
-/// Kinds of mission, in the byte after the flags.
+/// Kinds of mission: the value of the byte after the flags.
 const KIND_GOALS: u8 = 0;
 const KIND_COVERAGE: u8 = 1;
-/// Settings that all vehicles of a mission share.
+/// Settings of a mission that all its vehicles share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionHeader {
-    /// CRC-32 of the roadmap file it belongs to.
+    /// CRC-32 of the roadmap file that the mission was made for; in a coverage mission over uneven
+    /// ground of the field.
     pub roadmap_crc: u32,
     /// Rule by which goals are assigned to vehicles.
     pub mode: Mode,
-    /// How vehicles keep apart.
+    /// Method by which vehicles keep apart in flight.
     pub method: Method,
-    /// Origin of the mission frame.
+    /// Origin of the mission frame: latitude, longitude, altitude.
     pub origin: Geodetic,
-    /// Speed along paths, m/s.
+    /// Cruise speed along paths, m/s.
     pub cruise_mps: f32,
-    /// Separation and speeds that are planned with; the schedule reckons with less than the cruise
-    /// speed.
+    /// Separations and speeds that the schedule is planned with; its cruise speed is lower than the
+    /// flown one.
     pub schedule: ScheduleConfig,
-    /// Smallest distance between two vehicles' centres, metres.
+    /// Least distance between the centres of two vehicles, metres.
     pub safety_distance_m: f32,
-    /// Minimum and maximum corner of the volume the vehicles may be in.
+    /// Geofence: lowest and highest corner of the box, in the mission frame, in which vehicles must
+    /// stay; `None` for no geofence.
     pub geofence: Option<(Point, Point)>,
-    /// System ids whose commands count; 0 is no id.
+    /// System ids of the ground stations whose commands count; 0 for an unused entry.
     pub ground_stations: [u8; GROUND_STATIONS],
 }
 
@@ -112,21 +115,21 @@ impl MissionHeader {
     }
 }
 
-/// Work of the vehicles of a mission.
+/// What the vehicles of a mission do, as read from its file.
 #[derive(Clone, Copy, Debug)]
 pub enum MissionKind<'a> {
-    /// The vehicles fly to goals, on a roadmap.
+    /// The vehicles fly to goals on a roadmap.
     Goals,
     /// The vehicles photograph an area.
     Coverage(CoverageView<'a>),
 }
 
-/// Work of the vehicles of a mission, as it is written.
+/// What the vehicles of a mission do, to be written to its file.
 #[derive(Clone, Copy, Debug)]
 pub enum MissionBlock<'a> {
-    /// The vehicles fly to goals.
+    /// The vehicles fly to these goals.
     Goals(&'a [MissionGoal]),
-    /// The vehicles photograph an area.
+    /// The vehicles photograph this area.
     Coverage(CoverageParts<'a>),
 }
 
@@ -138,7 +141,7 @@ impl MissionBlock<'_> {
         }
     }
 
-    /// Bytes the mission file takes, CRC included, with so many vehicles.
+    /// Length of the mission file, bytes, CRC included, with so many vehicles.
     pub fn file_len(&self, vehicles: usize) -> usize {
         let block = match self {
             Self::Goals(_) => 0,
@@ -148,15 +151,15 @@ impl MissionBlock<'_> {
     }
 }
 
-/// Bytes the file of a mission with goals takes, CRC included.
+/// Length of the file of a mission with goals, bytes, CRC included.
 pub const fn encoded_len(vehicles: usize, goals: usize) -> usize {
     HEADER_LEN + vehicles * VEHICLE_LEN + goals * GOAL_LEN + CRC_LEN
 }
 
-/// Writes a mission file; the bytes written.
+/// Writes a mission file to `out`. Returns its length.
 ///
 /// # Errors
-/// Whatever [`MissionView::parse`] would refuse, or `out` is too small.
+/// The mission is one that [`MissionView::parse`] rejects, or `out` is too small.
 pub fn write_mission(
     header: &MissionHeader,
     vehicles: &[MissionVehicle],
@@ -234,7 +237,7 @@ pub fn write_mission(
     Ok(needed)
 }
 
-/// A checked mission over borrowed bytes.
+/// A mission file whose bytes have been checked; it borrows them.
 #[derive(Clone, Copy, Debug)]
 pub struct MissionView<'a> {
     header: MissionHeader,
@@ -245,10 +248,10 @@ pub struct MissionView<'a> {
 }
 
 impl<'a> MissionView<'a> {
-    /// Checks a mission file at the start of `bytes`; what follows its length is ignored.
+    /// Checks the mission file at the start of `bytes`; bytes behind its length are ignored.
     ///
     /// # Errors
-    /// Names the first thing that is not sound.
+    /// The first error found in the file.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, MissionError> {
         let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(FileError::Truncated)?;
         if head[..8] != MAGIC {
@@ -357,22 +360,22 @@ impl<'a> MissionView<'a> {
         Ok(())
     }
 
-    /// Settings that all vehicles share.
+    /// Settings of the mission that all its vehicles share.
     pub fn header(&self) -> &MissionHeader {
         &self.header
     }
 
-    /// The CRC-32 at the end of the file: the mission's identity on the radio.
+    /// The CRC-32 at the end of the file, by which vehicles recognise their mission on the radio.
     pub fn crc(&self) -> u32 {
         self.crc
     }
 
-    /// Work of the vehicles.
+    /// What the vehicles do: fly to goals or photograph an area.
     pub fn kind(&self) -> &MissionKind<'a> {
         &self.kind
     }
 
-    /// Bytes the file takes.
+    /// Length of the file, bytes.
     pub fn byte_len(&self) -> usize {
         let block = match &self.kind {
             MissionKind::Goals => 0,
@@ -381,22 +384,23 @@ impl<'a> MissionView<'a> {
         encoded_len(self.vehicles.len(), self.goals.len()) + block
     }
 
-    /// The vehicles, in the order of the roadmap's starts.
+    /// The vehicles of the mission, in the order of the roadmap's starts.
     pub fn vehicles(&self) -> impl ExactSizeIterator<Item = MissionVehicle> + '_ {
         self.vehicles.iter().map(MissionVehicle::from_bytes)
     }
 
-    /// The goals, in the order of the roadmap's.
+    /// The goals of the mission, in the order of the roadmap's goals.
     pub fn goals(&self) -> impl ExactSizeIterator<Item = MissionGoal> + '_ {
         self.goals.iter().map(MissionGoal::from_bytes)
     }
 
-    /// Place of a vehicle in the mission.
+    /// Index of the vehicle with this system id in the mission; `None` if it has none.
     pub fn index_of(&self, system_id: u8) -> Option<usize> {
         self.vehicles().position(|vehicle| vehicle.task.id == system_id)
     }
 
-    /// Whether it can be planned beside this roadmap, or beside none.
+    /// Whether the mission can be planned with this roadmap: one with goals only on its own
+    /// roadmap, a coverage mission with any or none.
     pub fn can_be_planned_with(&self, roadmap: Option<&RoadmapView<'_>>) -> bool {
         match self.kind {
             MissionKind::Goals => roadmap.is_some_and(|roadmap| self.matches_roadmap(roadmap)),
@@ -404,18 +408,18 @@ impl<'a> MissionView<'a> {
         }
     }
 
-    /// Whether it was made for this roadmap.
+    /// Whether the mission was made for this roadmap: CRC and numbers of starts and goals agree.
     fn matches_roadmap(&self, roadmap: &RoadmapView<'_>) -> bool {
         let terminals = (usize::from(roadmap.header().starts), usize::from(roadmap.header().goals));
         self.header.roadmap_crc == roadmap.crc()
             && terminals == (self.vehicles.len(), self.goals.len())
     }
 
-    /// The request to the whole swarm's planner, over lists that the caller keeps, for vehicles
-    /// with room for `gates_most`.
+    /// The request to the planner for the whole swarm. `tasks` and `descents_m` are the memory for
+    /// its lists; each vehicle has room for `gates_most` gates.
     ///
     /// # Errors
-    /// [`MissionError::RosterFull`] if there are more vehicles or goals than `V`.
+    /// [`MissionError::RosterFull`] if the mission has more than `V` vehicles or goals.
     pub fn plan_request<'b, const V: usize>(
         &self,
         tasks: &'b mut Vec<VehicleTask, V>,
@@ -438,10 +442,11 @@ impl<'a> MissionView<'a> {
         })
     }
 
-    /// The settings of one vehicle's companion, with the defaults of what the mission does not say.
+    /// The settings of one vehicle's companion in this mission; defaults for what the mission does
+    /// not set.
     ///
     /// # Errors
-    /// The vehicle is not in the mission, or the mission has more vehicles than `V`.
+    /// The mission has no vehicle with this system id, or more than `V` vehicles.
     pub fn companion_config<const V: usize>(
         &self,
         system_id: u8,

@@ -1,20 +1,19 @@
-//! What a companion keeps in flash: two slots for roadmaps or fields, and a journal with the
-//! mission file, the parameters and what of an area is photographed.
+//! The flash store of a companion: two slots, each for a roadmap or a field of heights, and a
+//! journal with the mission file, the parameters and the photographed waypoints of an area.
 //!
-//! Flash is I/O: the store asks ([`Store::poll_request`]) for one sector to be erased, one block to
-//! be programmed or some bytes to be read, and is given the result ([`Store::handle_outcome`]). So
-//! a slow erasure never stops the setpoints, and the same code keeps its files in a board's flash,
-//! an emulated one, or a desk's memory.
+//! Flash is I/O: the store requests ([`Store::poll_request`]) that one sector be erased, one block
+//! programmed or some bytes read, and gets the outcome later ([`Store::handle_outcome`]). So a slow
+//! erasure never delays setpoints, and the same code runs on a board's flash, an emulated flash, or
+//! memory on the desk.
 //!
-//! A file is whole or not there: it is written into an area that was erased before, read back, and
-//! sealed last ([`area`]). A cut at any byte leaves what was sealed before. The areas not in use
-//! are erased ahead of time, as soon as the vehicle is known to be disarmed, so that an upload
-//! finds one ready. A small crate for such journals (`sequential-storage`) was checked: its
-//! operations are futures over a flash driver that they own, which cannot be asked for one step at
-//! a time.
+//! A file is either complete or absent. It is written into an erased area and read back; the area's
+//! seal is written last ([`area`]). A power loss at any byte leaves what was sealed before. Areas
+//! not in use are erased ahead of time, once the vehicle is known to be disarmed, so that an upload
+//! finds one ready. The crate `sequential-storage` was considered: its operations are futures that
+//! own the flash driver, and cannot be executed one request at a time.
 //!
-//! A roadmap is used in place, so the slot a companion started from is not written until the next
-//! start; the newest roadmap and mission take effect then.
+//! A roadmap is used in place. So the slot that a companion uses since its start is not written
+//! before the next start; a newer roadmap or mission takes effect then.
 
 pub mod area;
 pub mod flash;
@@ -42,10 +41,10 @@ pub use self::upload_state::{UploadError, UploadState};
 use self::window::UploadReassembly;
 use crate::services::parameters::Parameters;
 
-/// Photographed waypoints of an area, as the mission writes them.
+/// Record of the photographed waypoints of an area, as [`crate::mission::photographed`] writes it.
 pub(crate) type Photographed = heapless::Vec<u8, MAX_PROGRAM>;
 
-/// A companion's flash.
+/// State of the flash store.
 #[derive(Clone, Debug)]
 pub struct Store {
     layout: FlashLayout,
@@ -53,7 +52,7 @@ pub struct Store {
     in_use: Option<usize>,
     journal: Journal,
     parameters: Parameters,
-    /// Roadmaps up to this number were removed.
+    /// Slots sealed with this sequence number or a lower one hold a removed file.
     forgotten: u32,
     unsaved: bool,
     photographed: Photographed,
@@ -61,9 +60,9 @@ pub struct Store {
     reassembly: UploadReassembly,
     upload: Option<(File, UploadState)>,
     job: FlashJob,
-    /// An erasure that lets a read go first, between two sectors.
+    /// An erasure interrupted between two sectors, so that a read comes first.
     paused_job: FlashJob,
-    /// Whether the shell is at work for us.
+    /// Whether the shell executes a request whose outcome has not come yet.
     request_pending: bool,
     buffer: [u8; MAX_PROGRAM],
     program_word: [u8; WORD],
@@ -71,8 +70,8 @@ pub struct Store {
 }
 
 impl Store {
-    /// Looks through the flash: which roadmap is the newest whole one, which mission and parameters
-    /// were last kept. Reads a roadmap slot whole, so it takes milliseconds.
+    /// Reads the flash: which slots hold complete files, and the last complete records of mission
+    /// and parameters. It reads whole slots to check their CRC, so it takes milliseconds.
     pub fn mount(layout: FlashLayout, flash: &mut impl ReadFlash) -> Self {
         let slots = [0, 1].map(|i| area::read_condition(&layout, FlashArea::Slot(i), flash));
         let mut store = Self {
@@ -99,17 +98,17 @@ impl Store {
         store
     }
 
-    /// Place of the roadmap or field that this start uses, in the storage bank. The place is not
-    /// written until the next start.
+    /// Range of the roadmap or field in use since this start, in the storage bank; `None` if there
+    /// is none. It is not written before the next start.
     pub fn roadmap(&self) -> Option<Range<u32>> {
         let slot = self.in_use?;
         let at = FlashArea::Slot(slot).data_offset(&self.layout);
         Some(at..at + self.slots[slot].seal()?.len)
     }
 
-    /// The roadmap of this start cannot be used after all, whole as it is: [`Self::roadmap`] is the
-    /// one before it, if that is still there; whether it is. To be called before anything else is
-    /// done with the flash.
+    /// Rejects the roadmap or field of this start, which is complete but cannot be used.
+    /// [`Self::roadmap`] is then the older one; returns whether there is one. To be called before
+    /// any other use of the store.
     pub fn refuse_roadmap(&mut self) -> bool {
         if let Some(slot) = self.in_use {
             self.slots[slot] = AreaCondition::Dirty;
@@ -118,18 +117,18 @@ impl Store {
         self.in_use.is_some()
     }
 
-    /// Place of the mission file, in the storage bank; the caller copies the file from there, since
-    /// the journal moves.
+    /// Range of the mission file in the storage bank; the caller must copy the file, since the
+    /// journal moves it.
     pub fn mission(&self) -> Option<Range<u32>> {
         self.file_range(File::Mission)
     }
 
-    /// The parameters.
+    /// The values of the parameters, as set or as restored from flash.
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
 
-    /// Sets a parameter; it is kept when the flash has time.
+    /// Sets a parameter; it is written to flash by a later request.
     ///
     /// # Errors
     /// As [`Parameters::set`].
@@ -144,28 +143,29 @@ impl Store {
         Ok(())
     }
 
-    /// Whether parameters wait to be kept.
+    /// Whether a parameter was set whose record has not been written yet.
     pub fn is_unsaved(&self) -> bool {
         self.unsaved
     }
 
-    /// Photographed waypoints of an area as last kept.
+    /// The record of photographed waypoints, as last set or restored from flash.
     pub(crate) fn photographed(&self) -> &[u8] {
         &self.photographed
     }
 
-    /// Keeps that when the flash has time.
+    /// Sets the record of photographed waypoints; it is written to flash by a later request.
     pub(crate) fn store_photographed(&mut self, photographed: Photographed) {
         self.photographed = photographed;
         self.unsaved_photographed = true;
     }
 
-    /// Length of a file; `None` where there is none.
+    /// Length of a file, bytes; `None` if there is no such file.
     pub fn file_size(&self, file: File) -> Option<u32> {
         self.file_range(file).map(|extent| extent.end - extent.start)
     }
 
-    /// Removes a file: it is not there at the next start.
+    /// Removes a file from listings and from the next start on; a roadmap in use stays in use until
+    /// then.
     pub fn remove_file(&mut self, file: File) {
         match file {
             File::Roadmap | File::Field => {
@@ -180,8 +180,9 @@ impl Store {
         }
     }
 
-    /// Asks for bytes of a file; false where others are under way. At most [`MAX_READ`] are given,
-    /// fewer at its end.
+    /// Starts reading up to `len` bytes of a file (at most [`MAX_READ`], fewer at the file's end).
+    /// False if the file ends before `offset`, or the store is at work; then it is to be called
+    /// again.
     pub fn request_read(&mut self, file: File, offset: u32, len: usize) -> bool {
         let Some(extent) =
             self.file_range(file).filter(|extent| offset < extent.end - extent.start)
@@ -193,8 +194,8 @@ impl Store {
         self.start_read(FlashJob::Read { at, len })
     }
 
-    /// Asks for the running CRC of a whole file from a state; false where something else is under
-    /// way.
+    /// Starts computing the CRC-32 of a whole file, beginning with `state`. False if there is no
+    /// such file, or the store is at work; then it is to be called again.
     pub fn request_crc(&mut self, file: File, state: u32) -> bool {
         let Some(extent) = self.file_range(file) else { return false };
         self.start_read(FlashJob::Sum { at: extent.start, end: extent.end, sum: state })
@@ -210,13 +211,14 @@ impl Store {
         true
     }
 
-    /// The newest sealed roadmap that was not removed.
+    /// The slot with the newest complete roadmap or field that was not removed.
     fn newest_slot(&self) -> Option<usize> {
         let number = |i: &usize| self.slots[*i].seal().map(|seal| seal.sequence);
         (0..2).filter(|i| number(i).is_some_and(|n| n > self.forgotten)).max_by_key(number)
     }
 
-    /// The newest sealed area, if it holds this file.
+    /// The newest slot and its seal, if it holds `file`; of roadmap and field only the newer one
+    /// counts.
     fn newest_of(&self, file: File) -> Option<(usize, Seal)> {
         let slot = self.newest_slot()?;
         let seal = self.slots[slot].seal()?;
@@ -241,7 +243,8 @@ impl Store {
         }
     }
 
-    /// An area that is to be erased ahead of time: neither used nor the newest.
+    /// An area to be erased ahead of time: neither in use, nor the newest, nor erased or being
+    /// written.
     fn next_area_to_erase(&self) -> Option<FlashArea> {
         let newest = self.newest_slot();
         let slot = (0..2).find(|&i| {

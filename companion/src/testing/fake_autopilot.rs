@@ -1,6 +1,6 @@
-//! A scripted autopilot, PX4 or ArduCopter, for unit tests: the modes, acks and streams that the
-//! companion relies on, and a vehicle that goes where the setpoint says at a limited speed. The
-//! real closed loop is host-sim's.
+//! A scripted autopilot, PX4 or ArduCopter, for the companion's unit tests. It has the modes,
+//! COMMAND_ACKs and streams that the companion relies on, and a vehicle that moves to the setpoint
+//! at a limited speed. `host-sim` simulates the real closed loop.
 
 extern crate std;
 use std::vec::Vec;
@@ -28,21 +28,23 @@ mod telemetry;
 pub(crate) use self::mission::*;
 
 pub type Small = Companion<4, WAYPOINTS, GATES>;
-/// A plan for it.
+/// A plan for the bench's companion.
 pub type Plan = VehiclePlan<WAYPOINTS, GATES>;
 pub const WAYPOINTS: usize = 32;
 pub const GATES: usize = 8;
 
-/// The autopilot, the radio's other end, and the companion between them.
+/// Test bench: the companion, its scripted autopilot, and a ground station and a neighbour on the
+/// radio.
 pub struct Bench {
     pub kind: AutopilotKind,
-    /// ArduCopter: message ids whose streams were asked for.
+    /// ArduCopter: message ids whose streams the companion has requested.
     pub streams: Vec<u16>,
     /// ArduCopter: flags of EKF_STATUS_REPORT.
     pub ekf_flags: u16,
-    /// ArduCopter: NAV_TAKEOFF lifted it off.
+    /// ArduCopter: whether NAV_TAKEOFF was accepted and not cancelled by a setpoint before the
+    /// lift-off.
     pub took_off: bool,
-    /// ArduCopter: how long the motors take to lift it off.
+    /// ArduCopter: time from NAV_TAKEOFF to the lift-off, while the motors spin up.
     pub spool: Duration,
     lifts_at: Instant,
     pub timesyncs: Vec<(i64, i64)>,
@@ -53,41 +55,43 @@ pub struct Bench {
     pub armed: bool,
     pub status: u8,
     pub battery: i8,
-    /// Commands refused: `MAV_CMD` numbers.
+    /// Commands that the autopilot refuses: `MAV_CMD` numbers.
     pub refused: Vec<u16>,
-    /// No command is answered; a refused one is not answered either.
+    /// Whether the autopilot sends no COMMAND_ACK, neither for accepted nor for refused commands.
     pub mute: bool,
-    /// SYS_STATUS does not come.
+    /// Whether the autopilot does not send SYS_STATUS.
     pub no_battery: bool,
-    /// The landing detector reports ground, whatever the height.
+    /// Whether the landing detector reports ground at any height.
     pub false_ground: bool,
-    /// Vertical speed as reported, m/s.
+    /// Vertical speed that the autopilot reports, m/s upwards.
     pub climbs_mps: f32,
     pub silent: bool,
     pub no_position: bool,
-    /// Accuracy that ESTIMATOR_STATUS reports, metres; none: the message is not sent.
+    /// Horizontal accuracy that ESTIMATOR_STATUS reports, metres; `None`: the message is not sent.
     pub accuracy_m: Option<f32>,
     /// ArduCopter: `pos_horiz_variance` that EKF_STATUS_REPORT reports.
     pub pos_horiz_variance: f32,
     pub stays_armed: bool,
-    /// Arming is accepted, and undone by the pilot before a HEARTBEAT shows it.
+    /// Whether the autopilot accepts arming, but its pilot disarms before a HEARTBEAT shows the
+    /// armed bit.
     pub never_arms: bool,
-    /// No setpoint moves it.
+    /// Whether the vehicle ignores setpoints and stays where it is.
     pub stuck: bool,
-    /// The rest of the area cannot be divided.
+    /// Whether the shell answers every request for a division with a failure.
     pub undividable: bool,
-    /// Distance that the vehicle moves in 50 ms, metres.
+    /// Distance that the vehicle moves in one tick of 50 ms, metres.
     pub step_m: f32,
     pub never_lands: bool,
     pub events: Vec<Event>,
     pub setpoints: Vec<(Instant, Point, u16)>,
-    /// Heading at each of the pictures, radians from east to the left; none: as the vehicle flies.
+    /// Heading in each setpoint received, radians from east, counter-clockwise; `None` if its mask
+    /// ignores the heading.
     pub headings: Vec<Option<f32>>,
     pub commands: Vec<(u16, f32, f32, f32)>,
     pub texts: Vec<std::string::String>,
     pub swarm: Vec<Frame>,
     pub acks: Vec<(u16, u8, u8, u8)>,
-    /// ArduCopter: the height NAV_TAKEOFF asked for.
+    /// ArduCopter: height above home that NAV_TAKEOFF requested, metres.
     pub takeoff_m: f32,
     target: Option<Point>,
     framers: [Framer; 2],
@@ -97,24 +101,25 @@ pub struct Bench {
     idle_since: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<Plan, crate::PlanFailure>>,
-    /// Whether there is a detour: by y = 16; over a field as planned.
+    /// Answer of the shell to a request for a detour: with `Ok` a path by y = 16, over a field one
+    /// that is planned; `None`: no answer.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
-    /// Whether a division is planned.
+    /// Whether the shell answers requests for a division.
     pub answer_division: bool,
-    /// Times that the planner takes for its answers, one after the other, from the first again;
-    /// none: it answers at once.
+    /// Times that the shell's planner takes for its answers, in turn and again from the first;
+    /// empty: it answers at once.
     pub planner_takes: Vec<Duration>,
     plan_requests: PlanRequests,
     answer_under_way: Option<planner::Answer>,
     answer_count: usize,
     /// The vehicle's plan before it requested a detour.
     own_plan: Option<Plan>,
-    /// The first other vehicle of the roster, or 77, as it reports itself five times a second:
-    /// place, flags of its intent, progress, CRC of its plan.
+    /// The neighbour, vehicle 77 or the first other one of the roster, which reports five times a
+    /// second: place, flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
-    /// When it last knew where it is; none: always.
+    /// Time stamp of the neighbour's positions; `None`: the current time.
     pub neighbour_clock: Option<Instant>,
-    /// Place along its path up to which the neighbour's gates are open, metres.
+    /// Place along the neighbour's path up to which its gates are open, metres.
     pub neighbour_clear_m: f32,
     neighbour_sequence: u8,
 }
@@ -204,7 +209,7 @@ impl Bench {
         self.drain();
     }
 
-    /// A command from the ground station, on the swarm link.
+    /// Sends a COMMAND_LONG from ground station 255 on the swarm link.
     pub fn command(&mut self, command: MavCmd, param1: f32, system: u8, component: u8) {
         let data = COMMAND_LONG_DATA {
             command,
@@ -253,12 +258,13 @@ impl Bench {
         }
     }
 
-    /// An ArduCopter that has just booted.
+    /// A bench with an ArduCopter that has just booted.
     pub fn ardupilot(config: Config<4>) -> Self {
         Self { kind: AutopilotKind::ArduPilot, mode: 0, ..Self::new(config) }
     }
 
-    /// 50 ms of flight and telemetry.
+    /// Lets 50 ms pass: the companion's step, the vehicle's flight, and the autopilot's and
+    /// neighbour's messages.
     pub fn tick(&mut self) {
         self.report_neighbour();
         self.now = self.now + Duration::from_millis(50);
@@ -274,7 +280,8 @@ impl Bench {
         }
     }
 
-    /// Runs until a state is reached; panics with what happened if it is not within the time.
+    /// Runs until the companion is in this state; panics with its texts if it is not within
+    /// `seconds`.
     #[track_caller]
     pub fn until(&mut self, state: crate::State, seconds: f32) {
         for _ in 0..(seconds * 20.0) as u32 {
@@ -286,7 +293,7 @@ impl Bench {
         assert_eq!(self.state(), state, "{:?} at {:?}", self.texts, self.enu);
     }
 
-    /// Started, while vehicle 77 stands on its pad, from where it follows the plan.
+    /// A bench whose mission is started while vehicle 77 stands on its pad, following the plan.
     pub fn accompanied(config: Config<4>) -> Self {
         let mut bench = Self::new(config);
         bench.neighbour =
@@ -296,7 +303,7 @@ impl Bench {
         bench
     }
 
-    /// A bench in the middle of its path.
+    /// A bench whose vehicle follows its path, 2 s after the climb.
     pub fn following(config: Config<4>) -> Self {
         let mut bench = Self::new(config);
         bench.until(crate::State::Ready, 6.0);

@@ -1,5 +1,5 @@
-//! A simulated flash: words of 32 bytes that tear when the power goes, and may not be readable
-//! afterwards; and files to keep in it.
+//! A simulated flash whose words of 32 bytes tear when the power is lost, and may be unreadable
+//! afterwards; and sample files to be stored in it.
 
 extern crate std;
 use std::collections::HashSet;
@@ -22,12 +22,13 @@ use crate::storage::store::{
     Store, WORD,
 };
 
-/// Layout like the H743's bank, but smaller, so that many cuts are tried in little time.
+/// Layout as the H743's storage bank, but smaller, so that many power losses can be simulated
+/// quickly.
 pub const LAYOUT: FlashLayout =
     FlashLayout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
 
-/// The power went.
+/// The power was lost during a request.
 #[derive(Debug)]
 pub struct Cut;
 
@@ -35,13 +36,14 @@ pub struct Flash {
     pub bytes: Vec<u8>,
     pub torn: HashSet<u32>,
     pub rng: Pcg32,
-    /// Words that may still be programmed or erased before the power goes.
+    /// Number of words that can still be programmed or erased before the power is lost; `None` for
+    /// any number.
     pub power: Option<u32>,
     pub programmed: u32,
 }
 
 impl Flash {
-    /// A flash as delivered: any bytes may be in it, and some words cannot be read.
+    /// A flash as delivered: with random bytes, and some unreadable words.
     pub fn new(seed: u64) -> Self {
         let mut rng = Pcg32::new(seed, 7);
         let bytes = (0..LAYOUT.len()).map(|_| rng.next_u32() as u8).collect();
@@ -49,7 +51,7 @@ impl Flash {
         Self { bytes, torn, rng, power: None, programmed: 0 }
     }
 
-    /// Whether the power goes at this word.
+    /// Counts a word that is programmed or erased. Returns whether the power is lost at it.
     pub fn goes(&mut self) -> bool {
         self.programmed += 1;
         match &mut self.power {
@@ -62,7 +64,7 @@ impl Flash {
         }
     }
 
-    /// A word the power went at: as it was, as it was to be, or anything between, readable or not.
+    /// Tears a word: it keeps its old bytes, has the new ones or a mixture, and may be unreadable.
     pub fn tear(&mut self, at: usize, wanted: &[u8]) {
         let kind = self.rng.next_u32() % 4;
         for (i, byte) in wanted.iter().enumerate() {
@@ -129,7 +131,7 @@ impl ReadFlash for Flash {
     }
 }
 
-/// Does one thing that is asked; the bytes read are left in `read`.
+/// Executes one request of the store; the bytes of a read are put into `read`.
 pub fn obey(
     flash: &mut Flash,
     request: FlashRequest<'_>,
@@ -153,7 +155,7 @@ pub fn obey(
     }
 }
 
-/// Does what the store asks until it asks for nothing.
+/// Executes the store's requests until it has none.
 pub fn run(store: &mut Store, flash: &mut Flash, erasing: ErasePermission) -> Result<(), Cut> {
     let mut read = [0; MAX_READ];
     for _ in 0..100_000 {
@@ -164,7 +166,8 @@ pub fn run(store: &mut Store, flash: &mut Flash, erasing: ErasePermission) -> Re
     panic!("it asks for ever");
 }
 
-/// Tidies the flash up as a board that stands idle does.
+/// A store mounted on this flash, after the work that a board does while idle: areas are erased
+/// ahead of time.
 pub fn started(flash: &mut Flash) -> Store {
     let mut store = Store::mount(LAYOUT, flash);
     run(&mut store, flash, ErasePermission::Allowed).expect("the power is on");

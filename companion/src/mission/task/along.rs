@@ -1,20 +1,20 @@
-//! Where on its path a vehicle is.
+//! How far along its path a vehicle is, and on which path.
 
-/// Which path a vehicle is on, as its task sees it.
+/// Which path a vehicle flies, for its task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PathRelation {
-    /// The plan's own.
+    /// The path of its plan.
     OnPath,
-    /// A detour around a keep-out zone on the path, near the path and back to it.
+    /// A detour near that path, around a keep-out zone on it and back to it.
     Beside,
-    /// Another one, or none.
+    /// Another path, or none: no pictures are taken.
     Elsewhere,
 }
 
-/// Progress of a vehicle along its path, as its task sees it.
+/// Progress of a vehicle along the path that it flies, for its task.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PathProgress {
-    /// Way made along the path, metres.
+    /// Distance flown along that path, metres.
     pub(crate) progress_m: f32,
     /// Which path that is.
     pub(crate) place: PathRelation,

@@ -1,11 +1,11 @@
-//! The camera: the autopilot is commanded to trigger it along the stretches that are photographed.
+//! The camera: commands that make the autopilot take pictures along the path's photographed
+//! stretches.
 //!
-//! By distance, `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the trigger on at a stretch's first place,
-//! with a picture at once, and off at its last, with another. By waypoint,
-//! `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands go one after the other and are
-//! repeated until they are acknowledged. A vehicle that leaves its path switches the trigger off;
-//! where it comes back it continues with a picture at once, so that no gap is wider than the
-//! spacing.
+//! Two triggers. By distance: `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the autopilot's trigger on
+//! at a stretch's first place and off at its last, with a picture at each. By waypoint:
+//! `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands are sent one after the other, each
+//! repeated until acknowledged. The trigger is switched off when the vehicle leaves its path. Back
+//! on the path it starts with a picture at once, so that no gap is wider than the spacing.
 
 use heapless::Deque;
 use libm::atan2f;
@@ -19,15 +19,15 @@ use crate::link::Links;
 use crate::link::outbox::Outgoing;
 use crate::time::{Duration, Instant};
 
-/// Most camera commands that wait.
+/// Most camera commands in the queue.
 const MAX_COMMANDS: usize = 4;
-/// Time after which a command that was not acknowledged is repeated.
+/// Time after which an unacknowledged command is sent again.
 const REPEAT_EVERY: Duration = Duration::from_millis(300);
-/// Number of times that a command is sent before it is given up and reported.
+/// Number of times that a command is sent before it is dropped and reported.
 const MAX_TRIES: u8 = 5;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
-/// Shortest stretch from which a direction of flight is taken, metres.
+/// Shortest horizontal length of a stretch from which a heading is computed, metres.
 const MIN_STRETCH_M: f32 = 0.1;
 
 const DO_DIGICAM_CONTROL: u16 = 203;
@@ -36,11 +36,11 @@ const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 /// A camera command to the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum CameraCommand {
-    /// A picture now, and one after each distance in metres; 0 ends that.
+    /// Take a picture now, and one after each such distance, metres; at 0 no more after the first.
     Every(f32),
-    /// No more pictures.
+    /// Stop taking pictures.
     Off,
-    /// A picture now.
+    /// Take one picture now.
     Picture,
 }
 
@@ -61,28 +61,29 @@ impl CameraCommand {
     }
 }
 
-/// Progress of the pictures.
+/// State of the camera commands along one path.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CameraControl {
-    /// The stretch at hand, and the next picture on it.
+    /// Index of the current stretch, and number (`picture`) of the next picture on it.
     stretch: usize,
     picture: u32,
-    /// Beside its path: where the next one is taken, metres along that way.
+    /// On a detour beside the path: place along the detour where the next picture is taken, metres.
     beside_m: f32,
-    /// Whether it is beside its path.
+    /// Whether the vehicle flies a detour beside its path.
     beside: bool,
-    /// Whether the autopilot was commanded to trigger by distance.
+    /// Whether the autopilot's trigger by distance was switched on.
     trigger_on: bool,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
-    /// Number of times that the first command was sent, and the time of the last.
+    /// Number of times that the first queued command was sent, and (`sent_at`) when it was sent
+    /// last.
     tries: u8,
     sent_at: Option<Instant>,
-    /// Commands given up, or refused; none was reported yet.
+    /// Whether a command was dropped or refused: from then on such failures are not reported.
     failed: bool,
 }
 
 impl CameraControl {
-    /// Queues and sends the camera commands that are due.
+    /// Queues the camera commands that are due at this place, and sends the first queued command.
     pub(super) fn step<const W: usize>(
         &mut self,
         photographs: &PicturePlan,
@@ -94,8 +95,8 @@ impl CameraControl {
         if photographs.trigger != Trigger::None {
             let beside = along.place == PathRelation::Beside;
             if core::mem::replace(&mut self.beside, beside) != beside {
-                // Pictures begin again where it leaves its path, and where it comes back: neither
-                // place may lie between two.
+                // Pictures begin again where the vehicle leaves its path, and where it comes back:
+                // neither place may lie in a gap between two pictures.
                 self.beside_m = 0.0;
                 self.switch_off();
             }
@@ -116,7 +117,8 @@ impl CameraControl {
         }
     }
 
-    /// Beside its path it takes pictures as far apart as on it, whether it would there or not.
+    /// On a detour beside the path pictures are taken at the path's spacing, even where the path
+    /// has none.
     fn photograph_on_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
         let spacing_m = photographs.spacing_m;
         if photographs.trigger == Trigger::Distance {
@@ -144,8 +146,7 @@ impl CameraControl {
             }
             Trigger::Distance => self.queue_command(CameraCommand::Every(0.0)),
             _ => {
-                // Of several pictures that were passed at once one is enough: all would show the
-                // same.
+                // Of several pictures passed within one step one is taken: all would show the same.
                 let before = self.picture;
                 while self.picture < shots.count && shots.picture_at_m(self.picture) <= progress_m {
                     self.picture += 1;
@@ -161,7 +162,8 @@ impl CameraControl {
     }
 
     fn queue_command(&mut self, order: CameraCommand) {
-        // Full where the autopilot is silent: the one that waits longest is worth least.
+        // The queue is full while the autopilot is silent: drop the oldest command, whose place is
+        // farthest away.
         if self.commands.is_full() {
             self.commands.pop_front();
             (self.tries, self.sent_at, self.failed) = (0, None, true);
@@ -169,7 +171,8 @@ impl CameraControl {
         let _ = self.commands.push_back(order);
     }
 
-    /// Sends the first queued command, and repeats it until it is acknowledged.
+    /// Sends the first queued command, and repeats it until it is acknowledged or has been sent
+    /// five times.
     fn send_current_command(&mut self, now: Instant, links: &mut Links) {
         let Some(&order) = self.commands.front() else { return };
         if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
@@ -209,8 +212,9 @@ impl CameraControl {
     }
 }
 
-/// Heading of the vehicle `along_m` metres along its path: along the current stretch, and before a
-/// stretch along that stretch, so that the vehicle has turned before the first picture.
+/// Heading of the vehicle `along_m` metres along its path, radians from east, counter-clockwise:
+/// the direction of the stretch there, or of the next stretch before its first picture. `None` on a
+/// path without a stretch.
 pub(super) fn heading<const W: usize>(
     photographs: &PicturePlan,
     path: &Path<W>,

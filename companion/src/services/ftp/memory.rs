@@ -1,22 +1,23 @@
-//! What the server remembers of requests that it must not obey twice.
+//! Duplicate detection: the outcomes of requests that must not be executed twice.
 //!
-//! A repeated request is known for [`DUPLICATE_WINDOW`] by all that is in it. MAVSDK repeats under
-//! a new sequence number, after up to 4 s: so what closing a session came to is answered for
-//! [`CLOSED_SESSION_WINDOW`] under any number, until its client opens the next.
+//! A repeated request is recognised by its whole content for [`DUPLICATE_WINDOW`]. MAVSDK repeats
+//! with a new sequence number, up to 4 s later. So the outcome of closing a session is sent again
+//! for [`CLOSED_SESSION_WINDOW`] whatever the sequence number, until the client opens the next
+//! session.
 
 use super::packet::{NakError, Request, RequestFingerprint, op, request_fingerprint};
 use crate::time::{Duration, Instant};
 
-/// Time for which a repeated request is recognised as a duplicate.
+/// Time for which a repetition of an answered request is recognised.
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(3);
-/// Time for which the result of the last session is still answered.
+/// Time for which a repeated TerminateSession gets the outcome of the closed session.
 const CLOSED_SESSION_WINDOW: Duration = Duration::from_secs(10);
-/// Most requests remembered for duplicate detection.
+/// Most answered requests that are remembered.
 const MAX_REMEMBERED: usize = 8;
 
 type Outcome = Result<(), NakError>;
 
-/// The memory.
+/// The last answered requests and the last closed session, with their outcomes.
 #[derive(Clone, Debug, Default)]
 pub struct DuplicateDetection {
     done: [Option<AnsweredRequest>; MAX_REMEMBERED],
@@ -31,7 +32,7 @@ struct AnsweredRequest {
     at: Instant,
 }
 
-/// The last session that was closed.
+/// The session that was closed last, and the outcome of closing it.
 #[derive(Clone, Copy, Debug)]
 struct ClosedSession {
     client: (u8, u8),
@@ -41,8 +42,8 @@ struct ClosedSession {
 }
 
 impl DuplicateDetection {
-    /// Remembers the outcome of a request: TerminateSession by its session, any other request by
-    /// its whole content.
+    /// Remembers the outcome of a request: of TerminateSession by client and session, of any other
+    /// request by its whole content.
     pub fn remember(&mut self, request: &Request, outcome: Outcome, at: Instant) {
         if request.opcode == op::TERMINATE {
             self.closed = Some(ClosedSession {
@@ -58,7 +59,7 @@ impl DuplicateDetection {
         }
     }
 
-    /// Outcome of the same request if it was answered a short time ago.
+    /// Outcome of this same request if it was answered within the last 3 s (`DUPLICATE_WINDOW`).
     pub fn previous_outcome(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let print = request_fingerprint(request);
         let known =
@@ -66,7 +67,8 @@ impl DuplicateDetection {
         self.done.iter().flatten().find(known).map(|done| done.outcome)
     }
 
-    /// Outcome of closing the session that a request is of.
+    /// Outcome of closing the session that the request names, if that was within the last 10 s
+    /// (`CLOSED_SESSION_WINDOW`).
     pub fn previous_close_outcome(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let known = |closed: &&ClosedSession| {
             (closed.client, closed.session) == (request.client, request.session)
@@ -75,7 +77,7 @@ impl DuplicateDetection {
         self.closed.as_ref().filter(known).map(|closed| closed.outcome)
     }
 
-    /// A client opens a session: the one before it is forgotten.
+    /// Forgets the client's closed session, as it opens another one.
     pub fn forget_closed(&mut self, client: (u8, u8)) {
         self.closed.take_if(|closed| closed.client == client);
     }

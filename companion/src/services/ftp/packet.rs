@@ -1,20 +1,20 @@
-//! The packet inside a FILE_TRANSFER_PROTOCOL: 12 bytes of header (sequence u16, session, opcode,
-//! size, opcode answered, burst complete, 0, offset u32), then at most 239 of data.
+//! The FTP packet in a FILE_TRANSFER_PROTOCOL: a header of 12 bytes (sequence number u16, session,
+//! opcode, size, opcode replied to, burst complete, 0, offset u32), then at most 239 bytes of data.
 
 use crate::link::frame::Frame;
 use crate::storage::store::{File, UploadError, crc32};
 
-/// Most data of an FTP packet, bytes.
+/// Most bytes of data in an FTP packet.
 pub const MAX_DATA: usize = 239;
 
-/// Bytes of an FTP packet before its data.
+/// Bytes of an FTP packet's header.
 pub const HEADER_LEN: usize = 12;
-/// Opcode of a positive answer.
+/// Opcode of a positive reply.
 pub const ACK: u8 = 128;
-/// Opcode of a negative answer.
+/// Opcode of a negative reply.
 pub const NAK: u8 = 129;
 
-/// Opcodes.
+/// Opcodes of requests, as MAVLink numbers them.
 pub mod op {
     /// `kCmdNone`: no operation, always acknowledged.
     pub const NONE: u8 = 0;
@@ -35,10 +35,10 @@ pub mod op {
     pub const BURST_READ: u8 = 15;
 }
 
-/// Error code of a NAK.
+/// Error of a NAK, as MAVLink numbers them; [`NakError::Errno`] has an `errno` in addition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NakError {
-    /// With an `errno`.
+    /// `FailErrno`, with this `errno`.
     Errno(u8),
     InvalidSize,
     InvalidSession,
@@ -61,10 +61,10 @@ impl From<UploadError> for NakError {
     }
 }
 
-/// A text for a person: whether it is a warning, and the text.
+/// A STATUSTEXT for the operator: whether its severity is WARNING (else INFO), and the text.
 pub type Text = (bool, &'static str);
 
-/// All texts that the FTP service reports.
+/// All STATUSTEXTs of the FTP server.
 pub const FTP_TEXTS: [Text; 9] = [
     (false, "Roadmap stored: used from the next start"),
     (false, "Mission stored: used from the next start"),
@@ -77,10 +77,10 @@ pub const FTP_TEXTS: [Text; 9] = [
     (false, "Field stored: used from the next start"),
 ];
 
-/// Text of a file that was removed.
+/// STATUSTEXT after a file was removed.
 pub const FILE_REMOVED: Text = FTP_TEXTS[2];
 
-/// The text for the end of an upload.
+/// STATUSTEXT after an upload has ended with this result.
 pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
     FTP_TEXTS[match (file, result) {
         (File::Roadmap, Ok(())) => 0,
@@ -127,12 +127,12 @@ impl Request {
         request_fingerprint(self) == request_fingerprint(other)
     }
 
-    /// The data that counts, or all of it where the size is too large.
+    /// The first `size` bytes of the data; all of it if `size` is too large.
     pub fn bytes(&self) -> &[u8] {
         &self.data[..usize::from(self.size).min(MAX_DATA)]
     }
 
-    /// The path it names, without slashes around it; a zero ends it.
+    /// The path that the request names, up to a zero byte, without a leading `.` or slashes.
     pub fn path(&self) -> &[u8] {
         let path = self.bytes().split(|b| *b == 0).next().unwrap_or_default();
         let path = path
@@ -148,13 +148,13 @@ impl Request {
     }
 }
 
-/// Whether it opens a session.
+/// Whether the request opens a session.
 pub fn is_open(request: &Request) -> bool {
     matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
 }
 
-/// The fields by which a repeated request is recognised. Two programs of one client's id may begin
-/// at the same sequence number: session and data may tell them apart.
+/// The fields by which a repeated request is recognised. Two programs under one client's ids may
+/// both begin at the same sequence number: session and data can distinguish them.
 pub type RequestFingerprint = ((u8, u8), u16, (u8, u8), u32, u32);
 
 pub fn request_fingerprint(request: &Request) -> RequestFingerprint {
@@ -162,7 +162,7 @@ pub fn request_fingerprint(request: &Request) -> RequestFingerprint {
     (client, sequence, (session, opcode), offset, crc32(request.bytes()))
 }
 
-/// Bytes asked for with each packet of a read.
+/// Bytes of data that each packet of a read or burst is to have; size 0 means the most possible.
 pub fn chunk_len(request: &Request) -> usize {
     match usize::from(request.size) {
         0 => MAX_DATA,

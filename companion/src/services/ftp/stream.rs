@@ -1,11 +1,12 @@
-//! A burst: one request that is answered by packets, each as if it had been asked for by itself.
+//! A burst: one request that is answered by several packets, each as if it had been requested by
+//! itself.
 
 use super::packet::{Request, chunk_len};
 
-/// Packets of one burst; after it the client requests the next burst.
+/// Packets of one burst; after the last one the client requests the next burst.
 pub const PACKETS_PER_BURST: u8 = 16;
 
-/// A burst that has begun.
+/// A burst under way: the request, and offset and sequence number of its next packet.
 #[derive(Clone, Copy, Debug)]
 pub struct FtpBurst {
     request: Request,
@@ -15,7 +16,7 @@ pub struct FtpBurst {
 }
 
 impl FtpBurst {
-    /// A burst before its first packet.
+    /// The burst that a request asks for, before its first packet.
     pub fn new(request: &Request) -> Self {
         Self {
             request: *request,
@@ -25,17 +26,18 @@ impl FtpBurst {
         }
     }
 
-    /// The request that started the burst.
+    /// The request that the client sent for the burst.
     pub fn first_request(&self) -> Request {
         self.request
     }
 
-    /// The request that its next packet answers.
+    /// The request that the client would have sent for the next packet alone.
     fn next_request(&self) -> Request {
         Request { sequence: self.sequence, offset: self.offset, ..self.request }
     }
 
-    /// The burst after a packet of `len` data bytes; `None` where that packet was the last.
+    /// The burst after a packet with `len` bytes of data was read; `None` if that packet was its
+    /// last.
     pub fn advanced_by(&self, len: usize) -> Option<Self> {
         let last = self.packets_left == 1 || len < chunk_len(&self.request);
         let (offset, sequence) = (self.offset + len as u32, self.sequence.wrapping_add(1));
@@ -43,7 +45,8 @@ impl FtpBurst {
     }
 }
 
-/// A request of one packet, or that of the next packet of the burst which it asked for.
+/// The request that the next packet answers: that of the burst's next packet if `request` started
+/// the burst, else `request` itself.
 pub fn next_request(request: &Request, stream: Option<&FtpBurst>) -> Request {
     stream
         .filter(|stream| stream.request.is_same_request(request))

@@ -1,8 +1,8 @@
-//! The block of a coverage mission: the area, how it is photographed, and each vehicle's share (CPP
-//! §3; byte by byte in `companion/README.md`).
+//! The coverage block of a mission file: the area, how it is photographed, and each vehicle's share
+//! (CPP §3); `companion/README.md` lists it byte by byte.
 //!
-//! What follows from these numbers is computed: lanes, routes, flights. POWELL's shares W are
-//! planned on the desk.
+//! Lanes, routes and flights are not in the file: each companion computes them from these numbers.
+//! The shares W of POWELL are computed on the desk.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};
@@ -15,64 +15,67 @@ use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, f32_at, is_positive_up_to, put_numbers, u16_at, u32_at};
 pub use crate::config::Ground;
 
-/// Bytes before the first vehicle's share.
+/// Bytes of the block before the first vehicle's share.
 const HEAD_LEN: usize = 60;
-/// Bytes of a vehicle's share.
+/// Bytes of a vehicle's share in the block.
 const SHARE_LEN: usize = 12;
-/// Bytes of a ring.
+/// Bytes of a ring in the block.
 const RING_LEN: usize = 4;
-/// Bytes of a vertex.
+/// Bytes of a vertex in the block.
 const VERTEX_LEN: usize = 8;
-/// Most changes of the lanes' order that a mission file may request: a board tries each of them.
+/// Most changes of the lanes' order that a mission file may request to be tried: a board must try
+/// all of them.
 pub const MAX_ORDER_CHANGES_OF_FILE: u32 = 20_000_000;
 
-/// Heading of vehicles along the lanes.
+/// Heading of the vehicles on the lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeadingRule {
-    /// One heading on all lanes.
+    /// The same heading on all lanes.
     Sweep,
-    /// The way they fly.
+    /// The direction of flight.
     Lane,
 }
 
-/// Which vehicles a part of the work may go to.
+/// Which vehicles a part of the area may be assigned to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PartEligibility {
-    /// Any: the shares are those that POWELL found, or all alike.
+    /// Any vehicle: the shares are sizes of parts, as POWELL found them or all equal.
     Anyone,
-    /// Vehicles with equal weights: the shares are the weights.
+    /// Vehicles whose weight is that of the part: the shares are the vehicles' weights.
     SameWeight,
 }
 
-/// Settings that all vehicles of a coverage mission share.
+/// Settings of a coverage mission that all its vehicles share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoverageHeader {
-    /// The smallest part of the work.
+    /// The smallest part of the area that is assigned to one vehicle: a lane or a waypoint.
     pub unit: TrackUnit,
-    /// Which vehicles it may go to.
+    /// Which vehicles a part may be assigned to.
     pub parts: PartEligibility,
-    /// Heading of the vehicles along their lanes.
+    /// Heading of the vehicles on the lanes.
     pub heading: HeadingRule,
-    /// Trigger of the pictures.
+    /// How the pictures are triggered.
     pub trigger: Trigger,
-    /// Changes of the lanes' order that are checked, at most.
+    /// Most changes of the lanes' order that the planner tries.
     pub search_steps: u32,
-    /// Height of the pictures and of the layers.
+    /// Height at which pictures are taken, and distance between the layers of transit flights.
     pub heights: Heights,
-    /// Footprint and spacings.
+    /// Footprint of a picture, and distances between lanes and between waypoints.
     pub spacing: Spacing,
-    /// Direction of the lanes, degrees from east to the left; the one of least width where absent.
+    /// Direction of the lanes, degrees from east, counter-clockwise; `None` for the direction of
+    /// least width of the area.
     pub angle_deg: Option<f32>,
-    /// Lanes begin and end so far beyond the edge, metres.
+    /// Distance by which lanes begin and end beyond the area's edge, metres.
     pub margin_m: f32,
-    /// The ground, where it is not level: the mission needs the field of its `roadmap_crc`.
+    /// Heights of uneven ground; the mission then needs the field whose CRC is its `roadmap_crc`.
+    /// `None` for level ground.
     pub ground: Option<Ground>,
 }
 
-/// Capability of one vehicle.
+/// Share and vertical speeds of one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleShare {
-    /// Weight of the vehicle, or the size of the share that comes at its place: at least 0.
+    /// Weight of the vehicle, or size of a part ([`PartEligibility`]); at least 0.
     pub weight: f32,
     /// Speed upwards, m/s.
     pub climb_mps: f32,
@@ -80,26 +83,26 @@ pub struct VehicleShare {
     pub descend_mps: f32,
 }
 
-/// The block as it is written.
+/// The coverage block as it is to be written.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverageParts<'a> {
     /// Settings that all vehicles share.
     pub header: CoverageHeader,
-    /// Share of each vehicle, in the order of the mission's.
+    /// Share of each vehicle, in the order of the mission's vehicles.
     pub shares: &'a [VehicleShare],
-    /// The rings.
+    /// The rings of the area: outer edges, holes and no-fly zones.
     pub rings: &'a [Ring],
-    /// Vertices of the rings, metres east and north of the mission origin.
+    /// Vertices of all rings, metres east and north of the mission's origin.
     pub vertices: &'a [Flat],
 }
 
 impl CoverageParts<'_> {
-    /// Bytes of the block.
+    /// Length of the block, bytes.
     pub fn encoded_len(&self) -> usize {
         encoded_len(self.shares.len(), self.rings.len(), self.vertices.len())
     }
 
-    /// Writes the block, which has its length.
+    /// Writes the block to `out`, which has the block's length.
     pub(super) fn write(&self, out: &mut [u8]) {
         let h = &self.header;
         out[..2].copy_from_slice(&(self.vertices.len() as u16).to_le_bytes());
@@ -149,13 +152,13 @@ impl CoverageParts<'_> {
     }
 }
 
-/// Bytes of a block.
+/// Length of the block with so many vehicles, rings and vertices, bytes.
 pub const fn encoded_len(vehicles: usize, rings: usize, vertices: usize) -> usize {
     HEAD_LEN + vehicles * SHARE_LEN + rings * RING_LEN + vertices * VERTEX_LEN
 }
 
-/// A checked block over borrowed bytes. Whether its rings are an area,
-/// [`planner_core::coverage::area::Area::new`] says.
+/// A coverage block whose numbers have been checked; it borrows its bytes.
+/// [`planner_core::coverage::area::Area::new`] checks whether its rings form an area.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverageView<'a> {
     header: CoverageHeader,
@@ -164,14 +167,14 @@ pub struct CoverageView<'a> {
     vertices: &'a [[u8; VERTEX_LEN]],
 }
 
-/// Time after which a vehicle that no other vehicle hears any more is on the ground, beside its
-/// flight, seconds: the lease, a message's age and delay, the stop, what the row `Alone` waits, and
-/// the slow end of a descent.
+/// Time, beside its flight, after which a vehicle that no other vehicle hears any more is on the
+/// ground, seconds: its lease, age and delay of the last message, the stop, the wait of the row
+/// `Alone`, and the slow end of a descent.
 const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
-    /// A vehicle that no other vehicle hears any more is down after so many seconds, from the
-    /// highest layer.
+    /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground,
+    /// from the highest layer at the slowest vehicle's descent speed.
     pub fn time_to_ground_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
@@ -180,7 +183,7 @@ impl<'a> CoverageView<'a> {
         UNHEARD_DOWN_S + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
     }
 
-    /// Checks the block of a mission of so many vehicles.
+    /// Checks the coverage block of a mission with so many vehicles.
     pub(super) fn parse(b: &'a [u8], vehicles: usize) -> Result<Self, MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());
         let Some(head) = b.first_chunk::<HEAD_LEN>() else { return Err(FileError::Length.into()) };
@@ -250,7 +253,7 @@ impl<'a> CoverageView<'a> {
         Ok(view)
     }
 
-    /// Settings that all vehicles share.
+    /// Settings of the coverage mission that all its vehicles share.
     pub fn header(&self) -> &CoverageHeader {
         &self.header
     }
@@ -264,7 +267,7 @@ impl<'a> CoverageView<'a> {
         })
     }
 
-    /// The rings.
+    /// The rings of the area: outer edges, holes and no-fly zones.
     pub fn rings(&self) -> impl ExactSizeIterator<Item = Ring> + '_ {
         self.rings.iter().map(|b| Ring {
             end: u16_at(b, 0),
@@ -276,12 +279,12 @@ impl<'a> CoverageView<'a> {
         })
     }
 
-    /// Vertices of the rings, metres east and north of the mission origin.
+    /// Vertices of all rings, metres east and north of the mission's origin.
     pub fn vertices(&self) -> impl ExactSizeIterator<Item = Flat> + '_ {
         self.vertices.iter().map(|b| Flat::new(f32_at(b, 0), f32_at(b, 4)))
     }
 
-    /// Bytes it takes.
+    /// Length of the block, bytes.
     pub(super) fn byte_len(&self) -> usize {
         encoded_len(self.shares.len(), self.rings.len(), self.vertices.len())
     }

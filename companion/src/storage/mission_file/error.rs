@@ -1,18 +1,19 @@
-//! Reason why a mission file is refused, for programs and for people.
+//! Why a mission file is rejected, for programs and as a text for the operator.
 
 use core::fmt;
 
 use planner_core::file::FileError;
 
-/// Reason why a mission file was refused, on reading or writing. Its text has at most 41
-/// characters, so that a STATUSTEXT has room for it.
+/// Why a mission file was rejected, on reading or writing. Its text has at most 41 characters, so
+/// that it fits into a STATUSTEXT.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionError {
-    /// The bytes are no whole file.
+    /// The bytes are no complete mission file, or its header has an invalid value.
     File(FileError),
-    /// The vehicle at this index has no system id, one that another has, or a number out of range.
+    /// The vehicle at this index has no system id, one that another vehicle has, or a number out of
+    /// range.
     Vehicle(u16),
-    /// Labelled, the vehicle with this system id has a goal that is another one's too.
+    /// In labelled mode, the vehicle with this system id has the same goal as another vehicle.
     SameGoal(u8),
     /// The vehicle with this system id starts outside the geofence.
     StartOutside(u8),
@@ -20,12 +21,12 @@ pub enum MissionError {
     Goal(u16),
     /// The goal at this index lies outside the geofence.
     GoalOutside(u16),
-    /// The output buffer is smaller than the mission file; `needed` bytes would do.
+    /// The output buffer is too small for the mission file of `needed` bytes.
     MissionFull {
-        /// Bytes the file takes.
+        /// Length of the mission file, bytes.
         needed: usize,
     },
-    /// More vehicles than this companion has room for.
+    /// The mission has more vehicles or goals than this companion has room for.
     RosterFull,
     /// No vehicle of the mission has this system id.
     NotInRoster(u8),

@@ -1,4 +1,4 @@
-//! One vehicle, one goal.
+//! The vehicles and goals of a mission file.
 
 use planner_core::Point;
 use planner_core::plan::VehicleTask;
@@ -8,32 +8,32 @@ use super::numbers::{
     MAX_SPEED_MPS, f32_at, in_range, is_positive_up_to, point_at, put_numbers, u16_at,
 };
 
-/// Bytes of a vehicle.
+/// Bytes of a vehicle in the file.
 pub const VEHICLE_LEN: usize = 32;
-/// Bytes of a goal.
+/// Bytes of a goal in the file.
 pub const GOAL_LEN: usize = 16;
-/// Goal index of a vehicle without a goal of its own.
+/// Goal index of a vehicle that has no goal of its own.
 pub const NO_GOAL: u16 = u16::MAX;
 
-/// One vehicle; vehicle `i` starts at node `i` of the roadmap.
+/// One vehicle of a mission; vehicle `i` starts at node `i` of the roadmap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionVehicle {
-    /// System id, clearance needed, height of the start over its pad, own goal.
+    /// System id, required clearance, height of the path's start above the pad, and goal.
     pub task: VehicleTask,
-    /// First point of its path.
+    /// First point of the vehicle's path, above its pad, in the mission frame.
     pub start: Point,
-    /// Radius of its hull, metres.
+    /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,
-    /// Fastest it can fly, m/s.
+    /// Greatest speed of the vehicle, m/s.
     pub speed_max_mps: f32,
 }
 
-/// One goal; goal `i` is node `vehicles + i` of the roadmap.
+/// One goal of a mission; goal `i` is node `vehicles + i` of the roadmap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionGoal {
-    /// Position of the goal.
+    /// Position of the goal in the mission frame.
     pub position: Point,
-    /// Height of the goal over where a vehicle stands on the ground below it, metres.
+    /// Height of the goal above the place where a vehicle stands after landing below it, metres.
     pub descent_m: f32,
 }
 

@@ -1,20 +1,20 @@
-//! Areas of flash, each written once between two erasures: two slots for roadmaps, two halves of
-//! the journal.
+//! The four areas of the storage bank, each written once between two erasures: two slots for
+//! roadmaps or fields, two halves of the journal.
 //!
 //! | offset | word of 32 bytes | programmed |
 //! |---|---|---|
 //! | 0 | "clean" | after all sectors of the area were erased: an erasure that was cut has none |
-//! | 32 | "used" | before anything else is written |
-//! | 64 | seal: what the area holds | last of all, when everything was read back |
-//! | 256 | data | between the two |
-//!
-//! A word that was cut while it was programmed may read as anything, or not at all; no decision
-//! hangs on one such word being one or the other: a seal is believed only with its CRC, an area is
-//! written only if it is clean and unused.
+//! | 0 | "clean" | after all sectors of the area were erased; an interrupted erasure leaves none |
+//! | 32 | "used" | before anything else is written to the area |
+//! | 64 | seal: sequence number, length and CRC of the data | last of all, after the data was read back |
+//! | 256 | data | between "used" and the seal |
+//! A word whose programming was interrupted may read as anything, or not at all. So no decision
+//! relies on one such word: a seal counts only with its CRC, and an area is written only if it is
+//! marked "clean" and not "used".
 
 use super::flash::{FlashFault, FlashLayout, MAX_PROGRAM, ReadFlash, WORD, crc32};
 
-/// Offset of a slot's data, bytes.
+/// Offset of an area's data from its first byte.
 pub const DATA_OFFSET: u32 = MAX_PROGRAM as u32;
 const USED_OFFSET: u32 = WORD as u32;
 const SEAL_OFFSET: u32 = 2 * WORD as u32;
@@ -23,10 +23,10 @@ const CLEAN: [u8; WORD] = *b"FLKCLEAN: erased, may be written";
 const USED: [u8; WORD] = *b"FLKUSED:  written to, seal ahead";
 const SEAL_MAGIC: [u8; 4] = *b"FLKS";
 
-/// One of the four areas.
+/// One of the four areas of the storage bank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashArea {
-    /// Roadmap slot 0 or 1.
+    /// Slot 0 or 1, for a roadmap or a field.
     Slot(usize),
     /// Half 0 or 1 of the journal.
     Half(usize),
@@ -41,7 +41,7 @@ impl FlashArea {
         }
     }
 
-    /// Length of the area.
+    /// Length of the area, bytes.
     pub fn len(self, layout: &FlashLayout) -> u32 {
         match self {
             Self::Slot(_) => layout.slot_len,
@@ -54,21 +54,21 @@ impl FlashArea {
         self.offset(layout) + DATA_OFFSET
     }
 
-    /// End of the area in the storage bank.
+    /// Offset of the area's end in the storage bank.
     pub fn end(self, layout: &FlashLayout) -> u32 {
         self.offset(layout) + self.len(layout)
     }
 }
 
-/// A word to program, and where.
+/// Offset in the storage bank, and the word to program there.
 pub type WordToProgram = (u32, [u8; WORD]);
 
-/// The word that says an area is clean.
+/// The word that marks an area as completely erased.
 pub fn clean_mark(layout: &FlashLayout, area: FlashArea) -> WordToProgram {
     (area.offset(layout), CLEAN)
 }
 
-/// The word that says an area is written to.
+/// The word that marks an area as being written.
 pub fn used_mark(layout: &FlashLayout, area: FlashArea) -> WordToProgram {
     (area.offset(layout) + USED_OFFSET, USED)
 }
@@ -78,16 +78,16 @@ pub fn seal_mark(layout: &FlashLayout, area: FlashArea, seal: &Seal) -> WordToPr
     (area.offset(layout) + SEAL_OFFSET, seal.to_bytes())
 }
 
-/// Record that marks an area as complete: sequence number, length, CRC and kind of its file.
+/// Seal of a complete area: sequence number, and of a slot's file the length, CRC and kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seal {
-    /// The larger, the newer.
+    /// Sequence number; of two slots or halves the higher one is newer.
     pub sequence: u32,
-    /// Bytes of the roadmap file; 0 in the journal.
+    /// Bytes of the slot's file; 0 in the journal.
     pub len: u32,
-    /// CRC-32 at the end of the roadmap file; 0 in the journal.
+    /// CRC-32 in the last four bytes of the slot's file; 0 in the journal.
     pub crc: u32,
-    /// Whether that file is a field.
+    /// Whether the slot's file is a field of heights, not a roadmap.
     pub field: bool,
 }
 
@@ -113,18 +113,18 @@ impl Seal {
     }
 }
 
-/// Puts the CRC-32 of a word's first 28 bytes into its last 4.
+/// Writes the CRC-32 of a word's first 28 bytes into its last 4.
 pub fn append_word_crc(word: &mut [u8; WORD]) {
     let crc = crc32(&word[..WORD - 4]);
     word[WORD - 4..].copy_from_slice(&crc.to_le_bytes());
 }
 
-/// Whether a word ends with the CRC-32 of the rest.
+/// Whether a word's last 4 bytes are the CRC-32 of its first 28.
 pub fn has_valid_word_crc(word: &[u8; WORD]) -> bool {
     crc32(&word[..WORD - 4]) == u32_at(word, WORD - 4)
 }
 
-/// The little-endian number at an offset.
+/// The little-endian u32 at offset `at`.
 pub fn u32_at(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
@@ -132,18 +132,18 @@ pub fn u32_at(bytes: &[u8], at: usize) -> u32 {
 /// Condition of an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AreaCondition {
-    /// The area is to be erased before it is written.
+    /// Unknown or half-written contents: the area must be erased before it is written.
     Dirty,
-    /// May be written.
+    /// Erased: the area may be written.
     Clean,
     /// Being written.
     Open,
-    /// Holds something whole.
+    /// Complete: a slot's file or a half of the journal.
     Sealed(Seal),
 }
 
 impl AreaCondition {
-    /// The seal of a sealed area.
+    /// The seal of a sealed area; `None` for any other.
     pub fn seal(self) -> Option<Seal> {
         match self {
             Self::Sealed(seal) => Some(seal),
@@ -152,7 +152,8 @@ impl AreaCondition {
     }
 }
 
-/// Reads the first words of an area; a slot's file is read whole and checked.
+/// The condition of an area in flash by its three marks; a slot's whole file is read to check its
+/// CRC.
 pub fn read_condition(
     layout: &FlashLayout,
     area: FlashArea,
@@ -179,7 +180,7 @@ pub fn read_condition(
     }
 }
 
-/// CRC-32 over a file in flash without its last four bytes.
+/// CRC-32 of a file in flash without its last four bytes, which are its own CRC.
 fn file_crc(at: u32, len: u32, flash: &mut impl ReadFlash) -> Result<u32, FlashFault> {
     let mut block = [0; MAX_PROGRAM];
     let (mut sum, mut done) = (super::flash::CRC_START, 0);

@@ -1,35 +1,37 @@
-//! What the store has in hand.
+//! Jobs of the flash store, each of one or several requests to the flash.
 
 use super::area::{FlashArea, Seal};
 use super::records::JournalRecord;
 
-/// Work of the store.
+/// The job that the store executes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashJob {
     /// No work.
     None,
-    /// The result of the request under way does not matter any more.
+    /// The upload was dropped while a request was open: its outcome is ignored.
     Ignored,
-    /// Reads bytes for a caller of the store.
+    /// Read bytes for a caller of the store.
     Read { at: u32, len: usize },
-    /// Computes the CRC of a file for a caller of the store.
+    /// Compute the running CRC-32 of a file for a caller of the store: done up to `at`.
     Sum { at: u32, end: u32, sum: u32 },
-    /// Erasing an area, sector by sector.
+    /// Erase an area, sector by sector; next the sector at `at`.
     Erase { area: FlashArea, at: u32 },
-    /// Saying that it is clean.
+    /// Program the word that marks an area as erased completely.
     MarkClean(FlashArea),
-    /// Saying that it is written to.
+    /// Program the word that marks an area as being written.
     MarkUsed(FlashArea),
-    /// The window's first block.
+    /// Program the first block of the reassembly window into this slot.
     Flush(FlashArea),
-    /// The window's last bytes, from there on.
+    /// Program the last bytes of an upload from the reassembly window; `done` of them are
+    /// programmed.
     FlushRest { slot: FlashArea, done: u32 },
-    /// Reading the roadmap back.
+    /// Read an upload back and compute its CRC-32; `tail` collects the file's last four bytes, its
+    /// own CRC.
     Check { slot: FlashArea, done: u32, sum: u32, tail: [u8; 4] },
-    /// Sealing an area.
+    /// Program the seal of an area whose data was read back.
     Seal(FlashArea, Seal),
-    /// Reading the seal back.
+    /// Read the seal of an area back.
     SealCheck(FlashArea, Seal),
-    /// A record of the journal.
+    /// Write a record of the journal, and read it back.
     Record(JournalRecord),
 }

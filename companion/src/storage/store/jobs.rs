@@ -1,5 +1,5 @@
-//! What the store does with its flash, one request at a time: which job is next, what it asks for,
-//! what follows.
+//! How the store uses its flash, one request at a time: it chooses a job, makes its next request,
+//! and continues with the outcome.
 
 use super::Store;
 use super::area::{self, AreaCondition, FlashArea, Seal};
@@ -13,9 +13,9 @@ use super::records::{Compaction, JournalRecord, RecordSource, RecordStep};
 use super::upload_state::{UploadError, UploadState};
 
 impl Store {
-    /// The shell's next request, once; its result goes to [`Self::handle_outcome`]. Areas are
-    /// erased only where that is allowed; a flash that stalls the processor only reads where it is
-    /// forbidden.
+    /// The next request to the shell; [`Self::handle_outcome`] must get its outcome before the next
+    /// one. `None` if there is nothing to do or a request is open. `erasing` says whether areas may
+    /// be erased. A flash that stalls the processor is only read while it is `Forbidden`.
     pub fn poll_request(&mut self, erasing: ErasePermission) -> Option<FlashRequest<'_>> {
         if self.request_pending {
             return None;
@@ -27,7 +27,7 @@ impl Store {
         if self.job == FlashJob::None {
             self.job = self.choose_job(erasing)?;
         }
-        // An erasure continues only while it may.
+        // An erasure is given up once it is no longer allowed.
         if matches!(self.job, FlashJob::Erase { .. }) && erasing != ErasePermission::Allowed {
             self.job = FlashJob::None;
             return None;
@@ -99,7 +99,7 @@ impl Store {
         })
     }
 
-    /// Fills the buffer for what is programmed next.
+    /// Fills the buffer with the bytes that the job programs next from the reassembly window.
     fn fill_buffer(&mut self) {
         let rest = match self.job {
             FlashJob::Flush(_) => self.reassembly.next_block().map(|block| &block[..]),
@@ -180,7 +180,8 @@ impl Store {
         FlashJob::Erase { area, at: area.offset(&self.layout) }
     }
 
-    /// Handles how the last request went; `Ok` of an erasure or a program holds no bytes.
+    /// Handles the outcome of the last request. Returns the outcome of a caller's read or CRC once
+    /// that has ended.
     pub fn handle_outcome<'a>(
         &mut self,
         outcome: Result<&'a [u8], FlashFault>,
@@ -255,7 +256,8 @@ impl Store {
         None
     }
 
-    /// An area is marked as used: what goes into it may come.
+    /// Continues after an area was marked as used: a slot takes an upload, a half of the journal a
+    /// compaction.
     fn open_area(&mut self, area: FlashArea) {
         *self.condition_mut(area) = AreaCondition::Open;
         match area {
@@ -269,7 +271,8 @@ impl Store {
         }
     }
 
-    /// A request to an area failed: the area is to be erased.
+    /// Marks an area for erasure after a request to it failed. Ends its upload with an error, or
+    /// counts a failed compaction.
     pub(super) fn handle_area_failure(&mut self, area: FlashArea) {
         *self.condition_mut(area) = AreaCondition::Dirty;
         match area {
@@ -295,7 +298,7 @@ impl Store {
         if (done == 0 && !Self::declares(field, bytes, len)) || bytes.is_empty() {
             return self.end_upload(Err(UploadError::Damaged));
         }
-        // The file's own CRC is its last four bytes, and covers all others.
+        // The last four bytes of the file are the CRC-32 of all others.
         let covered = (len - 4).saturating_sub(done) as usize;
         let (body, end) = bytes.split_at(covered.min(bytes.len()));
         let sum = crc_step(sum, body);
@@ -330,7 +333,7 @@ impl Store {
         }
     }
 
-    /// Cancels the job of an upload.
+    /// Gives up the job that serves an upload; the outcome of an open request is then ignored.
     pub(super) fn drop_job(&mut self) {
         match self.job {
             FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => {

@@ -1,9 +1,10 @@
-//! The journal: records one after the other in one of two halves; when it is full, what counts is
-//! copied to the other half, which is sealed last.
+//! The journal: records one after the other in one of two halves. Once a half is full, the records
+//! that count are copied to the other half, which is sealed last.
 //!
-//! A record is a word (kind, length, CRC-32 of the data, its own CRC-32), then the data, padded to
-//! whole words with 0xFF. The last whole record of a kind counts. A word that is neither blank nor
-//! whole ends the journal: the next record goes to the other half.
+//! A record is a head of one flash word (magic number, kind, length, CRC-32 of the data, CRC-32 of
+//! the head), then the data, padded to whole words with 0xFF. The last complete record of a kind
+//! counts. A head that is neither erased nor valid ends the journal: the next record goes to the
+//! other half.
 
 use super::area::{AreaCondition, append_word_crc};
 use super::flash::{MAX_PROGRAM, WORD};
@@ -13,24 +14,24 @@ use core::ops::Range;
 
 pub(super) const MAGIC: [u8; 4] = *b"FLKR";
 
-/// The state of the journal.
+/// State of the journal.
 #[derive(Clone, Debug)]
 pub struct Journal {
-    /// Condition of both halves.
+    /// Condition of each half.
     pub halves: [AreaCondition; 2],
-    /// The half that counts.
+    /// The sealed half whose records count; `None` if there is none.
     pub active: Option<usize>,
-    /// Offset of the next record in the storage bank; the end of the half when it is full.
+    /// Offset of the next record in the storage bank; the half's end if it takes no more.
     pub end: u32,
-    /// Place of the mission file.
+    /// Range of the mission file in the storage bank; `None` if there is none.
     pub mission: Option<Range<u32>>,
-    /// CRC-32 of the mission file's record.
+    /// CRC-32 of the mission file, as in its record.
     pub mission_crc: u32,
-    /// The mission was removed, and that is not kept yet.
+    /// Whether the mission file was removed and no record says so yet.
     pub removed: bool,
-    /// The other half being filled.
+    /// The compaction under way: the other half is being filled.
     pub compacting: Option<Compaction>,
-    /// Tries that failed.
+    /// Failed attempts in a row to write a record or a half.
     pub failures: u8,
 }
 
@@ -49,12 +50,12 @@ impl Default for Journal {
     }
 }
 
-/// Bytes that a record takes.
+/// Bytes of a record with `data` bytes of data: its head, and the data in whole words.
 pub fn record_len(data: u32) -> u32 {
     WORD as u32 + data.next_multiple_of(WORD as u32)
 }
 
-/// The word before a record's data.
+/// The head of a record, one flash word.
 pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD] {
     let mut word = [0; WORD];
     word[..4].copy_from_slice(&MAGIC);
@@ -65,6 +66,7 @@ pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD] {
     word
 }
 
-/// Bytes of the parameters' record.
+/// Bytes of the data of the parameters' record: the removed slots' sequence number, and all
+/// parameters.
 pub const PARAMETERS_LEN: usize = 4 + STORED_LEN;
 const _: () = assert!(PARAMETERS_LEN <= MAX_PROGRAM);

@@ -1,4 +1,4 @@
-//! Records written to the journal, and the journal written again where it is full.
+//! Writing the records of the journal, and its compaction into the other half when one is full.
 
 use super::Store;
 use super::area::{AreaCondition, FlashArea, Seal};
@@ -9,7 +9,8 @@ use super::records::*;
 use super::upload_state::{UploadError, UploadState};
 
 impl Store {
-    /// The journal's next step.
+    /// The job for the next record: of the compaction under way, else of what was changed. `None`
+    /// if nothing is to be written, or the other half is not erased yet.
     pub(super) fn choose_record(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
         if let Some(compaction) = self.journal.compacting.clone() {
             let Compaction { half, at, step, mission } = compaction;
@@ -111,7 +112,7 @@ impl Store {
         self.buffer_record(RecordKind::Photographed, at, len)
     }
 
-    /// A record of what is in the buffer.
+    /// Record whose data is the first `len` bytes of the buffer.
     fn buffer_record(&self, kind: RecordKind, at: u32, len: usize) -> JournalRecord {
         JournalRecord {
             kind,
@@ -200,7 +201,8 @@ impl Store {
         }
     }
 
-    /// A record did not come out whole: nothing more is written behind it.
+    /// Handles a record that was not written correctly: nothing is written behind it in its half,
+    /// and its data is written again.
     pub(super) fn fail_record(&mut self) {
         if let Some(compaction) = self.journal.compacting.clone() {
             return self.handle_area_failure(FlashArea::Half(compaction.half));

@@ -1,4 +1,4 @@
-//! The journal, read when the store is mounted.
+//! Reading the journal when the store is mounted.
 
 use super::Store;
 use super::area::{self, FlashArea, has_valid_word_crc, u32_at};
@@ -57,7 +57,7 @@ impl Store {
             self.journal.mission = (len > 0).then_some(at..at + len);
             self.journal.mission_crc = crc;
         } else if kind == RecordKind::Parameters as u8 && (4..=MAX_PROGRAM as u32).contains(&len) {
-            // Short enough to be in the block whole.
+            // The block holds all of the record's data.
             self.forgotten = u32_at(&block, 0);
             let (entries, _) = block[4..len as usize].as_chunks();
             entries.iter().for_each(|entry| self.parameters.restore(entry));

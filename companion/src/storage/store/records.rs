@@ -1,29 +1,30 @@
-//! How records get into the journal: the next one, a copy of what counts into the other half when
-//! the first is full.
+//! Records of the journal while they are written: the next one, or copies of those that count to
+//! the other half when the first is full.
 
 use super::flash::WORD;
 use core::ops::Range;
 
-/// Kind of a record.
+/// Kind of a record of the journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum RecordKind {
-    /// Which roadmaps were removed, and the parameters.
+    /// Sequence number up to which slots were removed, and the parameters.
     Parameters = 1,
-    /// The mission file; of length 0 when it was removed.
+    /// The mission file; with length 0 it was removed.
     Mission = 2,
-    /// Photographed waypoints of an area: as [`crate::mission::photographed`] writes them.
+    /// Photographed waypoints of an area, as [`crate::mission::photographed`] writes them.
     Photographed = 3,
 }
 
-/// Attempts to write the journal before the store gives up until the next start.
+/// Failed attempts in a row to write the journal, after which the store writes no record until the
+/// next start.
 pub(super) const MAX_JOURNAL_TRIES: u8 = 4;
 
-/// A record being written.
+/// A record of the journal that is being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JournalRecord {
     pub kind: RecordKind,
-    /// Offset of the record.
+    /// Offset of the record's head in the storage bank.
     pub at: u32,
     pub len: u32,
     pub crc: u32,
@@ -34,7 +35,7 @@ pub struct JournalRecord {
 }
 
 impl JournalRecord {
-    /// Bytes of its step: what is read back begins with the head.
+    /// Bytes that the current step processes: the data, when the record is read back also its head.
     pub fn total_len(&self) -> u32 {
         if self.step == RecordStep::Verify { WORD as u32 + self.len } else { self.len }
     }
@@ -42,7 +43,7 @@ impl JournalRecord {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordSource {
-    /// The record is in the buffer, whole.
+    /// All data is in the store's buffer.
     Buffer,
     Window,
     Flash(u32),
@@ -56,12 +57,13 @@ pub enum RecordStep {
     Verify,
 }
 
-/// The journal's other half being filled.
+/// Compaction: the journal's other half is being filled with copies of the records that count.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Compaction {
     pub half: usize,
     pub at: u32,
-    /// Next: 0 the parameters, 1 what is photographed, 2 the mission, 3 the seal.
+    /// Next record to be copied: 0 parameters, 1 photographed waypoints, 2 mission, 3 the half's
+    /// seal.
     pub step: u8,
     pub mission: Option<Range<u32>>,
 }

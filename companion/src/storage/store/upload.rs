@@ -1,4 +1,4 @@
-//! A file coming in: from the first piece in the window to the seal.
+//! Upload of a file: from its first piece in the reassembly window to the seal of its slot.
 
 use super::Store;
 use super::area::{AreaCondition, DATA_OFFSET, FlashArea};
@@ -9,13 +9,13 @@ use crate::storage::mission_file::MissionView;
 use planner_core::{field, roadmap};
 
 impl Store {
-    /// Progress of the upload, if there is one.
+    /// State of the last upload; `None` if there was none, or it was abandoned.
     pub fn upload_state(&self) -> Option<UploadState> {
         self.upload.map(|(_, state)| state)
     }
 
-    /// Begins an upload; one under way is given up. Pieces are taken once [`Self::upload_state`]
-    /// says so.
+    /// Begins an upload, and abandons one under way. Pieces are accepted once
+    /// [`Self::upload_state`] is `Taking`.
     ///
     /// # Errors
     /// [`UploadError::Armed`] or [`UploadError::Waiting`].
@@ -40,7 +40,7 @@ impl Store {
         Ok(())
     }
 
-    /// Accepts a piece of the file.
+    /// Accepts a piece of the file at `offset`; `Later` if no upload is open for pieces.
     pub fn take_piece(&mut self, offset: u32, piece: &[u8]) -> PieceOutcome {
         match self.upload {
             Some((File::Mission, UploadState::Taking)) => {
@@ -53,8 +53,8 @@ impl Store {
         }
     }
 
-    /// All was sent: the file is to be checked and kept. [`Self::upload_state`] says when that has
-    /// ended.
+    /// Ends an upload whose pieces were all sent: checks the file and starts to store it.
+    /// [`Self::upload_state`] becomes `Ended`.
     pub fn finish_upload(&mut self) {
         let Some((file, UploadState::Taking)) = self.upload else { return };
         let state = match (file, self.reassembly.last_part()) {
@@ -74,7 +74,7 @@ impl Store {
         }
     }
 
-    /// Gives an upload up, unless all of it was sent: then it is kept.
+    /// Abandons an upload, unless its file is already being stored.
     pub fn abandon_upload(&mut self) {
         if !matches!(self.upload, Some((_, UploadState::Closing))) {
             self.drop_job();
@@ -92,7 +92,7 @@ impl Store {
         }
     }
 
-    /// A slot that was being written is to be erased before it is written again.
+    /// Marks a half-written slot for erasure.
     fn clear_slot(&mut self) {
         for slot in &mut self.slots {
             if *slot == AreaCondition::Open {
@@ -101,19 +101,19 @@ impl Store {
         }
     }
 
-    /// The slot that may be written: not in use, and not the newest.
+    /// The slot for the next upload: neither in use nor with the newest file.
     pub(super) fn writable_slot(&self) -> Option<usize> {
         let newest = self.newest_slot();
         (0..2).find(|i| Some(*i) != self.in_use && Some(*i) != newest)
     }
 
-    /// The slot that is being written.
+    /// The slot into which an upload is being written.
     pub(super) fn open_slot(&self) -> Option<FlashArea> {
         self.slots.iter().position(|slot| *slot == AreaCondition::Open).map(FlashArea::Slot)
     }
 
-    /// Whether the first bytes are those of a roadmap file, or a field, of this length that can be
-    /// read.
+    /// Whether the file's first bytes are the head of a roadmap, or with `field` of a field of
+    /// heights, of length `len`.
     pub(super) fn declares(field: bool, bytes: &[u8], len: u32) -> bool {
         let declared = match field {
             true => bytes.first_chunk().and_then(|head| field::declared_len(head).ok()),

@@ -1,29 +1,29 @@
-//! How far an upload is, and why it failed.
+//! States of an upload, and reasons why one fails.
 
-/// Reason why an upload failed. The earlier file is unchanged.
+/// Why an upload failed. The earlier file stays as it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UploadError {
-    /// An area would have to be erased, and the vehicle is armed.
+    /// An area would have to be erased or programmed, and the vehicle is armed.
     Armed,
-    /// A roadmap waits for a restart, and the other slot is in use.
+    /// No slot is free: one is in use, and the other has a newer file that waits for a restart.
     Waiting,
-    /// Pieces are missing.
+    /// Bytes of the file are missing.
     Incomplete,
-    /// The file is of another kind, or damaged.
+    /// The file is of another kind than its name, or its CRC is wrong.
     Damaged,
-    /// The flash failed.
+    /// The flash failed to erase, program or read.
     Flash,
 }
 
-/// Progress of an upload.
+/// State of an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UploadState {
-    /// The upload's area is being erased or marked.
+    /// A slot for the upload is being erased or marked as used.
     Opening,
-    /// Pieces are taken.
+    /// Pieces of the file are accepted.
     Taking,
-    /// All was sent; it is written, read back and sealed.
+    /// All pieces were sent; the file is being written, read back and sealed.
     Closing,
-    /// Over.
+    /// The upload has ended: the file is stored, or an error says why not.
     Ended(Result<(), UploadError>),
 }

@@ -1,32 +1,32 @@
-//! What was received of a file being uploaded and is not yet in flash: pieces may come in any order
-//! within the window.
+//! Reassembly of an upload: the bytes received that are not in flash yet. Pieces may come in any
+//! order within a window of 4 kB.
 
 use super::flash::MAX_PROGRAM;
 
-/// Bytes of the reassembly window: a mission file waits here whole, a roadmap passes through. 4 kB,
-/// and 512 bytes of marks.
+/// Bytes of the reassembly window: a mission file fits in it, a roadmap passes through. With a bit
+/// for each byte 4.5 kB.
 pub const WINDOW_LEN: usize = 4096;
 
-/// What became of a received piece of the upload.
+/// What became of a piece of an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PieceOutcome {
-    /// The piece is here, or was already.
+    /// The piece was stored, or had been received before.
     Yes,
-    /// The window has no room for the piece yet.
+    /// The window cannot take the piece yet: the client must send it again.
     Later,
-    /// The file would be larger than there is room for.
+    /// The file would be longer than its slot or the window.
     TooLarge,
 }
 
-/// The window. All zero when new.
+/// The reassembly window. All zero when new.
 #[derive(Clone, Debug)]
 pub struct UploadReassembly {
     bytes: [u8; WINDOW_LEN],
-    /// A bit for each byte that is here.
+    /// One bit for each byte of the window: whether it was received.
     marks: [u64; WINDOW_LEN / 64],
-    /// Place of the first byte in the file; a multiple of [`BLOCK`].
+    /// Offset in the file of the window's first byte; a multiple of [`MAX_PROGRAM`].
     front: u32,
-    /// End of the furthest piece in the file.
+    /// Greatest end of a piece in the file.
     high: u32,
 }
 
@@ -43,17 +43,17 @@ impl UploadReassembly {
         (self.front, self.high) = (0, 0);
     }
 
-    /// Bytes of the file that are no longer here.
+    /// Number of leading bytes of the file that are in flash already.
     pub fn flushed_len(&self) -> u32 {
         self.front
     }
 
-    /// Length of the file, as far as it is known.
+    /// Length of the file, as far as pieces were received.
     pub fn file_len(&self) -> u32 {
         self.high
     }
 
-    /// Takes a piece of a file of at most `most` bytes.
+    /// Stores a piece of a file of at most `most` bytes.
     pub fn insert(&mut self, offset: u32, piece: &[u8], most: u32) -> PieceOutcome {
         let Some(end) = offset.checked_add(piece.len() as u32).filter(|end| *end <= most) else {
             return PieceOutcome::TooLarge;
@@ -62,7 +62,7 @@ impl UploadReassembly {
             return PieceOutcome::Later;
         }
         self.high = self.high.max(end);
-        // The part before the window is in flash already.
+        // The part of the piece before the window is in flash already.
         let skipped = self.front.saturating_sub(offset).min(piece.len() as u32);
         let at = (offset + skipped - self.front.min(offset + skipped)) as usize;
         let piece = &piece[skipped as usize..];
@@ -73,25 +73,25 @@ impl UploadReassembly {
         PieceOutcome::Yes
     }
 
-    /// Number of bytes received from the front on without a gap, at most `most`.
+    /// Number of bytes received without a gap from the window's first byte on, at most `most`.
     fn contiguous_len(&self, most: usize) -> usize {
         let gap = self.marks.iter().position(|marks| *marks != u64::MAX);
         let run = gap.map_or(WINDOW_LEN, |i| 64 * i + self.marks[i].trailing_ones() as usize);
         run.min(most)
     }
 
-    /// The next block for flash, once it is whole.
+    /// The window's first block of [`MAX_PROGRAM`] bytes; `None` until it is received completely.
     pub fn next_block(&self) -> Option<&[u8; MAX_PROGRAM]> {
         if self.contiguous_len(MAX_PROGRAM) < MAX_PROGRAM { None } else { self.bytes.first_chunk() }
     }
 
-    /// The end of the file, if nothing is missing before it.
+    /// The bytes from the window to the file's end; `None` if one of them is missing.
     pub fn last_part(&self) -> Option<&[u8]> {
         let len = (self.high - self.front.min(self.high)) as usize;
         (len <= WINDOW_LEN && self.contiguous_len(len) == len).then(|| &self.bytes[..len])
     }
 
-    /// Drops the first block: it was written to flash.
+    /// Drops the window's first block, which is in flash now.
     pub fn drop_first_block(&mut self) {
         self.bytes.copy_within(MAX_PROGRAM.., 0);
         self.marks.copy_within(MAX_PROGRAM / 64.., 0);

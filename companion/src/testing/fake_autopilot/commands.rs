@@ -1,4 +1,5 @@
-//! What the companion sends: setpoints and commands with their answers, and frames to the radio.
+//! What the scripted autopilot does with the companion's frames: setpoints, commands with their
+//! COMMAND_ACKs, and frames to the radio.
 
 use core::f32::consts::FRAC_PI_2;
 
@@ -13,7 +14,7 @@ use crate::Link;
 use crate::autopilot::AutopilotKind;
 use crate::link::frame::{self, Frame, Header, MAX_FRAME_LEN};
 
-/// Bit of a setpoint's mask: it says nothing of the heading.
+/// Bit of a setpoint's `type_mask`: its yaw is ignored.
 const YAW_IGNORED: u16 = 0x400;
 
 impl Bench {
@@ -46,7 +47,7 @@ impl Bench {
         let ned = Vector3::new(f64::from(s.x), f64::from(s.y), f64::from(s.z));
         let place = frames::ned_to_geodetic(self.kind.projection(), &self.origin, &ned);
         let enu = frames::geodetic_to_enu(&ORIGIN, &place);
-        // ArduCopter gives a take-off up for a setpoint that comes before the lift-off.
+        // ArduCopter cancels a take-off at a setpoint that arrives before the lift-off.
         self.took_off &= !self.on_ground();
         assert!(enu.iter().all(|c| c.is_finite()));
         let mask = s.type_mask.bits();
@@ -62,7 +63,8 @@ impl Bench {
         if self.silent {
             return;
         }
-        // Neither autopilot disarms in the air, where it knows that it is there.
+        // Neither autopilot kind accepts disarming in the air while its landing detector reports
+        // flight.
         let disarms_in_air = number == 400 && c.param1 == 0.0 && !self.on_ground() && self.armed;
         let takes_off_disarmed = number == 22 && !self.armed;
         let refused = self.refused.contains(&number) || disarms_in_air || takes_off_disarmed;
@@ -98,7 +100,7 @@ impl Bench {
         }
     }
 
-    /// COMMAND_ACK to the companion.
+    /// Sends a COMMAND_ACK for the companion's command.
     pub(crate) fn answer(&mut self, command: u16, result: u8) {
         let [low, high] = command.to_le_bytes();
         let payload = [low, high, result, 0, 0, 0, 0, 0, SYSTEM, crate::COMPANION_COMPONENT];

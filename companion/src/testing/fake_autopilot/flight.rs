@@ -1,4 +1,5 @@
-//! How the vehicle flies: to the setpoint at a limited speed, and down in the mode that lands.
+//! Motion of the scripted autopilot's vehicle: to the setpoint at a limited speed, straight down in
+//! the landing mode.
 
 use planner_core::Point;
 
@@ -11,12 +12,13 @@ impl Bench {
         self.enu.z < 0.05
     }
 
-    /// Whether it lifts off, or has.
+    /// Whether the vehicle can leave the ground: an ArduCopter only once its motors have spun up
+    /// after NAV_TAKEOFF.
     fn lifts(&self) -> bool {
         self.kind == AutopilotKind::Px4 || self.took_off && self.now >= self.lifts_at
     }
 
-    /// 50 ms of flight; on the ground the motors stop by themselves.
+    /// Moves the vehicle for 50 ms; disarms 2.2 s after a landing, and when idle on the ground.
     pub(super) fn fly(&mut self) {
         let step = self.step_m;
         let target = match self.mode {
@@ -40,8 +42,8 @@ impl Bench {
         self.disarm_by_itself();
     }
 
-    /// Both autopilots disarm after 10 s on the ground with nothing to fly to (`COM_DISARM_PRFLT`,
-    /// `DISARM_DELAY`).
+    /// Disarms after 10 s on the ground without a take-off, as both autopilot kinds do
+    /// (`COM_DISARM_PRFLT`, `DISARM_DELAY`).
     fn disarm_by_itself(&mut self) {
         let streamed =
             self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));

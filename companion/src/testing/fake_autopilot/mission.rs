@@ -1,4 +1,5 @@
-//! The mission that the tests fly: one vehicle, or two, from a pad past a corner to a goal above.
+//! The mission of the test bench: one vehicle, or two, from a pad around a corner to a goal higher
+//! up.
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
@@ -11,7 +12,8 @@ use super::Plan;
 use crate::{Config, RosterEntry};
 
 pub(crate) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-/// 300 m away and 20 m up: frames that are mixed up fly into the ground.
+/// EKF origin 300 m from the mission's origin and 20 m above it: code that confuses the two frames
+/// flies into the ground.
 pub(crate) const EKF_ORIGIN: Geodetic =
     Geodetic { lat_deg: 40.3350, lon_deg: -3.7640, alt_m: 720.0 };
 pub(crate) const SYSTEM: u8 = 42;
@@ -48,7 +50,8 @@ pub(crate) fn plan() -> Plan {
     }
 }
 
-/// One picture of a field, and home: up to its layer, out, back, and down over its pad.
+/// The plan of a coverage mission with a single picture: to the layer, out, back, and down to the
+/// pad.
 pub(crate) fn field_plan() -> Plan {
     let mut path = Path::new();
     for point in [
@@ -63,7 +66,7 @@ pub(crate) fn field_plan() -> Plan {
         path.push(point, 1.2).unwrap();
     }
     let mut photographs = PicturePlan::new(2.0, HeadingMode::Ahead, Trigger::Distance);
-    // A single picture: on the way to it the vehicle may look anywhere.
+    // A single picture, so that the stretch gives no heading.
     photographs.add_stretch(1, 1, WaypointRange { first: 0, end: 1 }).unwrap();
     VehiclePlan { task: Task::Photograph(photographs), path, descent_m: 1.5, ..plan() }
 }

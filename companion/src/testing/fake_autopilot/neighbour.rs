@@ -1,4 +1,4 @@
-//! The other vehicle, as the radio brings it.
+//! The neighbour of the test bench, as its messages arrive by radio.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, TUNNEL_DATA};
@@ -10,7 +10,7 @@ use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::Intent;
 
 impl Bench {
-    /// Sends the neighbour's intent and position, five times a second.
+    /// Sends the neighbour's intent and position to the companion, at every fourth tick of 50 ms.
     pub(super) fn report_neighbour(&mut self) {
         let Some((place, flags, progress_m, plan_crc)) = self.neighbour else { return };
         let roster = &self.companion.config.roster;

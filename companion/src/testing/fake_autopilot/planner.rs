@@ -1,5 +1,5 @@
-//! The planner of the shell: it reads what is wanted when it begins, and answers one request after
-//! the other.
+//! The shell's planner on the test bench: it reads a request's inputs when it begins, and answers
+//! one request after the other.
 
 extern crate std;
 use std::vec::Vec;
@@ -13,7 +13,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use super::{Bench, GOAL, Plan, plan};
 use crate::{Duration, Instant, PlanFailure, PlanKind};
 
-/// An answer under way.
+/// An answer whose plan is made and that is sent when `due`.
 pub(super) struct Answer {
     due: Instant,
     wanted: PlanKind,
@@ -21,8 +21,8 @@ pub(super) struct Answer {
 }
 
 impl Bench {
-    /// Begins what the vehicle wants, and gives the answer that is due, whatever the vehicle wants
-    /// by then. False if neither is.
+    /// Sends the answer that is due, or begins the next request, by the vehicle's wishes at that
+    /// time. Returns false if there was nothing to do.
     pub(super) fn step_planner(&mut self) -> bool {
         if let Some(answer) = self.answer_under_way.take_if(|answer| answer.due <= self.now) {
             self.companion.handle_plan(
@@ -53,7 +53,8 @@ impl Bench {
         true
     }
 
-    /// The detour that the vehicle requests.
+    /// The detour that the companion requests now, and the keep-out zones for it; `None` if it
+    /// requests none any more.
     fn requested(&mut self) -> Option<(DetourRequest, Vec<KeepOutZone>)> {
         let mut obstacles = Vec::new();
         let request = self.companion.detour_request(|obstacle| obstacles.push(obstacle))?;
@@ -89,7 +90,8 @@ impl Bench {
         self.answer_detour.map(|answer| answer.and_then(found))
     }
 
-    /// All that is left: the rest of the vehicle's path from where it holds.
+    /// The plan after a division: the rest of the vehicle's path from where it holds. `None` for no
+    /// answer.
     fn divided(&self) -> Option<Result<Plan, PlanFailure>> {
         if self.undividable {
             return Some(Err(PlanFailure::Capacity));
@@ -97,7 +99,7 @@ impl Bench {
         let rank =
             usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
-        // Beside its path its plan is the detour.
+        // On a detour beside its path the companion's current plan is the detour.
         let beside = self.companion.detours.is_beside_plan();
         let plan = if beside { self.own_plan.as_ref() } else { self.companion.mission.plan() };
         let mut plan = plan.filter(|_| self.answer_division)?.clone();

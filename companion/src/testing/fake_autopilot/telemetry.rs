@@ -1,4 +1,4 @@
-//! What the autopilot reports.
+//! Telemetry of the scripted autopilot.
 
 extern crate std;
 use std::vec::Vec;
@@ -36,7 +36,8 @@ impl Bench {
         self.send(&origin);
     }
 
-    /// PX4 sends all unasked, ArduCopter nothing.
+    /// Whether the autopilot sends this message: PX4 sends all without a request, ArduCopter those
+    /// requested.
     fn sends(&self, id: u16) -> bool {
         self.kind == AutopilotKind::Px4 || self.streams.contains(&id)
     }
@@ -48,13 +49,13 @@ impl Bench {
             self.send(&EKF_STATUS_REPORT_DATA { flags, pos_horiz_variance, ..Default::default() });
         }
         if self.sends(33) {
-            // Home lies two metres below the pad.
+            // The autopilot's home is two metres below the pad.
             let relative_alt = ((self.enu.z + 2.0) * 1e3) as i32;
             self.send(&GLOBAL_POSITION_INT_DATA { relative_alt, ..Default::default() });
         }
     }
 
-    /// Sends the messages that are due at this tick.
+    /// Sends the messages of the autopilot that are due at this tick.
     pub(super) fn report(&mut self) {
         if self.silent {
             return;
