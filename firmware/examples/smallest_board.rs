@@ -1,9 +1,8 @@
-//! The smallest board: all that the shell wants of a machine, here of a desk.
+//! The smallest board: everything that the shell needs from a board, here implemented on a PC.
 //!
 //! A board has a clock (embassy-time's driver), two UARTs (embedded-io-async), a flash for files
-//! and parameters, and something that runs tasks. `src/boards/pico2` is the same with registers:
-//! links and setpoints in an interrupt above planning, and a watchdog that is fed while
-//! `Shell::is_alive`.
+//! and parameters, and executors for the tasks. `src/boards/pico2` is the same on a chip: links and
+//! setpoints run in an interrupt above planning, and a watchdog is fed while `Shell::is_alive`.
 //!
 //! `cargo run -p firmware --example smallest_board`
 
@@ -30,7 +29,7 @@ use planner_core::frames::Geodetic;
 use planner_core::plan::SwarmPlan;
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// The clock, microseconds from the start.
+/// The clock: microseconds since its first use.
 struct Clock(OnceLock<std::time::Instant>);
 
 impl embassy_time_driver::Driver for Clock {
@@ -38,7 +37,8 @@ impl embassy_time_driver::Driver for Clock {
         self.0.get_or_init(std::time::Instant::now).elapsed().as_micros() as u64
     }
 
-    /// A board sets a timer here, and sleeps.
+    /// Wakes the task at once, which polls again until it is due; a board would set a timer and
+    /// sleep.
     fn schedule_wake(&self, _at: u64, waker: &Waker) {
         waker.wake_by_ref();
     }
@@ -46,14 +46,14 @@ impl embassy_time_driver::Driver for Clock {
 
 embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock(OnceLock::new()));
 
-/// One direction of a serial line.
+/// Bytes in one direction of a serial line.
 type Line = Pipe<CriticalSectionRawMutex, 4096>;
 static FROM_AUTOPILOT: Line = Line::new();
 static TO_AUTOPILOT: Line = Line::new();
 static FROM_RADIO: Line = Line::new();
 static TO_RADIO: Line = Line::new();
 
-/// A flash that forgets: erased, its bytes are 0xff.
+/// A flash in RAM, which does not outlast the program; erased bytes are 0xff.
 const LAYOUT: FlashLayout = FlashLayout::PICO2;
 struct Ram(Vec<u8>);
 
@@ -79,7 +79,7 @@ impl Flash for Ram {
     }
 }
 
-// All that is large lies in statics.
+// Large objects are statics, as on a board.
 static SHELL: Shell = Shell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
 static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
@@ -87,7 +87,7 @@ static SWARM: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> =
     ConstStaticCell::new(SwarmPlan::new());
 static OWN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
 
-/// Brings a companion up and runs it; nothing is uploaded, so it has no mission.
+/// Starts a companion and runs its tasks. No mission is uploaded, so it only reports.
 async fn board() {
     let mut flash = Ram(vec![0xff; LAYOUT.len() as usize]);
     let store = Store::mount(LAYOUT, &mut flash);
@@ -113,8 +113,8 @@ async fn board() {
     join(links, SHELL.run_planner_and_flash(&mut planner, &mut flash)).await;
 }
 
-/// The far end of the autopilot's line: a HEARTBEAT each second, and what the board sends is
-/// counted.
+/// The autopilot at the other end of the serial line: sends a HEARTBEAT each second for 5 s.
+/// Returns the number of bytes that the board sent to it.
 async fn autopilot() -> usize {
     let heartbeat =
         HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };

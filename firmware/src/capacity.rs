@@ -1,35 +1,38 @@
-//! Capacities of a board, and what each costs in RAM. The RP2350 has half a megabyte in all, so it
-//! takes half.
+//! Capacities of a board, and the RAM (or flash) that each item takes. The RP2350 has 520 kB of
+//! RAM, so it has half the capacities.
 
 use companion::Companion;
 
-/// Half on the smaller board.
+/// `of`, or half of it on the Pico 2.
 const fn halved_on_small_board(of: usize) -> usize {
     if cfg!(feature = "pico2") { of / 2 } else { of }
 }
 
-/// Nodes of a roadmap, terminals among them: 70 bytes each in scratch.
+/// Most nodes of a roadmap, terminals included: 70 bytes each in the planning workspace.
 pub const ROADMAP_NODES: usize = halved_on_small_board(4096);
-/// Half-edges of a roadmap: 4 bytes each, in flash; 8 bytes for each pair of them while a roadmap
-/// is built on board.
+/// Most half-edges of a roadmap (two per edge): 4 bytes each in flash, and 8 bytes for each edge
+/// while a roadmap is built on board.
 pub const HALF_EDGES: usize = halved_on_small_board(65_536);
-/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 100 × 100 ×
-/// 50 m at Dmax 8 m.
+/// Most cubes of the grid that sorts nodes by place while a roadmap is built: 2 bytes each. Enough
+/// for 100 × 100 × 50 m at a longest edge (Dmax) of 8 m.
 pub const ROADMAP_CUBES: usize = halved_on_small_board(8192);
-/// Vehicles of a swarm, and goals: 1.7 kB each, the most of it in the swarm's plan.
+/// Most vehicles of a swarm, and most goals: 1.7 kB for each vehicle, mainly in the swarm's plan.
 pub const VEHICLES: usize = halved_on_small_board(32);
-/// Waypoints of a path: 24 bytes each.
+/// Most waypoints of a path: 24 bytes each.
 pub const WAYPOINTS: usize = 64;
-/// Gates of one vehicle: 12 bytes each.
+/// Most gates in one vehicle's plan: 12 bytes each.
 pub const GATES: usize = 128;
-/// Timed segments of flights among which a vehicle steps aside: 44 bytes each.
+/// Most timed segments of flights already scheduled, among which safe-interval search finds a
+/// vehicle's route: 44 bytes each.
 pub const TIMED_SEGMENTS: usize = halved_on_small_board(2048);
-/// Lanes of a coverage mission: 72 bytes each in scratch, in all and in what is left of them.
+/// Most lanes of a coverage mission: 72 bytes each in the workspace, for the whole plan and for the
+/// lanes left after a loss together.
 pub const LANES: usize = halved_on_small_board(512);
-/// Vertices of a coverage mission's area: 36 bytes each in scratch.
+/// Most vertices of a coverage mission's area: 36 bytes each in the workspace.
 pub const AREA_VERTICES: usize = 256;
-/// Outward corners of that area's no-fly zones: 4 bytes for each pair, and 8 each.
+/// Most convex corners of a coverage mission's no-fly zones, around which transits lead: 4 bytes
+/// for each pair of corners, and 8 for each corner.
 pub const AREA_CORNERS: usize = 32;
 
-/// A companion with these.
+/// A companion with this board's capacities.
 pub type BoardCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;

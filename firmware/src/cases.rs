@@ -1,7 +1,8 @@
-//! Random cases that a board and the desk compute alike, to be compared bit by bit, and that tests
-//! count instructions of.
+//! Random test cases that a board and the host compute alike: tests compare the results bit by bit
+//! and count the board's instructions.
 //!
-//! All come from a seed and are the same everywhere: PCG numbers, f32, no clock.
+//! Each case comes from a seed and is the same everywhere: PCG random numbers, f32 arithmetic, no
+//! clock.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use heapless::Vec;
@@ -20,29 +21,31 @@ use rand_pcg::Pcg32;
 
 use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 
-/// Cases of [`PlanCase`] in which board and desk are compared.
+/// Number of [`PlanCase`]s in which a test compares the board's results with the host's.
 pub const PLAN_CASES: u64 = 200;
-/// Cases of [`StepCase`] of which the worst counts.
+/// Number of [`StepCase`]s whose instructions are counted; the largest count is reported.
 pub const STEP_CASES: usize = 10_000;
-/// Most vehicles of a [`PlanCase`].
+/// Most vehicles of a [`PlanCase`], so that its cost matrix is at most 10 × 10.
 const MAX_SWARM: usize = 10;
-/// Places along each path of a [`PlanCase`] at which the neighbours' advice is computed.
+/// Number of points along each path of a [`PlanCase`] at which [`deconflict::advise`] is called
+/// with random neighbours.
 const ADVICE_PER_PATH: usize = 4;
 const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// Schedule of every swarm of these cases.
+/// Speeds and separations by which the flights of these cases are scheduled.
 pub const SCHEDULE: ScheduleConfig = ScheduleConfig {
     separation_m: 2.0,
     parked_separation_m: 1.75,
     cruise_mps: 2.0,
     vertical_mps: 1.0,
 };
-/// Radius and safety margin of every vehicle of these cases, metres.
+/// Required clearance of every vehicle of these cases (radius and safety margin), metres.
 pub const CLEARANCE_M: f32 = 0.8;
-/// Assignment of goals in the cases of whole swarms.
+/// How goals are assigned to vehicles in these cases: any vehicle to any goal, least total
+/// distance.
 pub const ASSIGNMENT_MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
 
-/// A swarm for the terminals of a roadmap: one vehicle a start.
+/// The tasks of a swarm with one vehicle at each start of the roadmap, at most [`VEHICLES`].
 pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
     let starts = view.header().starts.min(VEHICLES as u16);
     let task = |i: u16| VehicleTask {
@@ -54,12 +57,12 @@ pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
     (0..starts).map(task).collect()
 }
 
-/// Height of every goal above its ground, metres.
+/// Descent at each goal of the roadmap, from the path's end to the ground: 1 m.
 pub fn goal_descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
     (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
 }
 
-/// The plan request for that swarm.
+/// The plan request for the vehicles of [`vehicle_tasks`] and the descents of [`goal_descents`].
 pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
     PlanRequest {
         vehicles,
@@ -70,14 +73,14 @@ pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> P
     }
 }
 
-/// Scratch of [`plan_case`].
+/// Workspace of [`plan_case`].
 pub struct Workspace {
     search: SearchWorkspace<ROADMAP_NODES>,
     assignment: AssignmentWorkspace<VEHICLES>,
 }
 
 impl Workspace {
-    /// Creates it empty: all zeros.
+    /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self { search: SearchWorkspace::new(), assignment: AssignmentWorkspace::new() }
     }
@@ -89,21 +92,22 @@ impl Default for Workspace {
     }
 }
 
-/// CRC-32 of every bit of a case's results.
+/// Results of one planning case: CRC-32 over every bit of each kind of result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanCase {
     /// CRC of the cost matrix.
     pub costs: u32,
-    /// CRC of the assignment of vehicles to goals, and of the total.
+    /// CRC of the assignment of vehicles to goals, and of its total cost.
     pub assignment: u32,
-    /// CRC of the nodes, places, arc lengths and clearances of all paths.
+    /// CRC of all paths: nodes, positions, arc lengths, clearances.
     pub paths: u32,
-    /// CRC of the speed scales and stops that random neighbours leave, by both methods.
+    /// CRC of the advice among random neighbours, by both methods: speed scale, stop distance, the
+    /// vehicle waited for.
     pub scales: u32,
 }
 
-/// One case: up to ten vehicles between random nodes, edges blocked at random, then random
-/// neighbours along every path.
+/// Computes case `number`: cost matrix, assignment and paths of up to ten vehicles between random
+/// nodes, some edges blocked at random; then advice among random neighbours along every path.
 pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> PlanCase {
     let mut rng = Pcg32::seed_from_u64(number);
     let nodes = view.node_count();
@@ -139,7 +143,7 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
         let mut path: Path<WAYPOINTS> = Path::new();
         for &node in &way {
             paths_crc.update(&node.to_le_bytes());
-            // A path as long as the nodes it is made of.
+            // Cannot fail: a path has room for as many waypoints as `way` has nodes.
             let _ = path.push(view.node(node), CLEARANCE_M);
         }
         for waypoint in path.waypoints() {
@@ -153,7 +157,8 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
     PlanCase { costs, assignment, paths, scales }
 }
 
-/// Value of the digest by its type: the crate has one of each width.
+/// Finalizes a digest of this type; the crate has a digest type for each width, and `map` needs
+/// one.
 fn digest_value(digest: Digest<'_, u32, Table<1>>) -> u32 {
     digest.finalize()
 }
@@ -189,7 +194,8 @@ fn random_neighbour(rng: &mut Pcg32, k: usize, around: &Point, reach_m: f32) -> 
     }
 }
 
-/// A moment of a flight: one vehicle among its neighbours.
+/// Input of [`deconflict::advise`] at one moment of a flight: own vehicle, its gates, its
+/// neighbours.
 pub struct StepCase {
     cfg: DeconflictConfig,
     position: Point,
@@ -200,8 +206,9 @@ pub struct StepCase {
 }
 
 impl StepCase {
-    /// A random case beside so many neighbours, at most [`VEHICLES`]. A hard one has everybody near
-    /// and without a shared plan, every gate within reach and passed.
+    /// A random case beside `neighbours` neighbours, at most [`VEHICLES`]. In a hard one all
+    /// neighbours are near, all gates are within 3 m ahead, and either all neighbours have passed
+    /// all gates or none sends its progress.
     pub fn new(rng: &mut Pcg32, neighbours: usize, hard: bool) -> Self {
         let cfg = DeconflictConfig {
             method: Method::Priority,
@@ -227,7 +234,8 @@ impl StepCase {
             (0..random_below(rng, GATES + 1)).map(|_| gate(rng)).collect();
         gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
         let unplanned = if hard { 1.0 } else { random_between(rng, 0.0, 1.0) };
-        // Half of the hard cases pass all gates, the other half have nobody's progress.
+        // Half of the hard cases: every neighbour's progress lies behind all gates. Other half: no
+        // neighbour sends its progress.
         let passed = hard && rng.next_u32().is_multiple_of(2);
         let neighbours = (0..neighbours.min(VEHICLES))
             .map(|k| Neighbour {
@@ -243,7 +251,7 @@ impl StepCase {
         Self { cfg, position, along_m, path, gates, neighbours }
     }
 
-    /// The call that is counted.
+    /// Calls [`deconflict::advise`] on this case; the call whose instructions are counted.
     pub fn advise(&self, method: Method) -> Advice {
         let Self { position, along_m, path, .. } = self;
         let own =
@@ -262,17 +270,17 @@ pub fn random_below(rng: &mut Pcg32, limit: usize) -> usize {
     rng.next_u32() as usize % limit
 }
 
-/// A random number between two.
+/// A random number from `low` up to `high`.
 pub fn random_between(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
     low + (rng.next_u32() >> 8) as f32 / (1u32 << 24) as f32 * (high - low)
 }
 
-/// A random point of a cube about zero.
+/// A random point in the cube about the origin whose sides are 2 · `reach_m` long.
 pub fn random_point(rng: &mut Pcg32, reach_m: f32) -> Point {
     Point::from_fn(|_, _| random_between(rng, -reach_m, reach_m))
 }
 
-/// Configuration of the roadmap built on board: P3D's building with 2300 nodes.
+/// Settings of the roadmap that is built on board: 2300 nodes in P3D's building.
 pub const ROADMAP_CONFIG: Config = Config {
     nodes: 2300,
     edge_min_m: 0.5,
@@ -282,11 +290,11 @@ pub const ROADMAP_CONFIG: Config = Config {
     sampling: Sampling::Uniform,
 };
 
-/// The map that lies in a board's memory: its head (three dimensions, three coordinates of the
-/// minimum corner, the resolution) and its words.
+/// The occupancy map that lies in a board's memory, from its header (three dimensions, minimum
+/// corner's three coordinates, resolution) and its words.
 ///
 /// # Panics
-/// It is none.
+/// Header and words make no valid map.
 pub fn voxel_map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
     let word = |i: usize| {
         u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]])
@@ -299,7 +307,7 @@ pub fn voxel_map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
     VoxelGrid::new(shape, Outside::Blocked, words).expect("a map lies there")
 }
 
-/// CRC-32 over every bit of a roadmap's nodes and edges.
+/// CRC-32 over every bit of a roadmap's node positions, and the node numbers of its edges.
 pub fn roadmap_crc(nodes: &[Point], edges: &[Edge]) -> u32 {
     let mut digest = CRC32.digest();
     nodes.iter().flatten().for_each(|c| digest.update(&c.to_bits().to_le_bytes()));

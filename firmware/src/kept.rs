@@ -1,6 +1,6 @@
-//! What is kept in memory that a warm reset leaves alone: how the last start ended, and how often
-//! the planner brought a start down. The memory may hold anything after the power came, so a
-//! checksum goes with it.
+//! The crash record, kept in memory that a warm reset leaves unchanged: how the last run ended, and
+//! how many starts in a row each kind of file work crashed. After power-on the memory may hold any
+//! values, so the record carries a checksum.
 
 use core::{array, str};
 
@@ -9,73 +9,78 @@ use heapless::String;
 
 use crate::chips::ResetCause;
 
-/// Longest text of a STATUSTEXT.
+/// Length of a STATUSTEXT's text, bytes.
 pub const TEXT: usize = 50;
-/// Words of the kept record: its contents, then the checksum.
+/// 32-bit words of the whole record: contents, then the checksum.
 pub const RECORD_WORDS: usize = 25;
-/// Words of the text.
+/// 32-bit words of the record's text.
 const TEXT_WORDS: usize = TEXT.div_ceil(4);
-/// Words before the text.
+/// 32-bit words of the record before the text.
 const HEADER_WORDS: usize = 5 + 2 * WORK_KINDS;
-/// Kinds of work.
+/// Number of kinds of [`FileWork`], without `None`.
 const WORK_KINDS: usize = 3;
-/// Crashed starts in a row after which files are set aside.
+/// Number of starts in a row that must crash amid work on the same files until these files are set
+/// aside.
 const MAX_CRASHED_STARTS: u32 = 3;
-/// Report of a restart whose cause neither the program nor the chip knows better.
+/// STATUSTEXT after a restart that left no crash record, on a chip that reports no cause.
 const UNKNOWN_RESTART: &str = "Restarted: watchdog, reset key or brown-out";
 
-/// Checksum of the kept record: a few bytes at a start and at an end need no table.
+/// Checksum of the crash record. It is computed over 96 bytes a few times a run, so it needs no
+/// table.
 static RECORD_CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// How a run of the firmware ended.
+/// How a run of the firmware ended; the numbers are kept in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 enum RunEnd {
-    /// No run before this one: the memory was not kept.
+    /// No run before this one is recorded, as after power-on.
     #[default]
     None = 0,
-    /// The firmware runs. Found at a start: the run before was cut off without a record.
+    /// The firmware runs. If a start finds this, the run before was reset without recording why.
     Runs = 0x464c_4b22,
     /// The program ended by a panic or a fault.
     Crashed = 0x464c_4b21,
-    /// A person requested the restart.
+    /// An operator requested the restart.
     Asked = 0x464c_4b23,
 }
 
-/// Work on uploaded files.
+/// A kind of work on uploaded files that may crash because of their contents.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 pub enum FileWork {
     /// No work on files.
     #[default]
     None = 0,
-    /// The roadmap is checked.
+    /// Parsing and checking the roadmap or field.
     CheckRoadmap = 1,
-    /// The mission is read.
+    /// Parsing the mission file.
     ReadMission = 2,
-    /// A plan is made.
+    /// Planning from roadmap and mission.
     Plan = 3,
 }
 
-/// Work with certain files, identified by a checksum.
+/// A kind of work, and the checksum of the files it works on.
 type Task = (FileWork, u32);
 
-/// The record that is kept over a restart.
+/// The record that is kept over a warm reset.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CrashRecord {
     end: RunEnd,
     text: String<TEXT>,
-    /// Under way.
+    /// File work that runs now; `FileWork::None` between.
     task: Task,
-    /// For each kind of work: the files with which it brought starts down, and how many in a row.
+    /// For each kind of work: checksum of the files on which it crashed last, and number of starts
+    /// in a row that it crashed.
     failed_work: [(u32, u32); WORK_KINDS],
-    /// A bit for each kind that came to its end in this start, with those files.
+    /// Bit of each kind of work that ended without a crash in this run, on the files in
+    /// `failed_work`.
     done: u32,
 }
 
 impl CrashRecord {
-    /// Result of a start: `kept` is the record that the memory holds, `cause` why the chip started.
-    /// Returns the record to keep from now on, and the report of the end before.
+    /// Evaluates the record at a start: `kept` is the record found in memory, `cause` the chip's
+    /// reset cause. Returns the record to keep from now on, and the STATUSTEXT about the end of the
+    /// last run; `None` if there is nothing to report. After power-on `kept` is ignored.
     pub fn on_start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<TEXT>>) {
         let mut kept = kept.filter(|_| cause != ResetCause::Power).unwrap_or_default();
         let crashed = kept.end == RunEnd::Crashed;
@@ -93,7 +98,7 @@ impl CrashRecord {
         let (work, files) = kept.task;
         for (i, failed) in kept.failed_work.iter_mut().enumerate() {
             if work as usize != i + 1 {
-                // All such work of that start came to its end: the row is broken.
+                // This kind of work ended without a crash in the last run: its count begins again.
                 if kept.done >> i & 1 == 1 {
                     failed.1 = 0;
                 }
@@ -106,15 +111,15 @@ impl CrashRecord {
         (kept, said)
     }
 
-    /// The program ends by a panic or a fault, of which the next start reports `text`.
+    /// Notes that this run ends by a panic or a fault; the next start reports `text`.
     pub fn note_crash(&mut self, text: &str) {
         self.end = RunEnd::Crashed;
         self.text.clear();
-        // A text too long is cut.
+        // A text longer than 50 bytes is cut.
         let _ = text.chars().try_for_each(|c| self.text.push(c));
     }
 
-    /// Whether it has ended.
+    /// Whether [`Self::note_crash`] was called in this run.
     pub fn has_crashed(&self) -> bool {
         self.end == RunEnd::Crashed
     }
@@ -124,13 +129,15 @@ impl CrashRecord {
         self.end = RunEnd::Asked;
     }
 
-    /// Whether work with files may begin: it did not bring three starts in a row down.
+    /// Whether `work` on the files with checksum `files` may begin: false if it crashed three
+    /// starts in a row.
     pub fn may_begin(&self, work: FileWork, files: u32) -> bool {
         let failed = (work as usize).checked_sub(1).map(|i| self.failed_work[i]);
         failed.is_none_or(|(of, times)| of != files || times < MAX_CRASHED_STARTS)
     }
 
-    /// Begins work with files; false, and nothing begins, if it may not.
+    /// Notes that `work` on `files` begins. False, and nothing is noted, if it crashed three starts
+    /// in a row.
     pub fn begin_work(&mut self, work: FileWork, files: u32) -> bool {
         let may = self.may_begin(work, files);
         if may {
@@ -139,7 +146,7 @@ impl CrashRecord {
         may
     }
 
-    /// Notes that the work has ended.
+    /// Notes that the work that runs has ended without a crash.
     pub fn finish_work(&mut self) {
         let (work, files) = core::mem::take(&mut self.task);
         if let Some(i) = (work as usize).checked_sub(1)
@@ -149,7 +156,7 @@ impl CrashRecord {
         }
     }
 
-    /// The record as words of memory.
+    /// Encodes the record as words, the checksum last.
     pub fn to_words(&self) -> [u32; RECORD_WORDS] {
         let mut text = [0; 4 * TEXT_WORDS];
         text[..self.text.len()].copy_from_slice(self.text.as_bytes());
@@ -164,7 +171,7 @@ impl CrashRecord {
         words
     }
 
-    /// The record from words of memory; `None` where the checksum is wrong.
+    /// Decodes a record; `None` where the checksum is wrong or a field has no valid value.
     pub fn from_words(words: &[u32; RECORD_WORDS]) -> Option<Self> {
         let end = [RunEnd::None, RunEnd::Runs, RunEnd::Crashed, RunEnd::Asked]
             .into_iter()
@@ -192,7 +199,7 @@ impl CrashRecord {
     }
 }
 
-/// The checksum of all words but the last.
+/// CRC-32 of all words but the last.
 fn checksum(words: &[u32; RECORD_WORDS]) -> u32 {
     let mut digest = RECORD_CRC.digest();
     words[..RECORD_WORDS - 1].iter().for_each(|word| digest.update(&word.to_le_bytes()));

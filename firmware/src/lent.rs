@@ -1,9 +1,10 @@
-//! Flash that is used where it lies: as long as bytes are lent nobody erases or programs them, so
-//! they may be read as memory.
+//! Flash that is read in place as a slice. While a range is lent, the flash driver refuses to erase
+//! or program it, so the bytes cannot change under a reference.
 
 use core::ops::{Deref, Range};
 
-/// Bytes of the flash that stay as they are. If this is dropped, they stay lent for good.
+/// A range of flash bytes that cannot change. If it is dropped instead of given back to
+/// [`FlashLender::take_back`], the range stays lent until the next start.
 #[derive(Debug)]
 pub struct LentFlash(&'static [u8]);
 
@@ -15,19 +16,19 @@ impl Deref for LentFlash {
     }
 }
 
-/// The ranges that a flash has lent: one at a time.
+/// Keeps which range of a flash is lent; one range at a time.
 #[derive(Debug, Default)]
 pub struct FlashLender {
     lent: Option<Range<u32>>,
 }
 
 impl FlashLender {
-    /// A flash that has lent nothing.
+    /// A lender of which nothing is lent.
     pub const fn new() -> Self {
         Self { lent: None }
     }
 
-    /// Lends the bytes at this offset of the flash; `None` where others are lent.
+    /// Lends `bytes`, which lie at offset `at` of the flash; `None` while another range is lent.
     pub fn lend(&mut self, at: u32, bytes: &'static [u8]) -> Option<LentFlash> {
         if self.lent.is_some() {
             return None;
@@ -36,12 +37,12 @@ impl FlashLender {
         Some(LentFlash(bytes))
     }
 
-    /// The lent bytes are not used any more.
+    /// Ends the loan: the range may be erased and programmed again.
     pub fn take_back(&mut self, _lent: LentFlash) {
         self.lent = None;
     }
 
-    /// Whether these bytes may be erased or programmed.
+    /// Whether `len` bytes at offset `at` may be erased or programmed: none of them is lent.
     pub fn allows(&self, at: u32, len: u32) -> bool {
         let meets = |lent: &Range<u32>| at < lent.end && lent.start < at.saturating_add(len);
         !self.lent.as_ref().is_some_and(meets)

@@ -1,8 +1,9 @@
-//! The companion as firmware: tasks around [`companion::Companion`], and the boards they run on.
+//! The companion as firmware: async tasks around [`companion::Companion`], and the boards they run
+//! on.
 //!
 //! The library holds what needs no board: the shell's tasks over any UART, the planner, the crash
-//! record, and the cases that board and desk compute alike. It is built and tested on the desk too;
-//! [`boards`] is built for a board alone.
+//! record, and the test cases that board and host compute alike. It is built and tested on the host
+//! too; only [`boards`] needs a board (a bare-metal target and a board's feature).
 #![no_std]
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The firmware: a companion between an autopilot's serial port and a swarm's radio.
 //!
-//! Two executors, both in interrupts: links and setpoints above plans and flash. Thread mode only
-//! sleeps, by WFI. (Embassy's executor for thread mode sleeps by WFE, which QEMU does not emulate:
-//! it would never sleep.)
+//! Two Embassy executors run in interrupts: links and setpoints at a higher priority than plans and
+//! flash. Thread mode only sleeps, by WFI. (Embassy's executor for thread mode sleeps by WFE, which
+//! QEMU does not emulate: the processor would never sleep.)
 #![no_std]
 #![no_main]
 #![expect(unsafe_code, reason = "the handler of faults, and where a static lies")]
@@ -32,18 +32,18 @@ use planner_core::plan::SwarmPlan;
 use planner_core::roadmap::RoadmapView;
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// Longest mission file, bytes.
+/// Longest mission file that the board can read, bytes.
 const MISSION_LEN: usize = mission_file::MAX_BYTES;
-/// Place of a board without a mission.
+/// Origin of the mission frame on a board without a mission.
 const UNKNOWN_PLACE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
-/// Report of a board whose mission does not name its system id.
+/// STATUSTEXT of a board whose system id is known but is not in the mission's roster.
 const NOT_IN_MISSION: &str = "This system id is not in the mission: no plan";
 
-/// Reports of files that are not used any more.
+/// STATUSTEXTs about files that brought three starts down and are no longer used.
 const ROADMAP_SET_ASIDE: &str = "Roadmap set aside: it crashed 3 starts in a row";
 const MISSION_SET_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 
-// `memory.x` names these: each lies where it says. Their first values are all zeros.
+// `memory.x` places these statics by name in separate memories. Their initial values are all zeros.
 static SHELL: StaticCell<Shell> = StaticCell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
 static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
@@ -70,7 +70,7 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 fn main() -> ! {
     let cause = chosen::reset_cause();
     #[cfg(any(feature = "nucleo-h743", feature = "qemu"))]
-    // SAFETY: nothing runs yet, and the chip's memories do since it was asked for the cause.
+    // SAFETY: no task runs yet, and `reset_cause` has switched the memories' clocks on.
     unsafe {
         firmware::boards::sections::zero_sections();
     }
@@ -89,16 +89,17 @@ fn main() -> ! {
     }
 }
 
-/// A line's two ends.
+/// Both halves of a UART.
 type UartEnds = (Receiver, Transmitter);
 
-/// Messages that the start leaves for the operator.
+/// Messages of the start for the operator, sent by STATUSTEXT.
 struct StartReport {
     crashed: Option<String<50>>,
     warnings: Vec<&'static str, MAX_WARNINGS>,
 }
 
-/// Brings the companion up, then plans and keeps the flash.
+/// Mounts the store, loads roadmap and mission, starts the companion and the tasks of the links;
+/// then makes plans and serves the companion's flash requests for ever.
 #[task]
 async fn planner_and_flash_task(
     shell: &'static Shell,
@@ -136,8 +137,9 @@ async fn planner_and_flash_task(
     let config = own
         .and_then(Result::ok)
         .unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_PLACE));
-    // Neither the stack nor the task's own memory has room for another.
-    // `expect` would print the error, and printing one that has a name in it takes 3 kB of flash.
+    // Neither the stack nor the task's own memory has room for a second companion, so it is made in
+    // its static. `expect` would format the error, which takes 3 kB of flash because of a name in
+    // it.
     let Ok(settings) = config.checked() else { panic!("every setting was checked") };
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
@@ -150,7 +152,7 @@ async fn planner_and_flash_task(
     }
     if let Some(error) = refused {
         let mut text = String::new();
-        // Text without room is left out; a test checks that all of it has room.
+        // Text that does not fit is cut; a test checks that every error fits.
         let _ = write!(text, "Mission: {error}");
         companion.send_text(true, REFUSED.init(text).as_str());
     }
@@ -162,14 +164,14 @@ async fn planner_and_flash_task(
     shell.run_planner_and_flash(&mut planner, &mut flash).await
 }
 
-/// The newest roadmap or field that is one, as long as it may be used; and whether one was set
-/// aside.
+/// Lends the newest stored roadmap or field that parses. The flag says whether a newer one was
+/// skipped because it brought three starts in a row down.
 fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, bool) {
     let mut aside = false;
     loop {
         let lies = store.roadmap();
         if let Some(lent) = lies.and_then(|r| flash.lend(r.start, (r.end - r.start) as usize)) {
-            // A file ends with its checksum.
+            // The last 4 bytes of a roadmap or field are its CRC-32.
             let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
             let begun = crash::begin_work(FileWork::CheckRoadmap, sum);
             aside |= !begun;
@@ -187,21 +189,23 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, boo
     }
 }
 
-/// Result of the search for a mission.
+/// Result of [`find_mission`].
 #[derive(Default)]
 struct FoundMission {
-    /// It, if it is one on this roadmap, or needs none.
+    /// The mission, if it parses and fits the roadmap in use, or needs no roadmap.
     mission: Option<MissionView<'static>>,
-    /// A checksum of both.
+    /// Checksum over mission and roadmap (or field), by which the crash record names the pair.
     files: u32,
-    /// Whether it was set aside.
+    /// Whether the mission is not used because reading or planning it brought three starts in a row
+    /// down.
     set_aside: bool,
-    /// Reason why it is none.
+    /// Parse error of the stored mission.
     refused: Option<MissionError>,
 }
 
-/// Looks for the mission on this roadmap. It is copied: the journal it lies in moves. `map_crc` is
-/// the roadmap's or the field's.
+/// Reads the stored mission and checks it against the roadmap in use. The mission is copied into
+/// RAM, because the flash journal moves its records. `map_crc` is the CRC of the roadmap or field
+/// in use, 0 without one.
 fn find_mission(
     store: &Store,
     flash: &mut Flash,
@@ -217,7 +221,7 @@ fn find_mission(
     let Some(bytes) = found else { return FoundMission::default() };
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
     let files = map_crc ^ sum.rotate_left(1);
-    // The crash may have come from reading the mission, or from a plan.
+    // Both kinds of work may have crashed on these files: reading the mission, and planning it.
     if !crash::may_begin(FileWork::Plan, files) || !crash::begin_work(FileWork::ReadMission, files)
     {
         return FoundMission { files, set_aside: true, ..FoundMission::default() };
@@ -259,7 +263,8 @@ async fn timer_task(shell: &'static Shell) {
     shell.run_timers().await
 }
 
-/// Feeds the watchdog while all is well, and restarts when that is asked for.
+/// Feeds the watchdog every 100 ms as long as [`Shell::is_alive`], and restarts the board when a
+/// restart is due.
 #[task]
 async fn watchdog_task(shell: &'static Shell, mut watchdog: Watchdog) {
     loop {

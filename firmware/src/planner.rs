@@ -1,5 +1,6 @@
-//! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission
-//! file as they lie in flash, or a way around what is in its way.
+//! The planner on board: makes the plans that the companion requests. These are the vehicle's part
+//! of the swarm's plan, from the roadmap and mission file in flash, and a detour around keep-out
+//! zones.
 
 use companion::planner::coverage::Request;
 use companion::storage::mission_file::coverage::CoverageView;
@@ -19,26 +20,26 @@ use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPO
 use crate::kept::FileWork;
 use crate::scratch::WorkspaceOverlay;
 
-/// Most keep-out zones of a detour. A vehicle that fell silent may lie below a dozen places, any
-/// other makes one zone or two; with more zones than these there is no detour, not one past a zone
-/// that was left out.
+/// Most keep-out zones of a detour. A vehicle that fell silent may make a dozen zones, any other
+/// one or two. With more zones than these the request fails ([`PlanFailure::Capacity`]): a detour
+/// that ignored some zones would not be safe.
 const MAX_ZONES: usize = 4 * VEHICLES;
 
-/// Memory for planning beside roadmap and mission: pieces that lie in memories of their own.
+/// Memory that the planner works in; the three parts lie in different RAMs of the chip.
 pub struct PlanningMemory<'a> {
-    /// Workspace of the search.
+    /// Workspace of searches and of coverage planning.
     pub scratch: &'a mut WorkspaceOverlay,
-    /// The swarm's plan.
+    /// Plan of the whole swarm.
     pub swarm: &'a mut SwarmPlan<VEHICLES, WAYPOINTS>,
-    /// The vehicle's own.
+    /// Plan of this vehicle, and inputs of it.
     pub own: &'a mut OwnPlanMemory,
 }
 
-/// A vehicle's plan, and what it is made from beside the swarm's.
+/// This vehicle's plan, and the inputs that the companion gives for it.
 pub struct OwnPlanMemory {
     plan: VehiclePlan<WAYPOINTS, GATES>,
     obstacles: Vec<KeepOutZone, MAX_ZONES>,
-    /// Whether there were more.
+    /// Whether a keep-out zone had no room in `obstacles`.
     too_many_zones: bool,
     done: Vec<WaypointRange, MAX_DONE_RANGES>,
     losses: Vec<DivisionInputs<VEHICLES>, MAX_DIVISIONS>,
@@ -46,7 +47,7 @@ pub struct OwnPlanMemory {
 }
 
 impl OwnPlanMemory {
-    /// All zeros, so a static costs .bss alone.
+    /// Empty; its bytes are all zeros, so a static of it lies in .bss and takes no flash.
     pub const fn new() -> Self {
         Self {
             plan: VehiclePlan::new(),
@@ -65,24 +66,27 @@ impl Default for OwnPlanMemory {
     }
 }
 
-/// A planner over a roadmap or field and a mission that belong together, or over none.
+/// Makes one vehicle's plans from a mission and the roadmap or field it needs; without them every
+/// request fails.
 pub struct Planner<'a> {
-    /// Roadmap to plan on.
+    /// Roadmap in flash on which routes are searched.
     pub roadmap: Option<RoadmapView<'a>>,
-    /// The heights to fly above.
+    /// Height field that a coverage mission's flights keep above.
     pub field: Option<FieldView<'a>>,
     /// Mission to plan.
     pub mission: Option<MissionView<'a>>,
-    /// System id of the vehicle whose plan it is.
+    /// System id of this vehicle.
     pub system_id: u8,
-    /// A checksum of all.
+    /// Checksum of mission and roadmap (or field), by which the crash record names them.
     pub files: u32,
-    /// Memory of the planner.
+    /// Memory that the planner works in.
     pub memory: PlanningMemory<'a>,
 }
 
 impl Planner<'_> {
-    /// Inputs of the plan that the companion wants: lost vehicles, or keep-out zones of its detour.
+    /// Copies the inputs of the requested plan from the companion: photographed waypoints, lost
+    /// vehicles for a division, keep-out zones for a detour. Returns the detour's start and goal;
+    /// `None` for any other plan, or if the companion no longer wants a detour.
     pub fn read_inputs(
         &mut self,
         wanted: PlanKind,
@@ -94,10 +98,11 @@ impl Planner<'_> {
         done.clear();
         losses.clear();
         *crowded = false;
-        // Cannot overflow: as many as the companion keeps.
+        // Cannot overflow: it has the capacity of the companion's list.
         let _ = done.extend_from_slice(companion.excluded_waypoints());
         if wanted == PlanKind::Division {
-            // Cannot overflow: as many as the companion keeps, and the one under way.
+            // Cannot overflow: it has room for the divisions that the companion keeps and for the
+            // one in progress.
             companion.losses().for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
         }
         if wanted != PlanKind::Detour {
@@ -106,11 +111,11 @@ impl Planner<'_> {
         companion.detour_request(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
     }
 
-    /// The plan asked for. Files of which it is known that they bring the board down are not
-    /// planned on.
+    /// Makes the requested plan. Files whose planning crashed three starts in a row are not planned
+    /// on.
     ///
     /// # Errors
-    /// Reason why there is none.
+    /// [`PlanFailure`]: the reason why there is no plan.
     pub fn answer(
         &mut self,
         wanted: PlanKind,
@@ -127,7 +132,7 @@ impl Planner<'_> {
         outcome
     }
 
-    /// Kept apart so that a debugger finds it.
+    /// Not inlined, so that a debugger finds the symbol.
     #[inline(never)]
     fn plan(
         &mut self,
@@ -167,7 +172,8 @@ impl Planner<'_> {
     }
 }
 
-/// The way home over the area, or aside. Apart as [`plan_area`].
+/// Plans a detour of a coverage mission: home above the area, or out of another vehicle's column.
+/// Not inlined, for the reason at [`plan_area`].
 #[inline(never)]
 fn plan_area_detour<'m>(
     area: &CoverageView<'_>,
@@ -191,8 +197,8 @@ fn plan_area_detour<'m>(
     Ok(&own.plan)
 }
 
-/// The plan of a coverage mission. Apart, so that what it has on the stack is not there while
-/// others plan.
+/// Plans a coverage mission and takes vehicle `index`'s flight from it. Not inlined, so that its
+/// stack frame is not added to that of roadmap plans.
 #[inline(never)]
 fn plan_area<'m>(
     mission: &MissionView<'_>,

@@ -1,8 +1,9 @@
-//! What a board plans with: one piece of memory, for planning on a roadmap, for building one, or
-//! for a coverage mission.
+//! The planning workspace: one memory for four uses, of which one is active at a time (planning on
+//! a roadmap, building one, the parts of coverage planning for measurements, planning a coverage
+//! mission).
 //!
-//! An enum would do but for its change from one use to the other, which the compiler makes on the
-//! stack, where there is no room for it.
+//! An enum is not used: to change its variant the compiler would build the new value on the stack,
+//! where there is no room for it.
 #![expect(unsafe_code, reason = "four uses of one piece of memory")]
 
 use core::mem::{ManuallyDrop, MaybeUninit};
@@ -22,19 +23,19 @@ use crate::capacity::{
     AREA_VERTICES, HALF_EDGES, LANES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES,
 };
 
-/// Scratch of planning a swarm.
+/// Workspace for planning a swarm on a roadmap.
 pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
-/// Scratch of planning a coverage mission.
+/// Workspace for planning a coverage mission.
 pub struct AreaWorkspace {
-    /// Lanes and routes.
+    /// Workspace for lanes and routes.
     pub area: coverage::Workspace<AREA_VERTICES, LANES, VEHICLES>,
-    /// Flights.
+    /// Workspace for scheduling the flights.
     pub schedule: ScheduleWorkspace,
 }
 
 impl AreaWorkspace {
-    /// Creates it empty.
+    /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self { area: coverage::Workspace::new(), schedule: ScheduleWorkspace::new() }
     }
@@ -46,7 +47,7 @@ impl Default for AreaWorkspace {
     }
 }
 
-/// The memory; a board has one. The smaller uses lie in the memory of the largest.
+/// The memory for all four uses, as large as the largest; a board has one.
 pub struct WorkspaceOverlay {
     memory: Memory,
     used: OverlayUse,
@@ -67,10 +68,11 @@ union Memory {
     area: ManuallyDrop<AreaWorkspace>,
 }
 
-/// Zero values of each use: the compiler refuses a constant that is no value of its type.
+/// All-zero values of the four types: this constant compiles only if all zeros is a valid value of
+/// each.
 #[expect(dead_code, reason = "made by the compiler alone")]
 const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageWorkspace, AreaWorkspace) = {
-    // SAFETY: the compiler checks it.
+    // SAFETY: the compiler evaluates this and rejects an invalid value.
     unsafe {
         let zeroed = (
             MaybeUninit::zeroed(),
@@ -88,44 +90,46 @@ const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageWorkspace, AreaWorkspace) = {
 };
 
 impl WorkspaceOverlay {
-    /// All zeros, so a static costs .bss alone.
+    /// Empty, in use for planning; its bytes are all zeros, so a static of it lies in .bss and
+    /// takes no flash.
     pub const fn new() -> Self {
         Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, used: OverlayUse::Plan }
     }
 
-    /// The memory for planning from here on.
+    /// The memory as workspace of roadmap plans. It is zeroed if it had another use before.
     pub fn planner(&mut self) -> &mut Planner {
         self.switch_use(OverlayUse::Plan);
-        // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner
-        // was written since.
+        // SAFETY: `switch_use` zeroed it when the use changed to this one, all zeros is an empty
+        // planner, and since then it was written as a planner alone.
         unsafe { &mut self.memory.plan }
     }
 
-    /// The memory for building from here on; empty.
+    /// The memory as roadmap builder. It is zeroed if it had another use before.
     pub fn builder(&mut self) -> &mut RoadmapBuilder {
         self.switch_use(OverlayUse::Build);
-        // SAFETY: as above; all zeros is an empty builder.
+        // SAFETY: as in `planner`; all zeros is an empty builder.
         unsafe { &mut self.memory.build }
     }
 
-    /// The memory for a coverage mission from here on; empty.
+    /// The memory as workspaces of coverage's separate steps. It is zeroed if it had another use
+    /// before.
     pub fn coverage(&mut self) -> &mut CoverageWorkspace {
         self.switch_use(OverlayUse::Coverage);
-        // SAFETY: as above; all zeros is nothing lent yet.
+        // SAFETY: as in `planner`; all zeros is an empty workspace.
         unsafe { &mut self.memory.coverage }
     }
 
-    /// The memory for planning a coverage mission from here on; empty.
+    /// The memory as workspace of coverage plans. It is zeroed if it had another use before.
     pub fn area(&mut self) -> &mut AreaWorkspace {
         self.switch_use(OverlayUse::Area);
-        // SAFETY: as above; all zeros is an area without vertices.
+        // SAFETY: as in `planner`; all zeros is an area without vertices.
         unsafe { &mut self.memory.area }
     }
 
-    /// Zeros where the use changes.
+    /// Zeroes the memory if `used` differs from its use until now.
     fn switch_use(&mut self, used: OverlayUse) {
         if self.used != used {
-            // SAFETY: no use has anything to drop, and any bytes may be written over their memory.
+            // SAFETY: no variant has a destructor, and any bytes may be written over their memory.
             unsafe { (&raw mut self.memory).write_bytes(0, 1) };
             self.used = used;
         }
@@ -138,26 +142,26 @@ impl Default for WorkspaceOverlay {
     }
 }
 
-/// Workspaces of a coverage mission's plan.
+/// Workspaces of the separate steps of coverage planning, for measuring them.
 pub struct CoverageWorkspace {
-    /// The whole path.
+    /// All lanes of the area, along one path.
     pub tracks: Tracks<LANES>,
-    /// Lanes that are left after a loss.
+    /// Lanes that are not photographed after a vehicle was lost.
     pub left: Tracks<LANES>,
-    /// Workspace for making lanes.
+    /// Workspace for computing lanes.
     pub build: tracks::Workspace<AREA_VERTICES>,
-    /// Workspace for dividing lanes.
+    /// Workspace for dividing lanes among vehicles.
     pub powell: powell::Workspace<VEHICLES>,
-    /// The routes.
+    /// Each vehicle's route over its lanes.
     pub plan: Plan<VEHICLES>,
-    /// Workspace for losses, and for the lanes left after them.
+    /// Workspace for lost vehicles and the lanes left after them.
     pub losses: losses::Workspace<LANES, VEHICLES>,
-    /// Workspace for keeping flights apart.
+    /// Workspace for scheduling the flights.
     pub schedule: ScheduleWorkspace,
 }
 
 impl CoverageWorkspace {
-    /// Creates it empty.
+    /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
@@ -177,7 +181,7 @@ impl Default for CoverageWorkspace {
     }
 }
 
-/// Nodes and edges of a roadmap that is built on board.
+/// A roadmap that is being built on board: nodes and edges.
 pub struct RoadmapBuilder {
     nodes: [Point; ROADMAP_NODES],
     node_count: usize,
@@ -187,11 +191,11 @@ pub struct RoadmapBuilder {
 }
 
 impl RoadmapBuilder {
-    /// Samples nodes and joins them: Algorithm 1 of P3D. Every edge carries the clearance it was
-    /// tested at.
+    /// Samples nodes and connects them by edges: Algorithm 1 of P3D. Every edge stores the
+    /// clearance with which it was tested.
     ///
     /// # Errors
-    /// The map has no room, or the roadmap is larger than this board's.
+    /// The map has no free space for the nodes, or the roadmap exceeds the board's capacities.
     pub fn build(
         &mut self,
         grid: &VoxelGrid<'_>,
@@ -203,7 +207,7 @@ impl RoadmapBuilder {
         self.connect_nodes(grid, config)
     }
 
-    /// First step: nodes.
+    /// Step 1 of 3: samples the nodes.
     ///
     /// # Errors
     /// As [`Self::build`].
@@ -218,7 +222,7 @@ impl RoadmapBuilder {
         Ok(())
     }
 
-    /// Second step: nodes by place.
+    /// Step 2 of 3: sorts the nodes into cubes by place.
     ///
     /// # Errors
     /// As [`Self::build`].
@@ -226,7 +230,7 @@ impl RoadmapBuilder {
         self.index.build_index(&self.nodes[..self.node_count], config)
     }
 
-    /// Third step: edges.
+    /// Step 3 of 3: connects near nodes by edges that are clear.
     ///
     /// # Errors
     /// As [`Self::build`].

@@ -1,10 +1,10 @@
-//! The shell around the companion: what moves bytes, keeps time and plans.
+//! The shell around the companion: async tasks that move bytes, run timers, plan and serve flash.
 //!
 //! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`run_timers`](Shell::run_timers)
-//! are tasks of an interrupt's executor; [`run_planner_and_flash`](Shell::run_planner_and_flash) is
-//! a task of another one below it, so a long plan never holds a setpoint up. The companion is held
-//! only for the time of one of its calls, never across an `await`, and both executors wait for so
-//! long ([`HoldsExecutors`]).
+//! run on the executor of higher priority; [`run_planner_and_flash`](Shell::run_planner_and_flash)
+//! runs on the one below it, so a long plan never delays a setpoint. The companion is locked only
+//! for the time of one of its calls, never across an `await`; neither executor runs another task
+//! meanwhile ([`HoldsExecutors`]).
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -25,59 +25,59 @@ use crate::capacity::BoardCompanion;
 use crate::flash::Flash;
 use crate::planner::Planner;
 
-/// Bytes taken from a UART at once.
+/// Most bytes that are read from a UART at once.
 const UART_CHUNK: usize = 256;
-/// Time between two polls of a UART, so that bytes come in handfuls: each poll costs as much as a
-/// hundred bytes.
+/// Pause after each read of a UART, so that bytes come in groups: a read costs as much processor
+/// time as handling a hundred bytes.
 const UART_POLL_EVERY: Duration = Duration::from_millis(1);
-/// Period at which a link task without work checks in, so that a task that hangs is known.
+/// A task without work checks in this often; the watchdog is fed only while all tasks check in.
 pub const CHECK_IN_EVERY: Duration = Duration::from_millis(100);
-/// Least time between two reports of errors of a line; the first is reported at once.
+/// Least time between two STATUSTEXTs about the errors of one UART; the first is sent at once.
 const LINE_REPORT_EVERY: Duration = Duration::from_secs(10);
-/// Reports of a line: errors that the UART reported, and frames that were damaged or cut.
+/// STATUSTEXT of each link: errors of its UART, and frames with a bad CRC or cut short.
 const LINE_TEXTS: [&str; 2] =
     ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
-/// Time that queued messages have to go out before a restart, milliseconds.
+/// Time from the request of a restart to the restart, milliseconds: queued messages are sent.
 const FLUSH_BEFORE_RESTART_MS: u32 = 200;
 
 type TaskSignal<T> = Signal<CriticalSectionRawMutex, T>;
 
-/// State that the tasks share.
+/// The companion, and signals and counters that all tasks share.
 pub struct Shell {
     companion: Mutex<HoldsExecutors, RefCell<Option<&'static mut BoardCompanion>>>,
-    /// Signals that a link may have bytes to send.
+    /// For each link: wakes its transmit task, because the companion may have a frame to send.
     send_due: [TaskSignal<()>; 2],
-    /// The companion's next step may be due earlier than thought.
+    /// Wakes `run_timers`, because the companion's next timeout may have changed.
     timer_changed: TaskSignal<()>,
-    /// The plans that the companion asks for.
+    /// Kinds of plan that the companion requested and that are not made yet.
     plan_requests: PlanRequests,
-    /// Signals that long work may be waiting.
+    /// Wakes `run_planner_and_flash`, because a plan or a flash operation may have been requested.
     work_due: TaskSignal<()>,
-    /// When a restart was asked for, milliseconds; 0 if none was.
+    /// Time at which a restart was requested, milliseconds since the start; 0 without a request.
     restart_ms: AtomicU32,
-    /// Whether the flash is at work.
+    /// Whether an erasure, programming or reading of the flash runs.
     flash_busy: AtomicBool,
-    /// When each task last came by, milliseconds: receiving and transmitting of both links, and
-    /// time.
+    /// Time of each task's last check-in, milliseconds since the start: receive tasks of both
+    /// links, transmit tasks of both links, timer task.
     checked_in_ms: [AtomicU32; TASK_COUNT],
-    /// Whether there is a companion.
+    /// Whether [`Shell::start`] has stored a companion.
     started: AtomicBool,
     setpoints: SetpointGaps,
-    /// Errors that the UARTs reported.
+    /// For each link: number of errors that its UART returned since the start.
     pub line_errors: [AtomicU32; 2],
 }
 
-/// A request of the companion, its bytes aside.
+/// A [`FlashRequest`] without the bytes to program: offset and length in bytes.
 enum Request {
     Erase(u32),
     Program(u32, usize),
     Read(u32, usize),
 }
 
-/// The system id of the autopilot: of those whose heartbeat comes within a while after the first
-/// one, that of which most is heard, since an autopilot may pass on those of others. `None` where
-/// none comes in time.
+/// Waits for HEARTBEATs on `uart` and returns the autopilot's system id: of the senders heard
+/// within 1.1 s after the first HEARTBEAT the one with most frames, since an autopilot may forward
+/// others' messages. `None` if no HEARTBEAT comes within 3 s.
 pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
     let mut ear = AutopilotListener::new();
     let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
@@ -86,7 +86,7 @@ pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
         with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
     {
         let known = ear.most_heard().is_some();
-        // A line error loses bytes, no more.
+        // A UART error loses bytes, nothing else.
         ear.handle_bytes(&chunk[..received.unwrap_or_default()]);
         if !known && ear.most_heard().is_some() {
             until = Instant::now() + OTHER_AUTOPILOTS_WITHIN;
@@ -95,20 +95,20 @@ pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
     ear.most_heard()
 }
 
-/// System id of a board without an autopilot: files can be uploaded to it. When it hears an
-/// autopilot it restarts.
+/// System id of a board that has heard no autopilot and has none set: files can be uploaded to it.
+/// When it hears an autopilot, it restarts and takes that one's id.
 pub const ID_WITHOUT_AUTOPILOT: u8 = 250;
-/// Time within which the first autopilot is heard: an autopilot reports its state once a second.
+/// Time to wait for the first HEARTBEAT; an autopilot sends one each second.
 const FIRST_AUTOPILOT_WITHIN: Duration = Duration::from_secs(3);
-/// Time after the first autopilot within which every other one on the line is heard.
+/// Time after the first HEARTBEAT in which other autopilots' HEARTBEATs are awaited.
 const OTHER_AUTOPILOTS_WITHIN: Duration = Duration::from_millis(1100);
-/// Most autopilots that are distinguished.
+/// Most autopilots whose frames are counted; frames of further ones are ignored.
 const MAX_AUTOPILOTS: usize = 8;
 
-/// Listens for autopilots.
+/// Counts the frames of each autopilot that is heard on a UART.
 struct AutopilotListener {
     framer: Framer,
-    /// System id, frames, and whether a heartbeat was among them.
+    /// Each autopilot's system id, number of its frames, and whether a HEARTBEAT was among them.
     heard: Vec<(u8, u32, bool), MAX_AUTOPILOTS>,
 }
 
@@ -125,28 +125,28 @@ impl AutopilotListener {
             let beats = frame.message_id == HEARTBEAT;
             match self.heard.iter_mut().find(|(id, ..)| *id == frame.system) {
                 Some((_, frames, beat)) => (*frames, *beat) = (*frames + 1, *beat || beats),
-                // More autopilots than these are not distinguished.
+                // No room for a further autopilot: its frames are not counted.
                 None => _ = self.heard.push((frame.system, 1, beats)),
             }
         }
     }
 
-    /// The system id of the autopilot of which most is heard; the first of several.
+    /// Of the autopilots that sent a HEARTBEAT, the one with most frames; the first of equals.
     fn most_heard(&self) -> Option<u8> {
         let beating = self.heard.iter().filter(|(_, _, beats)| *beats);
         beating.rev().max_by_key(|(_, frames, _)| *frames).map(|(id, ..)| *id)
     }
 }
 
-/// Longest start of a board, milliseconds: the search through the flash, the check of the roadmap
-/// and the wait for an autopilot. The watchdog is fed this long without any task of links or time.
+/// Longest start of a board, milliseconds: search of the flash, check of the roadmap, wait for an
+/// autopilot. Until then the watchdog is fed although no task checks in.
 pub const START_TIMEOUT_MS: u32 = 20_000;
 
 const HEARTBEAT: u32 = 0;
 const TASK_COUNT: usize = 5;
 const TIME_TASK: usize = 4;
 
-/// Now, as the companion counts time.
+/// Time since the board's start, in the companion's type.
 pub fn now() -> companion::Instant {
     companion::Instant::from_micros(Instant::now().as_micros())
 }
@@ -156,7 +156,7 @@ fn now_ms() -> u32 {
 }
 
 impl Shell {
-    /// Without a companion.
+    /// A shell without a companion; [`Self::start`] stores it.
     pub const fn new() -> Self {
         Self {
             companion: Mutex::new(RefCell::new(None)),
@@ -173,15 +173,15 @@ impl Shell {
         }
     }
 
-    /// Stores the companion, before any task of links or time starts. Until then the board is
-    /// alive for no longer than [`START_TIMEOUT_MS`].
+    /// Stores the companion; to be called before any task of the links or timers is spawned. Before
+    /// this call [`Self::is_alive`] holds for [`START_TIMEOUT_MS`] only.
     pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
         (0..TASK_COUNT).for_each(|task| self.check_in(task));
         self.started.store(true, Ordering::Relaxed);
     }
 
-    /// Holds the companion for the time of `run_planner_and_flash`.
+    /// Calls `work` with the companion locked; handles no events and wakes no task.
     fn lock_companion<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
         self.companion.lock(|held| {
             work(
@@ -192,8 +192,8 @@ impl Shell {
         })
     }
 
-    /// Does something with the companion, at a time no earlier than that of the last, and hands on
-    /// what came of it.
+    /// Calls `work` with the companion and the time, handles the companion's events (plan and
+    /// restart requests, report of setpoint gaps), and wakes all tasks.
     fn with_companion<T>(
         &'static self,
         work: impl FnOnce(&mut BoardCompanion, companion::Instant) -> T,
@@ -213,7 +213,7 @@ impl Shell {
                             );
                         }
                     }
-                    // The event's text is reported already.
+                    // The companion has sent a STATUSTEXT about these already.
                     Event::StateChanged { .. }
                     | Event::WaitsForStart { .. }
                     | Event::FlownAround { .. } => {}
@@ -232,7 +232,7 @@ impl Shell {
         result
     }
 
-    /// Requests a restart. A repeated request does not delay it.
+    /// Requests a restart of the board. A repeated request does not delay it.
     fn request_restart(&self) {
         let _ = self.restart_ms.compare_exchange(
             0,
@@ -246,9 +246,9 @@ impl Shell {
         self.checked_in_ms[task].store(now_ms(), Ordering::Relaxed);
     }
 
-    /// Takes what a UART receives to the companion.
+    /// Task: passes `uart`'s bytes to the companion as those of `link`; sends UART errors as texts.
     ///
-    /// A board without an autopilot restarts when it hears one, if `for_autopilot`.
+    /// `for_autopilot`: the board started without an autopilot; it restarts when it hears one.
     pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
         let mut chunk = [0; UART_CHUNK];
         let mut ear = for_autopilot.then(AutopilotListener::new);
@@ -267,7 +267,7 @@ impl Shell {
                         }
                     }
                 }
-                // Framing, noise or overrun: what was lost the framer finds out.
+                // Framing, noise or overrun error: the framer notices the lost bytes by the CRC.
                 Ok(Err(_)) => _ = errors.fetch_add(1, Ordering::Relaxed),
                 Err(_) => {}
             }
@@ -289,19 +289,19 @@ impl Shell {
         }
     }
 
-    /// Takes what the companion has for a link to its UART.
+    /// Task: sends the companion's frames for `link` by `uart`.
     pub async fn transmit(&'static self, link: Link, mut uart: impl Write) -> ! {
         let mut frame = [0; MAX_FRAME_LEN];
         loop {
             let length = self.lock_companion(|companion| companion.poll_transmit(link, &mut frame));
             if length == 0 {
-                // Late or not, it comes by.
+                // Without a frame to send the task checks in after 100 ms at the latest.
                 let _ = with_timeout(CHECK_IN_EVERY, self.send_due[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
                     self.setpoints.note_setpoint(now_ms());
                 }
-                // Work that waited for room for its report may continue.
+                // There is room in the send queue: work that waited for it may go on.
                 self.work_due.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
                     self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
@@ -311,7 +311,7 @@ impl Shell {
         }
     }
 
-    /// Calls the companion whenever one of its timers is due.
+    /// Task: calls the companion's `handle_timeout` whenever one of its timers is due.
     pub async fn run_timers(&'static self) -> ! {
         loop {
             let now = now();
@@ -328,8 +328,8 @@ impl Shell {
         }
     }
 
-    /// Answers the companion's requests for plans and for its flash, one after the other: the flash
-    /// is never erased while a roadmap in it is planned on.
+    /// Task: makes the plans that the companion requests and executes its flash requests, one after
+    /// the other: so the flash is never erased while a plan reads the roadmap in it.
     pub async fn run_planner_and_flash(
         &'static self,
         planner: &mut Planner<'_>,
@@ -349,8 +349,8 @@ impl Shell {
         }
     }
 
-    /// Executes one flash request of the companion; false if it asks for none, or is about to
-    /// restart: that must not tear what is being written.
+    /// Executes one flash request of the companion. Returns false if there is none, or if a restart
+    /// was requested: the restart must not tear a word that is being programmed.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
         if self.restart_ms.load(Ordering::Relaxed) != 0 {
             return false;
@@ -367,7 +367,7 @@ impl Shell {
             })
         });
         let Some(request) = request else {
-            // The companion may have an answer to send.
+            // `poll_flash` may have finished a request without flash, whose answer is to be sent.
             self.send_due.iter().for_each(|sends| sends.signal(()));
             return false;
         };
@@ -383,8 +383,8 @@ impl Shell {
         true
     }
 
-    /// Whether a restart was asked for, what was to be said before has had time to go out, and the
-    /// flash is at rest.
+    /// Whether the board may restart now: a restart was requested over 200 ms ago, so queued
+    /// messages have been sent, and no flash operation runs.
     pub fn is_restart_due(&self) -> bool {
         let asked = self.restart_ms.load(Ordering::Relaxed);
         asked != 0
@@ -392,8 +392,8 @@ impl Shell {
             && !self.flash_busy.load(Ordering::Relaxed)
     }
 
-    /// Whether every task of the links and of time came by lately, and so did the last setpoint
-    /// where they are to flow: else the watchdog is left to bite.
+    /// Whether the watchdog may be fed: all tasks checked in within 0.4 s, and while setpoints are
+    /// streamed the last was sent within 0.4 s; during the start, for its first 20 s.
     pub fn is_alive(&self) -> bool {
         self.is_alive_at(now_ms())
     }
@@ -416,15 +416,15 @@ impl Default for Shell {
     }
 }
 
-/// Number of setpoints in a flight and the gaps between them, by the board's own time. A stream
-/// lasts as long as the companion reports it, not until a pause: else the longest pauses would not
-/// be seen.
+/// Number of setpoints in a flight and the longest gap between two, by the board's clock. The
+/// stream ends when [`BoardCompanion::streams_setpoints`] says so, not at a pause: else the longest
+/// gaps would not be counted.
 struct SetpointGaps {
     count: AtomicU32,
-    /// The longest time between two, or from the stream's begin to the first or from the last to
-    /// its end, milliseconds.
+    /// Longest gap, milliseconds: between two setpoints, from the stream's begin to the first one,
+    /// or from the last one to the stream's end.
     gap_ms: AtomicU32,
-    /// When the last went out, or the stream began, milliseconds; 0 while there is no stream.
+    /// Time of the last setpoint or the stream's begin, milliseconds; 0 while no stream runs.
     last_ms: AtomicU32,
 }
 
@@ -433,24 +433,24 @@ impl SetpointGaps {
         Self { count: AtomicU32::new(0), gap_ms: AtomicU32::new(0), last_ms: AtomicU32::new(0) }
     }
 
-    /// Notes a setpoint that goes out.
+    /// Counts a setpoint that is sent now.
     fn note_setpoint(&self, now_ms: u32) {
         self.count.fetch_add(1, Ordering::Relaxed);
         self.set_last(now_ms, now_ms.max(1));
     }
 
-    /// The companion streams them, from now on if it did not before.
+    /// Notes that the companion streams setpoints; the stream begins now if none runs.
     fn begin_stream(&self, now_ms: u32) {
         let _ =
             self.last_ms.compare_exchange(0, now_ms.max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
 
-    /// Time since the last, if more are to come, milliseconds.
+    /// Time since the last setpoint or the stream's begin, ms; `None` while no stream runs.
     fn since_last_ms(&self, now_ms: u32) -> Option<u32> {
         elapsed_ms(self.last_ms.load(Ordering::Relaxed), now_ms)
     }
 
-    /// The companion streams none, for now.
+    /// Notes that the companion streams no setpoints.
     fn end_stream(&self, now_ms: u32) {
         self.set_last(now_ms, 0);
     }
@@ -461,8 +461,8 @@ impl SetpointGaps {
         }
     }
 
-    /// Returns the count and the longest gap of the setpoints of a flight that is over, and clears
-    /// both; `None` without any.
+    /// Ends the stream and returns the number of setpoints and the longest gap (ms) of the flight,
+    /// and clears both; `None` if no setpoint was sent.
     fn take_setpoint_stats(&self, now_ms: u32) -> Option<[u32; 2]> {
         self.end_stream(now_ms);
         let reported = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
@@ -470,12 +470,12 @@ impl SetpointGaps {
     }
 }
 
-/// Time since the last setpoint, if there was one.
+/// Time from `last_ms` to `now_ms`, milliseconds; `None` if `last_ms` is 0, which means no stream.
 fn elapsed_ms(last_ms: u32, now_ms: u32) -> Option<u32> {
     (last_ms != 0).then(|| now_ms.wrapping_sub(last_ms))
 }
 
-/// SET_POSITION_TARGET_LOCAL_NED, by the message id of a MAVLink 2 frame.
+/// Whether a MAVLink 2 frame is a SET_POSITION_TARGET_LOCAL_NED, by its message id (84).
 fn is_setpoint(frame: &[u8]) -> bool {
     frame.get(7..10) == Some(&[84, 0, 0])
 }

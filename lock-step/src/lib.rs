@@ -1,66 +1,67 @@
-//! What the desk and an emulated board say to each other in lock step: the board's time advances
-//! only as the desk grants it.
+//! Protocol between host-sim and an emulated board in lock step: the board's time advances only as
+//! far as the host grants it.
 //!
-//! The desk sends a message: its length (`u32`, little endian, of what follows), then records. The
-//! board does what the records say, in order, and answers with records of which the last is
-//! [`FromBoard::Waits`]. Between two messages the board stands still: it waits in one read of its
-//! host, which takes none of its instructions, and its timers and its watchdog count instructions.
+//! The host sends a message: its length (`u32`, little endian, of the rest), then records. The
+//! board executes the records in order and answers with records of which the last is
+//! [`FromBoard::Waits`]. Between two messages the board is stopped: it waits in a semihosting read,
+//! during which QEMU executes no instruction, and its timers and watchdog count instructions.
 //!
 //! ```text
 //! desk    Bytes(port, due) …, Bytes(port, due) …, Run(until)
 //! board   Sent(port, at) …, Sent(port, at) …, Waits(now)
 //! ```
 //!
-//! A board that starts, for whatever reason, says [`FromBoard::Started`] and waits for a message;
-//! what it had left of the message before is dropped. [`ToBoard::Peek`], [`ToBoard::Poke`] and
-//! [`ToBoard::Call`] are its debug probe; they travel in a message without `Run`.
+//! A board that starts, also after a reset, sends [`FromBoard::Started`] and waits for a message;
+//! the unexecuted rest of the last message is dropped. [`ToBoard::Peek`], [`ToBoard::Poke`] and
+//! [`ToBoard::Call`] act as a debug probe; the host sends them in a message without `Run`.
 //!
-//! A record is 16 bytes, little endian (kind `u8`, port `u8`, length `u16`, address `u32`, time or
-//! argument `u64`), and the bytes that its length counts. Times are microseconds since the board's
-//! start.
+//! A record is a header of 16 bytes, little endian (kind `u8`, port `u8`, payload length `u16`,
+//! address `u32`, time or argument `u64`), followed by its payload. Times are microseconds since
+//! the board's start.
 #![no_std]
 #![forbid(unsafe_code)]
 
 /// The board runs in lock step if this is its whole command line (QEMU:
 /// `-semihosting-config arg=…`).
 pub const COMMAND_LINE: &str = "lock-step";
-/// Bytes of a record before those that it carries.
+/// Bytes of a record's header.
 pub const HEAD: usize = 16;
-/// Longest message without its length.
+/// Longest message, bytes, without its length field.
 pub const LONGEST: usize = 256 << 10;
 
-/// A record from the desk.
+/// A record that the host sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToBoard {
-    /// A port receives the bytes that follow.
+    /// UART `port` receives the payload at time `due_us`.
     Bytes {
-        /// 0 to the autopilot, 1 to the radio.
+        /// 0 is the UART to the autopilot, 1 that to the radio.
         port: u8,
-        /// How many.
+        /// Length of the payload, bytes.
         len: u16,
-        /// When.
+        /// Time at which the UART's driver receives the payload, microseconds since the board's
+        /// start.
         due_us: u64,
     },
-    /// The board's time may pass.
+    /// Grants time: the board may run until `until_us`.
     Run {
-        /// Up to there.
+        /// End of the grant, microseconds since the board's start.
         until_us: u64,
     },
-    /// Answer with [`FromBoard::Memory`].
+    /// Asks for memory, which the board sends as [`FromBoard::Memory`].
     Peek {
-        /// Where.
+        /// Address of the first byte.
         address: u32,
-        /// How many bytes.
+        /// Number of bytes.
         len: u16,
     },
-    /// Put the bytes that follow into memory.
+    /// Writes the payload into memory.
     Poke {
-        /// Where.
+        /// Address of the first byte.
         address: u32,
-        /// How many.
+        /// Length of the payload, bytes.
         len: u16,
     },
-    /// Call a function of C's convention, above every task.
+    /// Calls a function with C calling convention, in an interrupt above every task.
     Call {
         /// Address of the function.
         address: u32,
@@ -69,33 +70,33 @@ pub enum ToBoard {
     },
 }
 
-/// A record from the board.
+/// A record that the board sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FromBoard {
-    /// It starts.
+    /// The board has started.
     Started,
-    /// A port sent the bytes that follow.
+    /// UART `port` sent the payload at time `at_us`.
     Sent {
-        /// As in [`ToBoard::Bytes`].
+        /// 0 is the UART to the autopilot, 1 that to the radio.
         port: u8,
-        /// How many.
+        /// Length of the payload, bytes.
         len: u16,
-        /// When its driver took them.
+        /// Time at which the UART's driver took the bytes, microseconds since the board's start.
         at_us: u64,
     },
-    /// The bytes that follow are in its memory.
+    /// The payload is the memory that [`ToBoard::Peek`] requested.
     Memory {
-        /// How many.
+        /// Length of the payload, bytes.
         len: u16,
     },
-    /// The message is done.
+    /// All records of the message are executed; the board waits for the next one.
     Waits {
-        /// The board's time.
+        /// Time of the board, microseconds since its start.
         now_us: u64,
     },
 }
 
-/// Kind, port, length, address, time.
+/// Fields of a record's header: kind, port, payload length, address, time or argument.
 type HeaderFields = (u8, u8, u16, u32, u64);
 
 fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEAD] {
@@ -119,7 +120,7 @@ fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
 }
 
 impl ToBoard {
-    /// The bytes of the record header.
+    /// Encodes the record's header.
     pub fn to_bytes(self) -> [u8; HEAD] {
         to_bytes(match self {
             Self::Bytes { port, len, due_us } => (0, port, len, 0, due_us),
@@ -130,7 +131,7 @@ impl ToBoard {
         })
     }
 
-    /// The record that these bytes encode; `None` for bytes of no record.
+    /// Decodes a record's header; `None` for an unknown kind.
     pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
         let (kind, port, len, address, time) = from_bytes(head);
         Some(match kind {
@@ -143,7 +144,7 @@ impl ToBoard {
         })
     }
 
-    /// Number of payload bytes that follow the header.
+    /// Bytes of payload that follow the header.
     pub fn payload_len(self) -> usize {
         match self {
             Self::Bytes { len, .. } | Self::Poke { len, .. } => len.into(),
@@ -153,7 +154,7 @@ impl ToBoard {
 }
 
 impl FromBoard {
-    /// The bytes of the record header.
+    /// Encodes the record's header.
     pub fn to_bytes(self) -> [u8; HEAD] {
         to_bytes(match self {
             Self::Started => (0, 0, 0, 0, 0),
@@ -163,7 +164,7 @@ impl FromBoard {
         })
     }
 
-    /// The record that these bytes encode; `None` for bytes of no record.
+    /// Decodes a record's header; `None` for an unknown kind.
     pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
         let (kind, port, len, _, time) = from_bytes(head);
         Some(match kind {
@@ -175,7 +176,7 @@ impl FromBoard {
         })
     }
 
-    /// Number of payload bytes that follow the header.
+    /// Bytes of payload that follow the header.
     pub fn payload_len(self) -> usize {
         match self {
             Self::Sent { len, .. } | Self::Memory { len } => len.into(),

@@ -1,17 +1,17 @@
 //! The camera that the autopilot triggers: by distance flown (DO_SET_CAM_TRIGG_DIST, 206) or at
 //! once (DO_DIGICAM_CONTROL, 203).
 //!
-//! Each firmware looks as it does. PX4's `camera_trigger` (TRIG_MODE 4) runs every 50 ms: then it
-//! takes up a command, photographs where it is switched on, and where it is the distance or more
-//! from there. ArduPilot's `AP_Camera` runs every 20 ms, counts from where it is switched on or
-//! from the picture before, and photographs at once what is asked for at once. Both measure across,
-//! on the estimate, from the last picture: pictures are a little more than the distance apart, by
-//! what is flown between two looks. Then CAMERA_IMAGE_CAPTURED (263, PX4, counted from 0) or
-//! CAMERA_FEEDBACK (180, ArduPilot, from
-//! 1) goes out through every port, with the estimated place. Source: `camera_trigger.cpp`,
-//!    `AP_Camera_Backend.cpp`.
+//! Each autopilot checks in its own way. PX4's `camera_trigger` (TRIG_MODE 4) runs every 50 ms:
+//! then it executes a command, takes a picture where triggering is switched on, and one whenever
+//! the distance from the last is reached. ArduPilot's `AP_Camera` runs every 20 ms: it measures
+//! from where triggering is switched on or from the last picture, and takes a requested picture
+//! immediately. Both measure horizontally, on the estimated position. So pictures are farther apart
+//! than the distance, by what is flown between two checks. Each picture is announced on every port,
+//! with the estimated position, by CAMERA_IMAGE_CAPTURED (263, PX4, counted from 0) or
+//! CAMERA_FEEDBACK (180, ArduPilot, counted from 1). Source: `camera_trigger.cpp`,
+//! `AP_Camera_Backend.cpp`.
 //!
-//! Where the vehicle truly was is kept for a referee ([`super::Autopilot::take_photos`]).
+//! The true position of each picture is kept for a referee ([`super::Autopilot::take_photos`]).
 
 use planner_core::Point;
 
@@ -23,40 +23,40 @@ use crate::AutopilotKind;
 
 const CAMERA_FEEDBACK: u32 = 180;
 const CAMERA_IMAGE_CAPTURED: u32 = 263;
-/// Period at which the trigger distance is checked, microseconds: PX4's, ArduPilot's.
+/// Period at which PX4 and ArduPilot check the trigger distance, microseconds.
 const TRIGGER_CHECK_EVERY_US: [u64; 2] = [50_000, 20_000];
-/// Most photos kept for a referee that does not fetch them.
+/// Most photos that are kept if no referee fetches them.
 const MAX_KEPT_PHOTOS: usize = 100_000;
 
-/// A picture as it truly was taken.
+/// A picture with the true position and heading at which it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photo {
-    /// Microseconds since boot.
+    /// Time since boot, microseconds.
     pub time_us: u64,
-    /// True centre of the body, ENU metres.
+    /// True position of the body's centre, ENU metres.
     pub position: Point,
     /// True heading, radians clockwise from north.
     pub heading_rad: f32,
 }
 
-/// The camera's trigger.
+/// State of the camera's trigger.
 #[derive(Clone, Debug, Default)]
 pub struct CameraTrigger {
-    /// Metres between pictures while it triggers by distance.
+    /// Distance between pictures while it triggers by distance, metres.
     distance_m: Option<f32>,
-    /// The estimated place, east and north, that the distance counts from.
+    /// Estimated position (east, north; metres) from which the distance is measured.
     last: Option<[f32; 2]>,
-    /// A picture was asked for at once.
+    /// Whether a single picture was requested.
     picture_requested: bool,
     next_poll_us: u64,
-    /// Pictures since boot.
+    /// Number of pictures since boot.
     taken: u32,
     photos: Vec<Photo>,
 }
 
 impl CameraTrigger {
-    /// DO_SET_CAM_TRIGG_DIST: metres in parameter 1, 0 and less stop it; parameter 3 asks for one
-    /// picture at once.
+    /// Executes DO_SET_CAM_TRIGG_DIST: parameter 1 is the distance in metres, 0 or less switches
+    /// triggering off; parameter 3 requests one picture at once.
     pub(super) fn handle_trigger_distance(&mut self, command: &Command) {
         let distance_m = command.param[0];
         self.distance_m = (distance_m > 0.0).then_some(distance_m);
@@ -64,22 +64,22 @@ impl CameraTrigger {
         self.picture_requested |= command.param[2] > 0.0;
     }
 
-    /// DO_DIGICAM_CONTROL: 1 in parameter 5 asks for a picture.
+    /// Executes DO_DIGICAM_CONTROL: 1 in parameter 5 requests a picture.
     pub(super) fn handle_digicam_control(&mut self, command: &Command) {
         self.picture_requested |= libm::roundf(command.param5) == 1.0;
     }
 
-    /// The state that a reboot leaves: the photos taken.
+    /// The state after a reboot: only the photos are kept.
     pub(super) fn after_reboot(&mut self) -> Self {
         Self { photos: core::mem::take(&mut self.photos), ..Self::default() }
     }
 
-    /// Returns the pictures taken since the last call.
+    /// Returns the photos since the last call.
     pub(super) fn take_photos(&mut self) -> Vec<Photo> {
         core::mem::take(&mut self.photos)
     }
 
-    /// Pictures since boot.
+    /// Number of pictures since boot.
     pub(super) fn picture_count(&self) -> u32 {
         self.taken
     }
@@ -89,8 +89,8 @@ impl CameraTrigger {
         self.next_poll_us
     }
 
-    /// One step: the message to announce, if a picture was taken. `estimate` is none without a
-    /// position.
+    /// Advances one step. Takes a picture if one is due and returns the id of the message that
+    /// announces it. `estimate` is the estimated position, `None` without one.
     pub(super) fn update(
         &mut self,
         personality: AutopilotKind,
@@ -111,7 +111,7 @@ impl CameraTrigger {
         {
             let far =
                 self.last.map(|last| libm::hypotf(at.x - last[0], at.y - last[1]) >= distance_m);
-            // PX4 photographs where it begins, ArduPilot only counts from there.
+            // PX4 takes a picture where triggering starts; ArduPilot only measures from there.
             let due = far.unwrap_or(px4);
             if due || far.is_none() {
                 self.last = Some([at.x, at.y]);
@@ -130,7 +130,8 @@ impl CameraTrigger {
 }
 
 impl Snapshot {
-    /// Reports of the picture taken in this step.
+    /// Sends CAMERA_IMAGE_CAPTURED or CAMERA_FEEDBACK of this step's picture; false for any other
+    /// id.
     pub(super) fn send_camera(&self, id: u32, port: &mut Port) -> bool {
         let (latitude, longitude, altitude_mm) = to_mavlink_units(&self.geodetic);
         let relative_m = (self.geodetic.alt_m - self.home.0.alt_m) as f32;
@@ -153,7 +154,7 @@ impl Snapshot {
                 for (k, q) in self.attitude().quaternion.iter().enumerate() {
                     payload[28 + 4 * k..32 + 4 * k].copy_from_slice(&q.to_le_bytes());
                 }
-                // Camera 1; success; no address of a file.
+                // Camera 1; success; no file URL.
                 payload[48..].copy_from_slice(&[1, 1]);
                 port.send_raw(id, &payload);
             }

@@ -1,4 +1,4 @@
-//! COMMAND_LONG and COMMAND_INT, read alike, and the results they are answered with.
+//! Reads COMMAND_LONG and COMMAND_INT into one type; MAV_RESULT values of the answers.
 
 use super::wire::PayloadReader;
 
@@ -8,7 +8,7 @@ pub const DENIED: u8 = 2;
 pub const UNSUPPORTED: u8 = 3;
 pub const FAILED: u8 = 4;
 
-/// Parameter 2 of COMPONENT_ARM_DISARM that forces arming or disarming.
+/// Parameter 2 of COMPONENT_ARM_DISARM that arms or disarms without checks.
 pub const ARM_FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
@@ -18,24 +18,24 @@ pub const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 pub const AUTOPILOT_VERSION: u32 = 148;
 pub const PROTOCOL_VERSION: u32 = 300;
 
-/// A command.
+/// A received command.
 pub struct Command {
-    /// MAV_CMD.
+    /// Number of the command (MAV_CMD).
     pub id: u16,
     /// Parameters 1 to 4.
     pub param: [f32; 4],
-    /// Parameter 5 where it is no place.
+    /// Parameter 5 as a number, for commands where it is no latitude.
     pub param5: f32,
-    /// Latitude and longitude in degrees, where given.
+    /// Latitude and longitude (parameters 5 and 6), degrees; NaN where not given.
     pub place: [f64; 2],
-    /// Parameter 7.
+    /// Parameter 7, for most commands an altitude, metres.
     pub z: f32,
-    /// z is above home, not above the sea.
+    /// Whether `z` counts from home; false: from sea level.
     pub relative: bool,
 }
 
 impl Command {
-    /// The command of a COMMAND_LONG.
+    /// Reads the payload of a COMMAND_LONG.
     pub fn from_command_long(fields: &PayloadReader<'_>) -> Self {
         let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
         Self {
@@ -48,7 +48,7 @@ impl Command {
         }
     }
 
-    /// The command of a COMMAND_INT.
+    /// Reads the payload of a COMMAND_INT.
     pub fn from_command_int(fields: &PayloadReader<'_>) -> Self {
         let degrees = |at: usize| match fields.i32(at) {
             i32::MAX => f64::NAN,
@@ -71,12 +71,12 @@ fn first_four(fields: &PayloadReader<'_>) -> [f32; 4] {
     [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
 }
 
-/// The result of what was done, or cannot be done now.
+/// MAV_RESULT of a command: ACCEPTED if `done`, else TEMPORARILY_REJECTED.
 pub fn accepted_or_rejected(done: bool) -> u8 {
     if done { ACCEPTED } else { TEMPORARILY_REJECTED }
 }
 
-/// A message id that came in a float.
+/// The message id that a float parameter holds; `None` outside 24 bits.
 pub fn message_id(value: f32) -> Option<u32> {
     (0.0..16_777_216.0).contains(&value).then_some(value as u32)
 }

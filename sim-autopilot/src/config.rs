@@ -1,4 +1,4 @@
-//! What a simulated autopilot is made from, and what of it is refused.
+//! Configuration of a simulated autopilot, and its checks.
 
 use planner_core::Point;
 use planner_core::frames::{Geodetic, Projection};
@@ -8,8 +8,8 @@ use super::vehicle::VehicleLimits;
 use crate::{AutopilotKind, Estimator};
 
 impl AutopilotKind {
-    /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its
-    /// recorded flights.
+    /// Factor on the airframe's drag. ArduCopter's follows from recorded flights of its simulated
+    /// quadrotor.
     pub(super) fn drag_share(self) -> f32 {
         match self {
             Self::Px4 => 1.0,
@@ -17,7 +17,7 @@ impl AutopilotKind {
         }
     }
 
-    /// Share of the push of wind.
+    /// Factor on the acceleration that wind causes.
     pub(super) fn wind_share(self) -> f32 {
         match self {
             Self::Px4 => 1.0,
@@ -25,7 +25,8 @@ impl AutopilotKind {
         }
     }
 
-    /// How it flattens the earth about its EKF origin.
+    /// Projection by which this autopilot converts latitude and longitude to NED about its EKF
+    /// origin.
     pub fn projection(self) -> Projection {
         match self {
             Self::Px4 => Projection::Px4,
@@ -39,47 +40,49 @@ impl AutopilotKind {
 pub struct Config {
     /// MAVLink system id, 1 to 255.
     pub system_id: u8,
-    /// Which autopilot it is.
+    /// Which autopilot it simulates.
     pub autopilot: AutopilotKind,
-    /// Origin of the mission frame.
+    /// Origin of the mission's ENU frame.
     pub world_origin: Geodetic,
-    /// Origin of the autopilot's own local frame.
+    /// Origin of the autopilot's own local NED frame.
     pub ekf_origin: Geodetic,
-    /// Home; `None` is where it stands when it arms.
+    /// Home position; `None`: the position at which it arms.
     pub home: Option<Geodetic>,
     /// Initial position of the centre of the vehicle's body, ENU metres.
     pub start: Point,
     /// Heading at the start, radians clockwise from north.
     pub heading_rad: f32,
-    /// Limits of the airframe.
+    /// Limits and dynamics of the airframe.
     pub vehicle: VehicleLimits,
     /// Mean wind, ENU m/s.
     pub wind: Point,
-    /// Peak of gusts over the mean wind, m/s.
+    /// Largest speed of gusts beyond the mean wind, m/s.
     pub gust_mps: f32,
-    /// Standard deviation of the position estimate, metres.
+    /// Standard deviation of a random error of the position estimate, metres.
     pub position_noise_m: f32,
-    /// How good its estimate is.
+    /// Error model of the estimator.
     pub estimator: Estimator,
-    /// Whether PX4 lands by a distance sensor, as the recorded ones did: it crawls over its last
-    /// metre.
+    /// Whether PX4 has a distance sensor, as in the recordings: then it lands at `MPC_LAND_CRWL`
+    /// over the last metre.
     pub distance_sensor: bool,
-    /// Seed of gusts and noise.
+    /// Seed of gusts and estimate errors.
     pub seed: u64,
     /// UTC at boot, microseconds since 1970.
     pub boot_unix_us: u64,
-    /// Time from boot until ArduCopter's estimator has a position, seconds; PX4 is found running.
+    /// Time from boot until ArduCopter's estimator has a position, seconds. PX4's has one at once.
     pub estimator_ready_s: f32,
-    /// MAVLink ports, at least one, each with its own stream settings.
+    /// Number of MAVLink ports without the ground station's, at least one; each has its own stream
+    /// rates.
     pub ports: usize,
-    /// Whether it has one more port, with a ground station's rates.
+    /// Whether there is one more port, for a ground station, with its stream rates.
     pub ground_port: bool,
-    /// Whether it passes on what is for others, from port to port.
+    /// Whether messages for other systems are forwarded from port to port.
     pub forwards: bool,
 }
 
 impl Default for Config {
-    /// PX4 as system 1 at rest on flat ground at the mission origin, in still air.
+    /// PX4 as system 1, at rest on flat ground at the mission's origin, in still air, with a
+    /// perfect estimate.
     fn default() -> Self {
         let origin = Geodetic { lat_deg: 47.397_742, lon_deg: 8.545_594, alt_m: 488.0 };
         let vehicle = VehicleLimits::default();
@@ -108,38 +111,38 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Seed of all randomness of this vehicle.
+    /// Seed of all random numbers of this vehicle: the configured seed mixed with the system id.
     pub(super) fn vehicle_seed(&self) -> u64 {
         self.seed ^ (u64::from(self.system_id) << 32)
     }
 
-    /// Error of the estimated height for the whole flight, metres: the EKF origin is off by as
-    /// much, if the receiver set it.
+    /// Constant error of the estimated height over the flight, metres. If the GPS receiver set the
+    /// EKF origin, the origin's altitude has the same error.
     pub fn height_error_m(&self) -> f32 {
         EstimateErrors::new(self.estimator, self.autopilot, self.vehicle_seed()).height_m()
     }
 }
 
-/// Reason why no autopilot can be made from a [`Config`].
+/// Reason why a [`Config`] is rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
-    /// A latitude, longitude or altitude out of range.
+    /// A position with a latitude, longitude or altitude out of range.
     #[error(
         "{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude"
     )]
     Place(&'static str),
-    /// A number that is not finite, or not positive where it must be.
+    /// A number that is not finite, or negative where it must not be.
     #[error("{0} must be finite and not negative")]
     Number(&'static str),
-    /// A parameter that the autopilot does not have.
+    /// An integer parameter that the autopilot does not have.
     #[error("no integer parameter `{0}`")]
     Parameter(&'static str),
-    /// System id 0 is broadcast.
+    /// System id 0, which MAVLink uses for broadcasts.
     #[error("system id 0 means everybody: choose 1 to 255")]
     SystemId,
 }
 
-/// Refuses what cannot be simulated.
+/// Checks a configuration; an error names the first invalid value.
 pub(super) fn check(config: &Config) -> Result<(), ConfigError> {
     if config.system_id == 0 {
         return Err(ConfigError::SystemId);

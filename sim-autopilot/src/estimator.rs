@@ -1,12 +1,12 @@
-//! What the estimator of an autopilot has wrong: a seeded model for each kind of receiver and
-//! firmware.
+//! Errors of an autopilot's position estimate: a seeded random model for each estimator and
+//! autopilot.
 //!
-//! An EKF's position error e follows its velocity error v and is pulled back by the receiver: e' =
-//! v − e / T. v is a first-order Gauss–Markov process with standard deviation σ and time constant
-//! τ, so e has the deviation σ T √(τ / (τ + T)). Above that lies a height that is wrong by the same
-//! amount for a whole flight, as the altitude of the EKF origin of a recorded PX4 was. The
-//! parameters are fitted to the recorded flights (`data/flights` of the shared data): truth less
-//! estimate has these ranges there, from arming to disarming, metres and m/s.
+//! An EKF's position error e follows its velocity error v, and GPS pulls it back: e' = v − e / T. v
+//! is a first-order Gauss–Markov process with standard deviation σ and time constant τ, so e has
+//! the standard deviation σ T √(τ / (τ + T)). A constant error of the height over the whole flight
+//! is added, like that of the EKF origin's altitude of a recorded PX4. The parameters are fitted to
+//! the recorded flights (`data/flights` of the shared data). Their errors, from arming to
+//! disarming, metres and m/s:
 //!
 //! | | PX4 | ArduCopter |
 //! |---|---|---|
@@ -22,8 +22,8 @@ use super::noise::{Gaussian, SLOT_S};
 use crate::{AutopilotKind, Estimator};
 
 impl Estimator {
-    /// Accuracy that ESTIMATOR_STATUS reports, across and in height, metres: recorded PX4s reported
-    /// 0.02 to 0.29 across and 0.07 to 0.3 in height, whatever their error.
+    /// Horizontal and vertical accuracy that ESTIMATOR_STATUS reports, metres. Recorded PX4s
+    /// reported 0.02 to 0.29 and 0.07 to 0.3, whatever their error was.
     pub(super) fn accuracy_m(self) -> [f32; 2] {
         match self {
             Self::Perfect | Self::Rtk => [0.02, 0.03],
@@ -32,8 +32,8 @@ impl Estimator {
     }
 }
 
-/// Standard deviation of the velocity's error (m/s), its time constant (s), the time in which the
-/// receiver pulls the position back (s), and what the position's error never exceeds (m).
+/// Model of one axis: standard deviation of the velocity error (m/s), its time constant (s), time
+/// constant with which GPS reduces the position error (s), and limit of the position error (m).
 #[derive(Clone, Copy, Debug)]
 struct ErrorModel {
     sigma_mps: f32,
@@ -46,7 +46,8 @@ impl ErrorModel {
     const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, pull_s: 1.0, most_m: 0.0 };
 }
 
-/// Across, up, and the most that a height is wrong for good, below and above.
+/// Models of the horizontal axes and of the height, and the range of the constant height error,
+/// metres.
 fn error_models(
     estimator: Estimator,
     autopilot: AutopilotKind,
@@ -71,28 +72,28 @@ fn error_models(
     }
 }
 
-/// One vehicle's errors, estimated minus true.
+/// Errors of one vehicle's estimate (estimated minus true).
 #[derive(Clone, Debug)]
 pub struct EstimateErrors {
     random: Gaussian,
     axes: [ErrorModel; 3],
     drift: Point,
     height_m: f32,
-    /// ENU metres.
+    /// Position error, ENU metres.
     pub position: Point,
-    /// ENU m/s.
+    /// Velocity error, ENU m/s.
     pub velocity: Point,
-    /// Change of the position's error, ENU m/s.
+    /// Rate of change of the position error, ENU m/s.
     pub rate: Point,
 }
 
 impl EstimateErrors {
-    /// Errors as they may be at any time, from the first sample on.
+    /// Stationary errors: the first values have the same distribution as later ones.
     pub fn new(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
         let (across, up, height_m) = error_models(estimator, autopilot);
-        // The sum of uniform numbers that a Gaussian is made of has its bound at 3.46; half of that
-        // is beyond any likely one.
+        // A number within ±1.75 becomes a share of the range from 0 to 1; the generator's others,
+        // up to ±3.46, are clamped to its ends.
         let share = (0.5 + random.sample() / 3.5).clamp(0.0, 1.0);
         let mut errors = Self {
             random,
@@ -103,19 +104,19 @@ impl EstimateErrors {
             velocity: Point::zeros(),
             rate: Point::zeros(),
         };
-        // After some time constants no trace is left of the begin at zero.
+        // After 30 s the start at zero has no effect any more.
         for _ in 0..(30.0 / SLOT_S) as usize {
             errors.advance();
         }
         errors
     }
 
-    /// Error of the height for the whole flight, metres.
+    /// Constant error of the height over the flight, metres.
     pub fn height_m(&self) -> f32 {
         self.height_m
     }
 
-    /// One slot of [`SLOT_S`].
+    /// Updates the errors by one period of [`SLOT_S`].
     pub fn advance(&mut self) {
         for (k, axis) in self.axes.iter().enumerate() {
             let keep = libm::expf(-SLOT_S / axis.tau_s);

@@ -1,4 +1,4 @@
-//! Which firmware runs: every call that depends on it goes through here.
+//! The kind of autopilot that runs: dispatches every call that depends on it.
 
 use super::ardupilot::{self, Copter};
 use super::command::Command;
@@ -13,7 +13,7 @@ use super::vehicle::Gains;
 use super::wire::PayloadReader;
 use crate::AutopilotKind;
 
-/// The firmware of one vehicle.
+/// The autopilot software of one vehicle.
 #[derive(Clone, Debug)]
 pub enum Firmware {
     /// PX4 1.17.
@@ -34,7 +34,7 @@ impl Firmware {
         }
     }
 
-    /// Streams it starts with: message id and interval in µs, 0 off until asked for.
+    /// Default telemetry streams: message id and interval in µs; 0: off until requested.
     pub(super) fn streams(personality: AutopilotKind) -> &'static [(u32, u32)] {
         match personality {
             AutopilotKind::Px4 => &telemetry::STREAMS,
@@ -42,7 +42,7 @@ impl Firmware {
         }
     }
 
-    /// Sends the boot messages.
+    /// Sends the messages that the autopilot sends at boot.
     pub(super) fn send_boot_messages(&mut self, platform: &mut Platform) {
         match self {
             Self::Px4(_) => platform.announce_origin(),
@@ -78,7 +78,7 @@ impl Firmware {
         }
     }
 
-    /// One step of the firmware's mode logic.
+    /// Advances the mode logic by one step and returns the demand to the controller.
     pub(super) fn update(
         &mut self,
         platform: &mut Platform,
@@ -122,7 +122,7 @@ impl Firmware {
         }
     }
 
-    /// SET_POSITION_TARGET_LOCAL_NED (84) or _GLOBAL_INT (86).
+    /// Handles SET_POSITION_TARGET_LOCAL_NED (84) or _GLOBAL_INT (86).
     pub(super) fn handle_setpoint(
         &mut self,
         platform: &Platform,
@@ -135,7 +135,7 @@ impl Firmware {
         }
     }
 
-    /// REQUEST_DATA_STREAM, which PX4 ignores.
+    /// Handles REQUEST_DATA_STREAM, which PX4 ignores.
     pub(super) fn handle_stream_request(
         &mut self,
         platform: &mut Platform,
@@ -147,7 +147,7 @@ impl Firmware {
         }
     }
 
-    /// HEARTBEAT of another system.
+    /// Handles another system's HEARTBEAT, which only ArduCopter evaluates.
     pub(super) fn handle_heartbeat(&mut self, platform: &mut Platform, from: Sender) {
         if let Self::Copter(copter) = self {
             copter.handle_heartbeat(platform, from);
@@ -161,7 +161,8 @@ impl Firmware {
         }
     }
 
-    /// Takes PARAM_SET.
+    /// Handles PARAM_SET: changes the parameter if the value is valid, and looks up the values in
+    /// use.
     pub(super) fn set_param(&mut self, name: &str, wire: f32, wire_type: u8) {
         match self {
             Self::Px4(px4) => {
@@ -175,7 +176,7 @@ impl Firmware {
         }
     }
 
-    /// Sets an integer parameter; false where there is none of that name.
+    /// Sets an integer parameter; false if there is none of this name.
     pub(super) fn set_integer(&mut self, name: &str, value: i32) -> bool {
         let params = self.params();
         let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else {
@@ -187,7 +188,7 @@ impl Firmware {
         true
     }
 
-    /// Takes over the parameters of the same firmware before a reboot.
+    /// Copies the parameters from before a reboot.
     pub(super) fn keep_params(&mut self, before: &Self) {
         match (self, before) {
             (Self::Px4(now), Self::Px4(before)) => {
@@ -207,7 +208,7 @@ impl Firmware {
         }
     }
 
-    /// The pilot's switch, by `custom_mode`; false where there is no such mode.
+    /// Sets the mode of this `custom_mode` as the pilot's switch does; false if there is none.
     pub(super) fn force_mode(&mut self, custom_mode: u32, sensors: &SensorReadings) -> bool {
         match self {
             Self::Px4(px4) => px4::Mode::from_custom_mode(custom_mode)

@@ -1,58 +1,59 @@
-//! MAVLink framing of the simulated autopilots. It shares no code with the companion's: a bug in
-//! one shall not hide in the other.
+//! MAVLink framing of the simulated autopilots. It shares no code with the companion's, so that a
+//! bug in one is not hidden by the same bug in the other.
 //!
-//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate gives message types, CRC
-//! seeds and the checksum; its reader wants a stream that it may wait for, and bytes here come
-//! whenever the simulation has some.
+//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate provides message types, CRC
+//! seeds and the checksum; its reader is not used, because it blocks on a stream, and bytes here
+//! arrive whenever the simulation has some.
 //!
-//! Of candidates that overlap, the first with the right checksum is the frame; a wrong one costs
-//! its start byte. A frame that is not complete [`PARTIAL_LIFETIME_US`] after its first byte is
-//! given up.
+//! Of overlapping candidates the first with a correct checksum is the frame; after a wrong checksum
+//! the search continues behind the candidate's start byte. An incomplete frame is dropped
+//! [`PARTIAL_LIFETIME_US`] after its first byte.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
 
-/// Time after its first byte at which an incomplete frame is dropped, microseconds.
+/// Time from its first byte until an incomplete frame is dropped, microseconds.
 const PARTIAL_LIFETIME_US: u64 = 100_000;
-/// Longest frame without a signature, bytes: 10 of header, 255 of payload, 2 of CRC.
+/// Longest frame without signature, bytes: header 10, payload 255, CRC 2.
 pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
 const V1_HEADER: usize = 6;
 const V2_HEADER: usize = 10;
-/// Flag of a V2 frame that a signature follows; a frame with any other flag cannot be read.
+/// Incompatibility flag of a MAVLink 2 frame: a signature follows. A frame with any other flag is
+/// not read.
 const FLAG_SIGNED: u8 = 1;
-/// COMPONENT_INFORMATION, the one message whose CRC seed is 0: the crate answers 0 for unknown ids
+/// COMPONENT_INFORMATION, the only message whose CRC seed is 0; for unknown ids the crate returns 0
 /// too.
 const SEED_ZERO: u32 = 395;
 
-/// A frame whose checksum is right.
+/// A received frame whose checksum is correct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// System id of the sender.
     pub system: u8,
     /// Component id of the sender.
     pub component: u8,
-    /// Sequence number of the sender's link.
+    /// Sequence number of the frame, counted by its sender.
     pub sequence: u8,
     /// Message id.
     pub message_id: u32,
-    /// Bytes of the payload that came.
+    /// Length of the received payload, bytes.
     len: usize,
     payload: [u8; 255],
 }
 
 impl Frame {
-    /// The payload; what V2 cut from the end reads as zero.
+    /// The payload, padded with the zeros that MAVLink 2 cuts from its end.
     pub fn padded(&self) -> &[u8; 255] {
         &self.payload
     }
 
-    /// The frame of these bytes, signature left out.
+    /// Decodes a frame from its bytes, which include the CRC but no signature.
     fn from_bytes(bytes: &[u8]) -> Self {
         let header = header_len(bytes);
-        // Sequence number, system and component stand before the id.
+        // In the header sequence number, system and component precede the message id.
         let at = if header == V1_HEADER { 2 } else { 4 };
         let received = &bytes[header..bytes.len() - 2];
         let mut payload = [0; 255];
@@ -67,7 +68,7 @@ impl Frame {
         }
     }
 
-    /// Appends it to `out` as a V2 frame of the same sender.
+    /// Appends this frame to `out` as a MAVLink 2 frame with the same sender and sequence number.
     pub fn write(&self, out: &mut Vec<u8>) {
         if let Some(seed) = crc_seed(self.message_id) {
             let sender = (self.system, self.component, self.sequence);
@@ -76,22 +77,22 @@ impl Frame {
     }
 }
 
-/// The CRC seed of a message id; `None` where the dialect does not know the id.
+/// CRC seed (CRC_EXTRA) of a message id; `None` if the dialect does not know the id.
 pub fn crc_seed(message_id: u32) -> Option<u8> {
     let seed = MavMessage::extra_crc(message_id);
     (seed != 0 || message_id == SEED_ZERO).then_some(seed)
 }
 
-/// Appends a message to `out` as a V2 frame; the sender is its system, component and sequence
-/// number.
+/// Appends a message to `out` as a MAVLink 2 frame. `sender` is system id, component id and
+/// sequence number.
 pub fn write_message<M: MessageData>(sender: (u8, u8, u8), message: &M, out: &mut Vec<u8>) {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);
     write_raw(sender, M::ID, M::EXTRA_CRC, &payload[..len], out);
 }
 
-/// As [`write_message`], of a payload of at most 255 bytes that the caller laid out; zeros at its
-/// end are cut, but for one.
+/// Like [`write_message`], for an encoded payload of at most 255 bytes. Zeros at its end are cut,
+/// but its first byte stays.
 pub fn write_raw(
     sender: (u8, u8, u8),
     message_id: u32,
@@ -110,26 +111,27 @@ pub fn write_raw(
     out.extend(crc.to_le_bytes());
 }
 
-/// What the buffer begins with.
+/// Result of parsing the start of the buffer.
 enum ParseStatus {
-    /// The beginning of what may be a frame.
+    /// An incomplete frame.
     Partial,
-    /// No frame.
+    /// No frame begins here.
     Noise,
-    /// A frame of this many bytes, signature not counted.
+    /// A frame with a correct checksum; its length without signature, bytes.
     Whole(usize),
 }
 
-/// The reader of one port.
+/// Finds frames in the bytes received at one port.
 #[derive(Clone, Debug, Default)]
 pub struct Framer {
     bytes: Vec<u8>,
-    /// When each of them came, microseconds.
+    /// Time at which each byte arrived, microseconds since boot.
     came_us: Vec<u64>,
 }
 
 impl Framer {
-    /// The next whole frame of what came so far; takes all of `input` first, which came now.
+    /// Adds all of `input`, received at `now_us`, to the buffer and returns the next whole frame in
+    /// it; `None` if there is none.
     pub fn next(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
         self.bytes.extend_from_slice(input);
         self.came_us.resize(self.bytes.len(), now_us);
@@ -178,7 +180,7 @@ fn header_len(bytes: &[u8]) -> usize {
     if bytes[0] == V1_START { V1_HEADER } else { V2_HEADER }
 }
 
-/// The message id of a whole header.
+/// Message id in a complete header.
 fn message_id(bytes: &[u8]) -> u32 {
     match header_len(bytes) {
         V1_HEADER => u32::from(bytes[5]),

@@ -1,25 +1,24 @@
-//! From the mission's ENU to what the autopilot believes and says, and back, without trigonometry
-//! in every step.
+//! Fast conversion between the mission's ENU frame and the autopilot's NED frame, latitude and
+//! longitude, without trigonometry in every step.
 //!
-//! The exact way goes through latitude and longitude with the autopilot's own projection
-//! (`planner_core::frames`). It is smooth: within 100 m its best linear map errs by d² / 2R < 1 mm.
-//! So the map is linearised about a point near the vehicle, renewed when the vehicle has moved 50 m
-//! away, and setpoints farther than 100 m take the exact way.
+//! The exact conversion goes through latitude and longitude, by the autopilot's own projection
+//! (`planner_core::frames`). Within 100 m a linear map deviates from it by d² / 2R < 1 mm. So a
+//! linear map about a point near the vehicle is used; it is renewed when the vehicle is 50 m away,
+//! and points farther than 100 m are converted exactly.
 
 use nalgebra::{Matrix3, Vector3};
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic, Projection};
 
-/// Distance from the centre of the linear map at which the map is renewed, metres.
+/// Distance of the vehicle from the linear map's centre at which the map is renewed, metres.
 const RENEW_MAP_M: f64 = 50.0;
-/// Distance from the centre beyond which conversions are exact, metres.
+/// Distance from the linear map's centre beyond which a point is converted exactly, metres.
 const LINEAR_WITHIN_M: f64 = 100.0;
-/// Half the span over which slopes are taken, metres: a power of two, so that the points are exact
-/// in f32.
+/// Half of the distance over which the linear map's slopes are computed, metres: a power of two, so
+/// that the points are exact in f32.
 const SLOPE_HALF_SPAN_M: f64 = 64.0;
 
-/// One autopilot's local frame: its EKF origin, its projection, and the mission frame it is seen
-/// from.
+/// Conversions between one autopilot's frame (EKF origin and projection) and the mission frame.
 #[derive(Clone, Debug)]
 pub struct LocalFrame {
     projection: Projection,
@@ -30,12 +29,12 @@ pub struct LocalFrame {
     centre_geodetic: Geodetic,
     ned_slope: Matrix3<f64>,
     enu_slope: Matrix3<f64>,
-    /// Degrees (and metres of altitude) for each metre of ENU.
+    /// Change of latitude and longitude (degrees) and altitude (metres) for each metre of ENU.
     geodetic_slope: Matrix3<f64>,
 }
 
 impl LocalFrame {
-    /// A frame whose linear map is centred at `near` (ENU).
+    /// Conversions with a linear map about `near` (ENU metres).
     pub fn new(
         projection: Projection,
         world_origin: Geodetic,
@@ -62,20 +61,21 @@ impl LocalFrame {
         &self.ekf_origin
     }
 
-    /// Moves the EKF origin, as an estimator that resets does.
+    /// Moves the EKF origin, as a reset of the estimator does.
     pub fn set_ekf_origin(&mut self, origin: Geodetic) {
         self.ekf_origin = origin;
         self.linearise(self.centre);
     }
 
-    /// Keeps the linear map near the vehicle; cheap when it is.
+    /// Renews the linear map if `enu` is more than 50 m from its centre; to be called in every
+    /// step.
     pub fn recentre(&mut self, enu: &Vector3<f64>) {
         if (enu - self.centre).norm_squared() > RENEW_MAP_M * RENEW_MAP_M {
             self.linearise(*enu);
         }
     }
 
-    /// NED about the EKF origin of an ENU point.
+    /// Converts a point from ENU to NED about the EKF origin, metres.
     pub fn ned_from_enu(&self, enu: &Vector3<f64>) -> Vector3<f64> {
         let d = enu - self.centre;
         if d.norm_squared() < LINEAR_WITHIN_M * LINEAR_WITHIN_M {
@@ -84,7 +84,7 @@ impl LocalFrame {
         self.exact_ned(enu)
     }
 
-    /// ENU of NED about the EKF origin.
+    /// Converts a point from NED about the EKF origin to ENU, metres.
     pub fn enu_from_ned(&self, ned: &Vector3<f64>) -> Vector3<f64> {
         let d = ned - self.centre_ned;
         if d.norm_squared() < LINEAR_WITHIN_M * LINEAR_WITHIN_M {
@@ -93,17 +93,17 @@ impl LocalFrame {
         self.enu_from_geodetic(&frames::ned_to_geodetic(self.projection, &self.ekf_origin, ned))
     }
 
-    /// NED velocity of an ENU velocity.
+    /// Converts a velocity from ENU to NED.
     pub fn ned_velocity_from_enu(&self, enu: &Point) -> Vector3<f64> {
         self.ned_slope * enu.cast::<f64>()
     }
 
-    /// ENU velocity of a NED velocity.
+    /// Converts a velocity from NED to ENU.
     pub fn enu_velocity_from_ned(&self, ned: &Vector3<f64>) -> Vector3<f64> {
         self.enu_slope * ned
     }
 
-    /// Latitude, longitude and altitude of an ENU point.
+    /// Converts a point from ENU to latitude, longitude and altitude.
     pub fn geodetic_from_enu(&self, enu: &Vector3<f64>) -> Geodetic {
         let d = enu - self.centre;
         if d.norm_squared() >= LINEAR_WITHIN_M * LINEAR_WITHIN_M {
@@ -117,7 +117,7 @@ impl LocalFrame {
         }
     }
 
-    /// ENU of a geodetic position.
+    /// Converts latitude, longitude and altitude to ENU, metres.
     pub fn enu_from_geodetic(&self, position: &Geodetic) -> Vector3<f64> {
         frames::geodetic_to_enu(&self.world_origin, position).cast::<f64>()
     }
@@ -128,7 +128,7 @@ impl LocalFrame {
     }
 
     fn linearise(&mut self, near: Vector3<f64>) {
-        // Whole metres are exact in f32, which the conversions take.
+        // Whole metres are exact in f32, the type of the conversions' arguments.
         self.centre = near.map(libm::round);
         self.centre_ned = self.exact_ned(&self.centre);
         self.centre_geodetic =
@@ -147,7 +147,7 @@ impl LocalFrame {
                 Vector3::new(a.lat_deg - b.lat_deg, a.lon_deg - b.lon_deg, a.alt_m - b.alt_m);
             self.geodetic_slope.set_column(axis, &(slope / (2.0 * SLOPE_HALF_SPAN_M)));
         }
-        // The map is a rotation by far less than a degree and a scale near 1: it has an inverse
+        // The map is a rotation by much less than a degree and a scale near 1: it is invertible
         // wherever it is finite.
         self.enu_slope = self.ned_slope.try_inverse().unwrap_or_else(Matrix3::identity);
     }

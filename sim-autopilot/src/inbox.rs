@@ -1,8 +1,8 @@
-//! What the simulated autopilot does with each message that comes in.
+//! Dispatches each received message.
 //!
-//! Read by field ([`PayloadReader`]): offsets are those of the wire order. What is for another
-//! system or component, or of an id not listed here, changes nothing and is not answered, as on PX4
-//! and ArduPilot.
+//! Fields are read at their offsets in wire order ([`PayloadReader`]). A message for another system
+//! or component, or with an id not listed here, has no effect and no answer, as in PX4 and
+//! ArduPilot.
 
 use mavlink::dialects::ardupilotmega as dialect;
 
@@ -39,7 +39,7 @@ impl Autopilot {
             20 if for_us(2, 3) => self.handle_param_read(port, &fields),
             21 if for_us(0, 1) => platform.ports[port].param_cursor = Some(0),
             23 if for_us(4, 5) => self.handle_param_set(port, &fields),
-            // Everything of the mission protocol that names its target first.
+            // Messages of the mission protocol, by where their target system and component stand.
             43 | 45 if for_us(0, 1) => platform.handle_mission(from, frame.message_id, &fields),
             40 | 41 | 44 | 47 | 51 if for_us(2, 3) => {
                 platform.handle_mission(from, frame.message_id, &fields);
@@ -79,11 +79,12 @@ impl Autopilot {
         if let Some(name) = name {
             self.firmware.set_param(name, fields.f32(0), fields.u8(22));
         }
-        // A refused value is answered with the value that stands.
+        // A refused value is answered by a PARAM_VALUE with the unchanged value.
         self.send_named_param(port, name);
     }
 
-    /// A name that is not known is not answered. ArduPilot leaves the index out of the answer.
+    /// Sends a parameter by its name; an unknown name gets no answer. ArduPilot reports no index
+    /// then.
     fn send_named_param(&mut self, port: usize, name: Option<&str>) {
         let params = self.firmware.params();
         if let Some(index) = name.and_then(|name| params.index(name)) {
@@ -96,7 +97,7 @@ impl Autopilot {
     pub(super) fn send_param(&mut self, port: usize, index: usize, reported: u16) {
         let params = self.firmware.params();
         let Some((name, value)) = params.get(index) else { return };
-        // Encoded field by field: value, count, index, name, type.
+        // Encoded by hand: value, count, index, name, type.
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&params.to_wire(value).to_le_bytes());
         payload[4..6].copy_from_slice(&(params.len() as u16).to_le_bytes());

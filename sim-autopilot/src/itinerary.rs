@@ -1,11 +1,12 @@
-//! An uploaded mission as it is flown: AUTO.MISSION of PX4, AUTO of ArduCopter.
+//! Flies an uploaded mission: AUTO.MISSION of PX4, AUTO of ArduCopter.
 //!
 //! The items NAV_DELAY (93), NAV_TAKEOFF (22), NAV_WAYPOINT (16), NAV_LAND (21) and
-//! NAV_RETURN_TO_LAUNCH (20) are flown, one after the other; DO_CHANGE_SPEED (178),
-//! DO_DIGICAM_CONTROL (203) and DO_SET_CAM_TRIGG_DIST (206) are done at once when the item before
-//! them is done. Every other item is passed over. ArduPilot's item 0 is home and not flown.
+//! NAV_RETURN_TO_LAUNCH (20) are flown one after the other. DO_CHANGE_SPEED (178),
+//! DO_DIGICAM_CONTROL (203) and DO_SET_CAM_TRIGG_DIST (206) are executed as soon as the item before
+//! them is completed. All other items are skipped. ArduPilot's item 0 is home and not flown.
 //!
-//! Item numbers as they were uploaded; ENU metres in the mission frame; microseconds since boot.
+//! Items have their numbers of the upload; positions are ENU metres in the mission frame; times are
+//! microseconds since boot.
 
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -24,30 +25,34 @@ const NAV_DELAY: u16 = 93;
 const DO_CHANGE_SPEED: u16 = 178;
 const MISSION_CURRENT: u32 = 42;
 const MISSION_ITEM_REACHED: u32 = 46;
-/// `NAV_ACC_RAD` of PX4's multicopters and `WPNAV_RADIUS`, metres.
+/// Horizontal distance at which a waypoint is reached, metres: `NAV_ACC_RAD` of PX4's multicopters,
+/// ArduCopter's `WPNAV_RADIUS`.
 const REACHED_M: f32 = 2.0;
-/// `NAV_MC_ALT_RAD`, metres.
+/// Vertical distance at which a waypoint is reached, metres (`NAV_MC_ALT_RAD`).
 const REACHED_HEIGHT_M: f32 = 0.8;
-/// `MIS_YAW_ERR` of PX4, radians: 12°. ArduCopter does not wait for its heading.
+/// Largest heading error at which PX4 counts a waypoint as reached, radians (`MIS_YAW_ERR`, 12°).
+/// ArduCopter does not check the heading.
 const MAX_YAW_ERROR_RAD: f32 = 0.21;
 
-/// Action that is flown for an item.
+/// What the vehicle flies for one mission item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum MissionLeg {
-    /// Wait so long, seconds.
+    /// Wait for this time, seconds.
     Wait(f32),
-    /// Climb to a height.
+    /// Climb to height `up`, ENU metres.
     TakeOff { up: f32 },
-    /// Fly to a point: with a heading, NaN none; stay, seconds; how near is there, metres.
+    /// Fly to point `at`, with a heading (radians; NaN: none), and stay there (seconds).
+    /// `reached_m` is the acceptance radius, metres.
     To { at: Point, heading: f32, stay_s: f32, reached_m: f32 },
-    /// Land, at a place if one is given.
+    /// Land, at this point (east, north; metres) if one is given.
     Land { at: Option<[f32; 2]> },
-    /// Return and land.
+    /// Return home and land.
     Return,
 }
 
 impl MissionLeg {
-    /// Start of the leg after this one: its point, or the place of the vehicle.
+    /// End point of a leg, at which the next one starts: its waypoint, else the vehicle's position
+    /// `here`.
     pub(super) fn leg_end(leg: Option<Self>, here: &Point) -> Point {
         match leg {
             Some(Self::To { at, .. }) => at,
@@ -56,9 +61,9 @@ impl MissionLeg {
     }
 }
 
-/// Height, and change of it, on the straight line between two items abreast of a vehicle. Both fly
-/// along it: PX4's `PositionSmoothing` makes one velocity of all three axes towards its end,
-/// ArduCopter's `AC_WPNav` one S-curve.
+/// Height and climb rate on the straight line between two waypoints, at the point abreast of the
+/// vehicle. Both autopilots fly along that line: PX4's `PositionSmoothing` computes one velocity on
+/// all three axes towards its end, ArduCopter's `AC_WPNav` one S-curve.
 pub(super) fn interpolate_height(
     from: &Point,
     at: &Point,
@@ -88,25 +93,25 @@ fn item_command(item: &MissionItem) -> u16 {
 }
 
 impl Platform {
-    /// The first item that is flown.
+    /// Number of the first item that is flown.
     fn first_item(&self) -> u16 {
         u16::from(self.config.autopilot == AutopilotKind::Ardupilot)
     }
 
-    /// Whether a mission is stored that can be flown.
+    /// Whether a mission with items to fly is stored.
     pub(super) fn has_mission(&self) -> bool {
         self.missions.items().len() > usize::from(self.first_item())
     }
 
-    /// Whether the first thing that the mission flies is a take-off; it may wait before.
+    /// Whether the mission begins with a take-off; it may have a delay before.
     pub(super) fn mission_takes_off(&self) -> bool {
         let flown = self.missions.items().iter().skip(usize::from(self.first_item()));
         let mut legs = flown.map(item_command).filter(|&id| is_flown(id) && id != NAV_DELAY);
         legs.next() == Some(NAV_TAKEOFF)
     }
 
-    /// Executes the commands that are due and returns the leg to fly; `None` once the mission is
-    /// complete. The next call begins with the first item again.
+    /// Executes the commands that are due and returns the leg to fly; `None` once all items are
+    /// completed.
     pub(super) fn fly_mission(
         &mut self,
         sensors: &SensorReadings,
@@ -133,7 +138,8 @@ impl Platform {
         None
     }
 
-    /// The item under way is done.
+    /// Completes the current item: sends MISSION_ITEM_REACHED and MISSION_CURRENT, and the next
+    /// item begins.
     pub(super) fn complete_item(&mut self) {
         let passed = self.missions.progress.current;
         self.missions.progress = MissionProgress::starting_at(passed + 1);
@@ -142,7 +148,7 @@ impl Platform {
         self.send_on_all_ports(MISSION_CURRENT);
     }
 
-    /// The next flight begins with the first item.
+    /// Makes the next flight start with the first item.
     pub(super) fn rewind_mission(&mut self) {
         self.missions.progress = MissionProgress::default();
     }
@@ -174,8 +180,8 @@ impl Platform {
         Some(leg)
     }
 
-    /// Place of an item; a coordinate that the item leaves out is the vehicle's. A place that is
-    /// none on earth is home.
+    /// Position of an item, ENU metres. Without latitude and longitude the vehicle's are used. An
+    /// invalid position becomes home.
     fn item_position(&self, item: &MissionItem) -> Point {
         let base = if matches!(item[34], 3 | 6 | 10 | 11) { self.home.alt_m } else { 0.0 };
         let here = self.frame.geodetic_from_enu(self.vehicle.position());
@@ -217,7 +223,7 @@ impl Platform {
             MissionLeg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_HEIGHT_M,
             MissionLeg::To { at, heading, stay_s, reached_m } => {
                 let off = at - sensors.position;
-                // NaN is no heading to wait for.
+                // NaN: no heading to wait for.
                 let turned = wrap_pi(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
                 let turned =
                     turned || heading.is_nan() || self.config.autopilot == AutopilotKind::Ardupilot;

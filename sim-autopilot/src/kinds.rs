@@ -1,23 +1,23 @@
-//! Kinds of autopilot and of estimate: what a scenario names and the simulation makes.
+//! Kinds of autopilot and of estimator that a scenario can choose.
 
-/// Which autopilot is simulated.
+/// The autopilot that is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AutopilotKind {
-    /// PX4 1.17, Offboard.
+    /// PX4 1.17, commanded in Offboard.
     #[default]
     Px4,
-    /// ArduCopter 4.6, Guided.
+    /// ArduCopter 4.6, commanded in Guided.
     Ardupilot,
 }
 
-/// Quality of an estimate.
+/// Error model of an autopilot's position estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {
-    /// The truth.
+    /// No error: the estimate is the true position.
     #[default]
     Perfect,
-    /// A receiver with fixed RTK: at most 0.1 m across and 0.15 m in height.
+    /// Errors of a GPS receiver with fixed RTK: at most 0.1 m horizontally and 0.15 m in height.
     Rtk,
-    /// Gusts as those of the recorded flights.
+    /// Errors as in the recorded flights of this kind of autopilot.
     Recorded,
 }

@@ -1,13 +1,14 @@
-//! A simulated autopilot: bytes of MAVLink and fixed time steps in, bytes and motion out.
+//! A simulated autopilot with its vehicle: MAVLink bytes and fixed time steps in, MAVLink bytes and
+//! motion out.
 //!
-//! It flies as PX4 1.17 or ArduCopter 4.6 was seen to fly and says what that was seen to say.
-//! Nothing in it reads a clock or blocks: the same bytes at the same steps give the same flight,
-//! bit for bit, from the same seed.
+//! It flies and answers as PX4 1.17 or ArduCopter 4.6 did in their own simulators and recordings.
+//! It reads no clock and never blocks: the same bytes at the same steps with the same seed give the
+//! same flight, bit for bit.
 //!
 //! Drain contract: call [`Autopilot::handle_bytes`] whenever bytes have arrived,
 //! [`Autopilot::step`] once for each 4 ms of simulated time, and [`Autopilot::poll_transmit`] until
-//! it returns 0. Physics are in the mission's ENU frame; what is said and heard is NED about the
-//! vehicle's own EKF origin in its firmware's projection ([`geodesy`]).
+//! it returns 0. The physics are in the mission's ENU frame; MAVLink messages are in NED about the
+//! vehicle's own EKF origin, in its autopilot's projection ([`geodesy`]).
 //!
 //! ```
 //! use sim_autopilot::{Autopilot, Config};
@@ -71,7 +72,7 @@ pub use self::px4::Mode;
 use self::snapshot::Snapshot;
 pub use self::vehicle::{TrueState, VehicleLimits, power_ratio_at_speed};
 
-/// One simulated vehicle with its autopilot.
+/// One simulated vehicle with its autopilot and MAVLink ports.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     platform: Platform,
@@ -80,10 +81,10 @@ pub struct Autopilot {
 }
 
 impl Autopilot {
-    /// An autopilot at rest, disarmed.
+    /// An autopilot that has just booted, its vehicle at rest and disarmed.
     ///
     /// # Errors
-    /// Refuses what [`ConfigError`] names.
+    /// [`ConfigError`] where the configuration has an invalid value.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config::check(config)?;
         let mut platform = Platform::new(config, Firmware::streams(config.autopilot));
@@ -92,23 +93,23 @@ impl Autopilot {
         Ok(Self { platform, firmware, due_messages: Vec::new() })
     }
 
-    /// The truth about the vehicle.
+    /// The vehicle's true position and motion, without errors of its estimator.
     pub fn true_state(&self) -> &TrueState {
         self.platform.vehicle.state()
     }
 
-    /// Every picture taken since the last call, as it truly was taken: a camera fixed level to the
-    /// body looks down from there.
+    /// Every picture taken since the last call, with the true position and heading at that time.
+    /// The camera is fixed to the body and looks straight down.
     pub fn take_photos(&mut self) -> Vec<Photo> {
         self.platform.camera.take_photos()
     }
 
-    /// The flight mode that flies, as HEARTBEAT's `custom_mode`.
+    /// `custom_mode` of HEARTBEAT: the flight mode in use, a failsafe's included.
     pub fn custom_mode(&self) -> u32 {
         self.firmware.status(&self.platform, &self.platform.sensors()).custom_mode
     }
 
-    /// Whether it lands where it is, by itself.
+    /// Whether it is in its autopilot's Land mode.
     pub fn is_landing(&self) -> bool {
         let land = match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Land.custom_mode(),
@@ -117,27 +118,27 @@ impl Autopilot {
         self.custom_mode() == land
     }
 
-    /// Whether a failsafe flies.
+    /// Whether a failsafe is active.
     pub fn in_failsafe(&self) -> bool {
         self.firmware.in_failsafe()
     }
 
-    /// Microseconds since boot.
+    /// Time since boot, microseconds.
     pub fn time_us(&self) -> u64 {
         self.platform.time_us
     }
 
-    /// Wind at the vehicle now, ENU m/s.
+    /// Wind at the vehicle now (mean and gust), ENU m/s.
     pub fn wind(&self) -> &Point {
         &self.platform.disturbance.wind
     }
 
-    /// Takes bytes that arrived at port 0.
+    /// Handles bytes that arrived at port 0.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         self.handle_bytes_on(0, bytes);
     }
 
-    /// Takes bytes that arrived at a port; a port that is not there ignores them.
+    /// Handles bytes that arrived at `port`; ignores them if there is no such port.
     pub fn handle_bytes_on(&mut self, port: usize, mut bytes: &[u8]) {
         if port >= self.platform.ports.len() {
             return;
@@ -156,18 +157,19 @@ impl Autopilot {
         }
     }
 
-    /// Moves bytes to send at port 0 into `out`, whole frames only; the bytes moved. 280 bytes fit
-    /// any frame.
+    /// Moves bytes to be sent from port 0 into `out`, whole frames only, and returns their number.
+    /// 280 bytes hold any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
         self.poll_transmit_from(0, out)
     }
 
-    /// As [`Autopilot::poll_transmit`], of any port.
+    /// Like [`Autopilot::poll_transmit`], for any port.
     pub fn poll_transmit_from(&mut self, port: usize, out: &mut [u8]) -> usize {
         self.platform.ports.get_mut(port).map_or(0, |port| port.poll_transmit(out))
     }
 
-    /// Adds the port for a ground station, which comes after the others and stays through a reboot.
+    /// Adds a port for a ground station, with its stream rates, as the last port. A reboot keeps
+    /// it.
     pub fn add_ground_port(&mut self) {
         let config = &mut self.platform.config;
         if !config.ground_port {
@@ -177,21 +179,21 @@ impl Autopilot {
         }
     }
 
-    /// Takes bytes that arrived at the port for a ground station, if there is one.
+    /// Handles bytes that arrived at the ground station's port; ignores them if there is none.
     pub fn handle_ground_bytes(&mut self, bytes: &[u8]) {
         if self.platform.config.ground_port {
             self.handle_bytes_on(self.platform.ports.len() - 1, bytes);
         }
     }
 
-    /// As [`Autopilot::poll_transmit`], of the port for a ground station.
+    /// Like [`Autopilot::poll_transmit`], for the ground station's port.
     pub fn poll_ground_transmit(&mut self, out: &mut [u8]) -> usize {
         let last = self.platform.ports.len() - 1;
         if self.platform.config.ground_port { self.poll_transmit_from(last, out) } else { 0 }
     }
 
-    /// Advances time by `dt_s` (0.004) over ground at `ground_up_m` below the vehicle, in the
-    /// mission frame.
+    /// Advances the simulation by `dt_s` (0.004): controller, motion, camera, telemetry.
+    /// `ground_up_m` is the height of the ground below the vehicle in the mission frame, metres.
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
         self.platform.advance_time(dt_s, ground_up_m);
         let was_armed = self.firmware.armed();
@@ -319,8 +321,8 @@ impl Autopilot {
         }
     }
 
-    /// Restarts: parameters, missions, charge and EKF origin stay, streams are forgotten, the
-    /// motors stop. In the air it falls.
+    /// Reboots the autopilot: it keeps parameters, missions, battery charge and EKF origin, but not
+    /// stream rates. The motors stop, so in the air the vehicle falls.
     pub fn reboot(&mut self) {
         let platform = &self.platform;
         let mut fresh = platform.config.clone();
@@ -339,16 +341,17 @@ impl Autopilot {
     }
 }
 
-/// Faults: what a scenario may do to a vehicle.
+/// Faults and outside influences that a scenario may impose on a vehicle.
 impl Autopilot {
-    /// The pilot's switch, by HEARTBEAT's `custom_mode`: changes the mode without asking whether it
-    /// can run. False where the firmware has no such mode.
+    /// Sets the mode given by its `custom_mode`, as the pilot's switch does, even if it cannot run.
+    /// Returns false if the autopilot has no such mode.
     pub fn set_pilot_mode(&mut self, mode: impl Into<u32>) -> bool {
         let sensors = self.platform.sensors();
         self.firmware.force_mode(mode.into(), &sensors)
     }
 
-    /// The pilot takes over: PX4's Position, ArduCopter's BRAKE, which hold where it is.
+    /// The pilot takes over: mode Position in PX4, BRAKE in ArduCopter. Both hold where the vehicle
+    /// is.
     pub fn take_over_by_pilot(&mut self) {
         self.set_pilot_mode(match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Position.custom_mode(),
@@ -356,7 +359,7 @@ impl Autopilot {
         });
     }
 
-    /// The pilot gives it back to Offboard or Guided.
+    /// The pilot hands control back: mode Offboard in PX4, Guided in ArduCopter.
     pub fn return_from_pilot(&mut self) {
         self.set_pilot_mode(match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Offboard.custom_mode(),
@@ -364,43 +367,45 @@ impl Autopilot {
         });
     }
 
-    /// Sets the charge left, 0 to 1.
+    /// Sets the battery's remaining charge, 0 to 1.
     pub fn set_battery(&mut self, charge: f32) {
         self.platform.vehicle.set_battery(charge);
     }
 
-    /// Shifts the position estimate by ENU metres from now on.
+    /// Adds `offset` (ENU metres) to the position estimate from now on.
     pub fn jump_position(&mut self, offset: &Point) {
         self.platform.position_offset += offset;
     }
 
-    /// Sets the errors of the estimate, estimated minus true, ENU metres and m/s, and how fast that
-    /// of the height changes: a replay imposes those that were recorded.
+    /// Sets the errors of the estimate (estimated minus true): position (ENU metres), velocity (ENU
+    /// m/s) and rate of change of the height's error (m/s). A replay imposes recorded errors by
+    /// this.
     pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
         (self.platform.position_offset, self.platform.velocity_bias) = (*position, *velocity);
         self.platform.height_error_rate = height_rate;
     }
 
-    /// Estimated position and velocity, ENU metres and m/s.
+    /// Estimated position (ENU metres) and velocity (ENU m/s).
     pub fn estimate(&self) -> [Point; 2] {
         let sensors = self.platform.sensors();
         [sensors.position, sensors.velocity]
     }
 
-    /// Moves the EKF origin and says so, as an estimator that resets does.
+    /// Moves the EKF origin to `origin` and sends GPS_GLOBAL_ORIGIN, as after a reset of the
+    /// estimator.
     pub fn set_ekf_origin(&mut self, origin: Geodetic) {
         self.platform.frame.set_ekf_origin(origin);
         self.platform.announce_origin();
     }
 
-    /// Moves the EKF origin by ENU metres.
+    /// Moves the EKF origin by `by`, ENU metres, and sends GPS_GLOBAL_ORIGIN.
     pub fn move_ekf_origin(&mut self, by: &Point) {
         let origin = frames::enu_to_geodetic(self.platform.frame.ekf_origin(), by);
         self.set_ekf_origin(origin);
     }
 
-    /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights
-    /// under a ceiling: its default is to climb and return. ArduCopter has no such parameter and
+    /// Sets PX4's failsafe after a loss of setpoints to Land (`COM_OBL_RC_ACT` 4), for flights
+    /// under a ceiling: PX4's default is to climb and return. ArduCopter has no such parameter; it
     /// brakes.
     pub fn land_on_stream_loss(&mut self) {
         if self.platform.config.autopilot == AutopilotKind::Px4 {
@@ -408,10 +413,10 @@ impl Autopilot {
         }
     }
 
-    /// Sets an integer parameter as an installer does before the flight.
+    /// Sets an integer parameter, as the user does before a flight.
     ///
     /// # Errors
-    /// There is none of this name.
+    /// The autopilot has no integer parameter of this name.
     pub fn set_parameter(&mut self, name: &'static str, value: i32) -> Result<(), ConfigError> {
         if self.firmware.set_integer(name, value) {
             Ok(())
@@ -420,7 +425,8 @@ impl Autopilot {
         }
     }
 
-    /// Takes the GPS fix away or gives it back; without it no position control flies.
+    /// Takes the GPS fix away (false) or restores it; without a fix no mode can control the
+    /// position.
     pub fn set_gps_ok(&mut self, ok: bool) {
         self.platform.gps_ok = ok;
         self.firmware.set_position_ok(ok);

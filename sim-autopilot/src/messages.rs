@@ -1,4 +1,4 @@
-//! How each of the larger messages is filled from a [`Snapshot`].
+//! Encodes the larger telemetry messages from a [`Snapshot`].
 
 use mavlink::dialects::ardupilotmega as dialect;
 use planner_core::frames::Geodetic;
@@ -7,25 +7,24 @@ use super::port::Port;
 use super::snapshot::Snapshot;
 use super::vehicle::GRAVITY;
 
-/// Capabilities that PX4 1.17 announced, without FTP (32), which is not simulated.
+/// `capabilities` that PX4 1.17 reports, without FTP (32), which is not simulated.
 const PX4_CAPABILITIES: u64 = 0xE8DF;
-/// Capabilities that ArduCopter 4.6 announces, without FTP (32), terrain (0x200) and compass
+/// `capabilities` that ArduCopter 4.6 reports, without FTP (32), terrain (0x200) and compass
 /// calibration (0x1000).
 const ARDUPILOT_CAPABILITIES: u64 = 0xE9CF;
-/// 1.17.0, release.
+/// PX4 1.17.0, release, in the encoding of AUTOPILOT_VERSION.
 const PX4_VERSION: u32 = 17_891_583;
-/// 4.6.2, release.
+/// ArduCopter 4.6.2, release, in the encoding of AUTOPILOT_VERSION.
 const ARDUPILOT_VERSION: u32 = 0x0406_02FF;
-/// Sensors present, enabled and healthy of SYS_STATUS.
+/// Sensor bits of SYS_STATUS: present, enabled, healthy.
 const PX4_SENSORS: [u32; 3] = [50_348_079, 50_413_615, 52_480_063];
 const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343 & !PREARM];
-/// MAV_SYS_STATUS_PREARM_CHECK.
+/// Bit MAV_SYS_STATUS_PREARM_CHECK of SYS_STATUS.
 const PREARM: u32 = 0x1000_0000;
 const POSITION_SENSORS: u32 = 0x4000;
 
-/// Messages newer than many dialects: id, CRC seed and payload as PX4 1.17 was recorded to send
-/// them. What they say does not change; that they come, and that not everybody knows them, is what
-/// counts.
+/// Messages that many dialects do not have: id, CRC seed and payload as recorded from PX4 1.17.
+/// Their contents do not matter; they test that receivers skip unknown messages.
 const RECORDED: [(u32, u8, &[u8]); 5] = [
     (8, 117, &[0xA0, 0x6F, 0x6D, 0, 0, 0, 0, 0, 0x29, 0x60, 0, 0, 0, 0, 0, 0, 0xAB, 9]),
     (
@@ -45,7 +44,7 @@ const RECORDED: [(u32, u8, &[u8]); 5] = [
     (441, 169, &[0, 0, 0, 0, 255, 255, 255, 255, 4, 0, 0, 0, 0, 255, 255, 255, 255]),
 ];
 
-/// Sends one of [`RECORDED`].
+/// Sends message `id` of [`RECORDED`].
 pub(super) fn send_recorded(id: u32, port: &mut Port) {
     if let Some(&(_, seed, payload)) = RECORDED.iter().find(|message| message.0 == id) {
         port.send_seeded(id, seed, payload);
@@ -57,8 +56,7 @@ impl Snapshot {
         if self.armed { (0.5 * self.specific_force.norm() / GRAVITY).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// Pressure of the standard atmosphere, hPa, to first order about sea level and exact enough
-    /// below 2 km.
+    /// Pressure of the standard atmosphere at the estimated altitude, hPa.
     pub(super) fn pressure(&self) -> f32 {
         let ratio = 1.0 - 2.255_77e-5 * self.geodetic.alt_m as f32;
         1013.25 * libm::powf(ratio.max(0.1), 5.255_88)
@@ -67,7 +65,7 @@ impl Snapshot {
     pub(super) fn send_heartbeat(&self, port: &mut Port) {
         let status = &self.status;
         let [a, b, c, d] = status.custom_mode.to_le_bytes();
-        // Laid out by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 or _ARDUPILOTMEGA, protocol
+        // Encoded by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 12 or _ARDUPILOTMEGA 3, protocol
         // version 3.
         let autopilot = if self.is_px4() { 12 } else { 3 };
         port.send_raw(0, &[a, b, c, d, 2, autopilot, status.flags, status.system_status, 3]);
@@ -187,7 +185,7 @@ impl Snapshot {
     }
 
     pub(super) fn send_imu(&self, port: &mut Port) {
-        // Thrust lies along the body's own axis, so the accelerometer sees it whole on z.
+        // Thrust acts along the body's z axis, so the accelerometer measures it on z alone.
         port.send(&dialect::HIGHRES_IMU_DATA {
             time_usec: self.time_us,
             xacc: 0.0,
@@ -280,7 +278,7 @@ impl Snapshot {
             x: ned.x,
             y: ned.y,
             z: ned.z,
-            // ArduCopter does not say how it stood.
+            // ArduCopter does not report the attitude at home.
             q: if self.is_px4() { [1.0, 0.0, 0.0, 0.0] } else { [f32::NAN; 4] },
             approach_x: 0.0,
             approach_y: 0.0,
@@ -289,7 +287,8 @@ impl Snapshot {
     }
 
     pub(super) fn send_odometry(&self, port: &mut Port) {
-        // Diagonals only, upper triangle row by row; what is not known is NaN.
+        // Only the diagonal of the covariance (upper triangle, row by row) is known; the rest is
+        // NaN.
         let mut pose_covariance = [f32::NAN; 21];
         let mut velocity_covariance = [f32::NAN; 21];
         for (at, variance) in
@@ -321,7 +320,7 @@ impl Snapshot {
     }
 }
 
-/// Latitude and longitude in 1e-7 degrees and altitude in millimetres, rounded.
+/// Converts to latitude and longitude in 1e-7 degrees and altitude in millimetres, rounded.
 pub(super) fn to_mavlink_units(position: &Geodetic) -> (i32, i32, i32) {
     (
         libm::round(position.lat_deg * 1e7) as i32,

@@ -1,9 +1,9 @@
-//! The mission protocol: plans, geofences and rally points are stored and given back; plans are
-//! also flown (`itinerary`).
+//! The mission protocol: missions, geofences and rally points are stored and can be read back; only
+//! missions have an effect (`itinerary`).
 //!
-//! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK.
-//! Download: REQUEST_LIST → COUNT, then each item as it is asked for. Source: MAVLink guide,
-//! "Mission Protocol".
+//! Upload: COUNT → items requested one by one, each again after a quarter of a second → ACK.
+//! Download: REQUEST_LIST → COUNT, then each item on request. Source: MAVLink guide, "Mission
+//! Protocol".
 
 use super::port::{Port, Sender};
 use super::wire::PayloadReader;
@@ -19,24 +19,24 @@ const ACK: u32 = 47;
 const REQUEST_INT: u32 = 51;
 const MISSION_ITEM_INT: u32 = 73;
 
-/// MAV_MISSION_RESULT.
+/// Values of MAV_MISSION_RESULT.
 const ACCEPTED: u8 = 0;
 const UNSUPPORTED: u8 = 3;
 const NO_SPACE: u8 = 4;
 const INVALID: u8 = 5;
 const INVALID_SEQUENCE: u8 = 13;
 
-/// Mission types: mission, geofence, rally points.
+/// Number of mission types that are stored: mission, geofence, rally points.
 const MISSION_TYPES: usize = 3;
-/// Most items of a mission: ArduCopter keeps 724 on small boards; PX4 at least 500.
+/// Most items of a mission: 724 as in ArduCopter on small boards; PX4 has at least 500.
 const MAX_ITEMS: u16 = 724;
 const RETRY_US: u64 = 250_000;
 const RETRIES: u32 = 20;
 
-/// An item as it travels: 37 bytes of MISSION_ITEM_INT, less the kind.
+/// An item as the first 37 bytes of MISSION_ITEM_INT's payload, without the mission type.
 pub(super) type MissionItem = [u8; 37];
 
-/// An upload under way.
+/// An upload in progress.
 #[derive(Clone, Debug)]
 struct MissionUpload {
     from: Sender,
@@ -47,45 +47,46 @@ struct MissionUpload {
     retries: u32,
 }
 
-/// Progress of a mission.
+/// Progress of the mission that is flown.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MissionProgress {
-    /// The item under way; the number of items when all are done.
+    /// Number of the current item; the number of items when all are completed.
     pub current: u16,
     pub(super) since_us: Option<u64>,
     pub(super) inside_us: Option<u64>,
 }
 
 impl MissionProgress {
-    /// Progress from an item on.
+    /// Progress at the start of item `current`.
     pub(super) fn starting_at(current: u16) -> Self {
         Self { current, ..Self::default() }
     }
 
-    /// The item is begun again when the mission continues.
+    /// The current item starts from its beginning when the mission is continued.
     pub(super) fn restart_item(&mut self) {
         (self.since_us, self.inside_us) = (None, None);
     }
 }
 
-/// The stored mission.
+/// Stored missions, geofences and rally points, and the mission's progress.
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
     stored: [Vec<MissionItem>; MISSION_TYPES],
     upload: Option<MissionUpload>,
-    /// Progress of the mission.
+    /// Progress of the mission that is flown.
     pub(super) progress: MissionProgress,
-    /// A speed that the mission asked for, m/s, until the firmware takes it.
+    /// Speed that a mission item set, m/s, until the mode logic takes it.
     pub(super) speed: Option<f32>,
 }
 
 impl Missions {
-    /// The items of the mission.
+    /// Items of the stored mission.
     pub(super) fn items(&self) -> &[MissionItem] {
         &self.stored[0]
     }
 
-    /// Asks again for an item that does not come; gives up in the end.
+    /// Requests the next item of an upload again if it did not come in time; after 20 repetitions
+    /// drops the upload.
     pub(super) fn retry_item_request(&mut self, now_us: u64, index: usize, port: &mut Port) {
         let Some(upload) = &mut self.upload else { return };
         if upload.from.port != index || now_us < upload.asked_us + RETRY_US {
@@ -109,7 +110,7 @@ impl MissionUpload {
 }
 
 impl Missions {
-    /// Takes a message of the mission protocol that came by `port`, from a sender there.
+    /// Handles a message of the mission protocol that `from` sent and that arrived at `port`.
     pub(super) fn handle_message(
         &mut self,
         now_us: u64,
@@ -123,7 +124,7 @@ impl Missions {
             COUNT | REQUEST | REQUEST_INT => 4,
             MISSION_ITEM | MISSION_ITEM_INT => 37,
             SET_CURRENT => return self.set_current(port, from, fields.u16(0)),
-            // An ACK ends a download.
+            // An ACK ends a download, which needs no action.
             _ => return,
         };
         let kind = fields.u8(kind_at);
@@ -194,7 +195,7 @@ impl Missions {
         }
         let sequence = usize::from(fields.u16(28));
         if sequence < upload.items.len() {
-            // A repetition: the next one is already asked for.
+            // A repeated item: the next one was requested already.
             return;
         }
         let Some(item) = read_item(id, fields) else {
@@ -230,8 +231,8 @@ fn send_mission_ack(port: &mut Port, from: Sender, result: u8, kind: u8) {
     port.send_raw(ACK, &[from.system, from.component, result, kind]);
 }
 
-/// An item of either kind as MISSION_ITEM_INT; `None` if a number in it is infinite, or a place is
-/// none on earth.
+/// Converts an item of either message to MISSION_ITEM_INT; `None` if a number in it is infinite or
+/// a coordinate is out of range.
 fn read_item(id: u32, fields: &PayloadReader<'_>) -> Option<MissionItem> {
     let mut item = [0; 37];
     for (at, byte) in item.iter_mut().enumerate() {
@@ -240,7 +241,7 @@ fn read_item(id: u32, fields: &PayloadReader<'_>) -> Option<MissionItem> {
     if (0..4).any(|k| fields.f32(4 * k).is_infinite()) || !fields.f32(24).is_finite() {
         return None;
     }
-    // MISSION_ITEM carries degrees, or metres in a local frame, as floats.
+    // MISSION_ITEM holds degrees, or metres in a local frame, as floats.
     if id == MISSION_ITEM {
         let local = matches!(fields.u8(34), 1 | 4 | 7 | 8 | 9);
         let scale = if local { 1e4 } else { 1e7 };

@@ -1,43 +1,45 @@
-//! Seeded disturbances: gusts of wind and the errors of the estimator.
+//! Seeded random disturbances: gusts of wind and a random error of the estimator.
 //!
-//! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one of these
-//! along each axis with τ = L / V). They advance in slots of 20 ms and are held between: nothing
-//! they model moves faster.
+//! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one on each
+//! axis with τ = L / V). They are updated every 20 ms and constant in between, since nothing they
+//! model changes faster.
 //!
-//! A gust is given by its peak over the mean wind, as in weather reports and MIL-F-8785C's discrete
-//! gust, not by a standard deviation: the peak lies [`PEAK_FACTOR`] deviations out, and nothing
-//! goes beyond it.
+//! A gust is specified by its peak beyond the mean wind, as in weather reports and MIL-F-8785C's
+//! discrete gust, not by a standard deviation: the peak is [`PEAK_FACTOR`] deviations, and gusts
+//! are clamped to it.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use planner_core::Point;
 
-/// Slot of the disturbance processes, seconds.
+/// Period at which the random processes are updated, seconds.
 pub const SLOT_S: f32 = 0.02;
-/// Time constant of gusts: a turbulence length of 20 m met at 8 m/s.
+/// Time constant of gusts, seconds: a turbulence length of 20 m at 8 m/s.
 const GUST_TAU_S: f32 = 2.5;
-/// Peak of gusts over their standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO,
+/// Ratio of a gust's peak to its standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO,
 /// Harper, Kepert and Ginger, Guidelines for converting between various wind averaging periods,
 /// 2010, §2).
 const PEAK_FACTOR: f32 = 3.0;
-/// Vertical gusts are half the horizontal ones near the ground (MIL-F-8785C, low altitude).
+/// Ratio of vertical to horizontal gusts near the ground (MIL-F-8785C, low altitude).
 const VERTICAL_SHARE: f32 = 0.5;
-/// Slow wander of the position estimate, seconds: GPS multipath and ionosphere.
+/// Time constant of the slow position error, seconds: GPS multipath and ionosphere.
 const BIAS_TAU_S: f32 = 60.0;
-/// Quick wander of the position estimate, seconds: what the filter lets through of GPS noise.
+/// Time constant of the fast position error, seconds: GPS noise that the estimator does not filter
+/// out.
 const JITTER_TAU_S: f32 = 1.0;
-/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts 0.1 m/s where it is 0.5
-/// m off.
+/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts by 0.1 m/s where it
+/// is 0.5 m wrong.
 const VELOCITY_SHARE: f32 = 0.2;
 
-/// Gaussian numbers from a seed. Four 16-bit uniforms are summed (Irwin–Hall): mean 0, variance 1,
-/// no tail past 3.5 σ, and no transcendental function that could differ between machines.
+/// Generator of Gaussian numbers. It sums four uniform 16-bit numbers (Irwin–Hall): mean 0,
+/// variance 1, no value beyond 3.5 σ, and no transcendental function whose result could differ
+/// between machines.
 #[derive(Clone, Debug)]
 pub struct Gaussian(Pcg64Mcg);
 
 impl Gaussian {
-    /// A generator that depends on nothing but the seed.
+    /// A generator whose numbers depend on the seed alone.
     pub fn new(seed: u64) -> Self {
         Self(Pcg64Mcg::seed_from_u64(seed))
     }
@@ -55,7 +57,7 @@ impl Gaussian {
     }
 }
 
-/// One Ornstein–Uhlenbeck process on three axes, stationary from the first sample on.
+/// An Ornstein–Uhlenbeck process on three axes, stationary from its first value on.
 #[derive(Clone, Debug)]
 struct OrnsteinUhlenbeck {
     value: Point,
@@ -76,7 +78,7 @@ impl OrnsteinUhlenbeck {
     }
 }
 
-/// Everything random about one vehicle.
+/// Random wind and estimate errors of one vehicle.
 #[derive(Clone, Debug)]
 pub struct Disturbance {
     random: Gaussian,
@@ -84,17 +86,17 @@ pub struct Disturbance {
     gust_peak_mps: f32,
     errors: Option<[OrnsteinUhlenbeck; 3]>,
     mean_wind: Point,
-    /// Wind, m/s, ENU.
+    /// Wind now: mean and gust, ENU m/s.
     pub wind: Point,
-    /// Estimated minus true position, metres, ENU.
+    /// Error of the position estimate (estimated minus true), ENU metres.
     pub position_error: Point,
-    /// Estimated minus true velocity, m/s, ENU.
+    /// Error of the velocity estimate (estimated minus true), ENU m/s.
     pub velocity_error: Point,
 }
 
 impl Disturbance {
-    /// Mean wind (m/s, ENU), peak of gusts over it (m/s) and standard deviation of the position
-    /// estimate (m); 0 switches one off.
+    /// Mean wind (ENU m/s), largest gust beyond it (m/s) and standard deviation of the position
+    /// estimate (m). 0 switches gusts or errors off.
     pub fn new(mean_wind: Point, gust_peak_mps: f32, position_noise_m: f32, seed: u64) -> Self {
         let mut random = Gaussian::new(seed);
         let sigma = gust_peak_mps / PEAK_FACTOR;
@@ -128,7 +130,7 @@ impl Disturbance {
         new
     }
 
-    /// Advances every process by one slot of [`SLOT_S`].
+    /// Updates every process by one period of [`SLOT_S`].
     pub fn advance(&mut self) {
         if let Some(gust) = &mut self.gust {
             gust.advance(&mut self.random);
@@ -149,13 +151,14 @@ impl Disturbance {
         }
     }
 
-    /// Gaussian noise of a sensor, standard deviation 1.
+    /// A random number for sensor noise: mean 0, standard deviation 1.
     pub fn sensor_noise(&mut self) -> f32 {
         self.random.sample()
     }
 }
 
-/// A gust no stronger than its peak.
+/// The gust clamped to its peak: as a vector horizontally, and by [`VERTICAL_SHARE`] of it
+/// vertically.
 fn clamp_gust(gust: &Point, peak_mps: f32) -> Point {
     let across = libm::sqrtf(gust.x * gust.x + gust.y * gust.y);
     let share = if across > peak_mps { peak_mps / across } else { 1.0 };

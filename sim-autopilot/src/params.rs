@@ -1,15 +1,16 @@
-//! The parameter protocol's table: names, types and values of one vehicle, and how integers travel.
+//! The parameter table of one vehicle, and the encoding of values in PARAM_VALUE and PARAM_SET.
 //!
-//! PX4 puts the bytes of an integer into the float of PARAM_VALUE and PARAM_SET
-//! (`MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE`) and refuses another type than the parameter's
-//! own. ArduPilot casts integers, and casts what it is sent to its own type.
+//! PX4 puts an integer's bytes into the message's float
+//! (`MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE`) and refuses a PARAM_SET of another type than
+//! the parameter's. ArduPilot sends integers as float numbers and converts a received value to the
+//! parameter's type.
 
-/// How integers travel in the float.
+/// How an integer is encoded in the message's float.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Values travel by their bytes, as PX4's.
+    /// The float has the integer's bytes, as in PX4.
     Bytewise,
-    /// Values travel as numbers, as ArduPilot's.
+    /// The float has the integer's value, as in ArduPilot.
     Cast,
 }
 
@@ -29,7 +30,7 @@ pub enum ParamValue {
 use ParamValue::{Int, Int8, Int16, Real};
 
 impl ParamValue {
-    /// MAV_PARAM_TYPE.
+    /// Number of the type (MAV_PARAM_TYPE).
     pub fn wire_type(self) -> u8 {
         match self {
             Int8(_) => 2,
@@ -39,7 +40,7 @@ impl ParamValue {
         }
     }
 
-    /// The whole number, of the integer types.
+    /// The value of an integer type; `None` for a float.
     fn as_i32(self) -> Option<i32> {
         match self {
             Int8(i) => Some(i32::from(i)),
@@ -49,12 +50,13 @@ impl ParamValue {
         }
     }
 
-    /// A value of the same integer type; `None` of a float.
+    /// `integer` as a value of the same integer type, clamped to its range; `None` if this is a
+    /// float.
     pub fn with_integer(self, integer: i32) -> Option<Self> {
         self.as_i32().map(|_| self.with_same_type(integer))
     }
 
-    /// A value of the same type from a whole number, kept within the type's range.
+    /// `integer` as a value of the same type, clamped to its range.
     fn with_same_type(self, integer: i32) -> Self {
         match self {
             Int8(_) => Int8(integer.clamp(i32::from(i8::MIN), i32::from(i8::MAX)) as i8),
@@ -73,10 +75,10 @@ pub struct Params {
 }
 
 impl Params {
-    /// The defaults of a sorted table, with this vehicle's own values for some.
+    /// The defaults in `table`, sorted by name, with the values in `own` instead for some.
     ///
     /// # Panics
-    /// If a name is not in the table.
+    /// A name in `own` is not in the table.
     pub fn new(
         table: &'static [(&'static str, ParamValue)],
         encoding: Encoding,
@@ -96,27 +98,27 @@ impl Params {
         self.values.len()
     }
 
-    /// Whether it is empty.
+    /// Whether there are no parameters.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// How integers travel.
+    /// How integers are encoded.
     pub fn encoding(&self) -> Encoding {
         self.encoding
     }
 
-    /// Index of a name.
+    /// Index of the parameter with this name; `None` if there is none.
     pub fn index(&self, name: &str) -> Option<usize> {
         self.table.binary_search_by(|&(known, _)| known.cmp(name)).ok()
     }
 
-    /// Name and value at an index.
+    /// Name and value of the parameter at an index; `None` if there is none.
     pub fn get(&self, index: usize) -> Option<(&'static str, ParamValue)> {
         Some((self.table.get(index)?.0, *self.values.get(index)?))
     }
 
-    /// The float a value travels in.
+    /// The float that encodes a value in PARAM_VALUE.
     pub fn to_wire(&self, value: ParamValue) -> f32 {
         match (value, self.encoding) {
             (Real(real), _) => real,
@@ -125,7 +127,8 @@ impl Params {
         }
     }
 
-    /// Takes what PARAM_SET brought; whether it was taken.
+    /// Applies a PARAM_SET. Returns false, and changes nothing, for an unknown name, an invalid
+    /// value, or (PX4) another type.
     pub fn set(&mut self, name: &str, wire: f32, wire_type: u8) -> bool {
         let Some(index) = self.index(name) else { return false };
         let old = self.values[index];
@@ -141,7 +144,7 @@ impl Params {
         true
     }
 
-    /// The value of a float; 0 where there is none of that name.
+    /// Value of a float parameter; 0 if there is none of this name.
     pub fn f32_value(&self, name: &str) -> f32 {
         match self.index(name).and_then(|index| self.values.get(index)) {
             Some(&Real(value)) => value,
@@ -149,7 +152,7 @@ impl Params {
         }
     }
 
-    /// The value of an integer; 0 where there is none of that name.
+    /// Value of an integer parameter; 0 if there is none of this name.
     pub fn i32_value(&self, name: &str) -> i32 {
         self.index(name).and_then(|index| self.values[index].as_i32()).unwrap_or(0)
     }

@@ -1,5 +1,4 @@
-//! What every simulated autopilot has, whatever its firmware: airframe, estimator, ports, home,
-//! stored missions.
+//! What both simulated autopilots share: vehicle, estimator, camera, ports, home, stored missions.
 
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
@@ -19,62 +18,63 @@ use crate::AutopilotKind;
 const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
 const GPS_GLOBAL_ORIGIN: u32 = 49;
-/// Delay of an answer, microseconds, one step: 4 ms, where PX4 was seen to take 1.3 to 16 and
-/// ArduCopter 2.5 to 7.
+/// Delay of a COMMAND_ACK, microseconds: one step. In recordings PX4 took 1.3 to 16 ms and
+/// ArduCopter took 2.5 to 7 ms.
 const ANSWER_DELAY_US: u64 = 4_000;
-/// Time from the command to reboot until the reboot, microseconds.
+/// Time from the command to reboot until the reboot, microseconds: the COMMAND_ACK is sent before.
 const REBOOT_DELAY_US: u64 = 200_000;
 
-/// Sensors and estimate that a firmware reads in one step.
+/// Sensor readings and estimate that the autopilot's mode logic uses in one step.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorReadings {
-    /// Microseconds since boot.
+    /// Time since boot, microseconds.
     pub now_us: u64,
     /// Estimated position, ENU metres.
     pub position: Point,
     /// Estimated velocity, ENU m/s.
     pub velocity: Point,
-    /// Change of the estimated height, m/s.
+    /// Rate of change of the estimated height, m/s, errors included.
     pub height_rate: f32,
     /// Measured acceleration, ENU m/s².
     pub acceleration: Point,
     /// Heading, radians clockwise from north.
     pub heading: f32,
-    /// The body touches the ground.
+    /// Whether the body touches the ground.
     pub touching: bool,
-    /// Height of the body over its resting place as the distance sensor shows it, metres; infinite
-    /// without one.
+    /// Reading of the distance sensor: height of the body above where it would rest on the ground,
+    /// metres; infinite without a sensor.
     pub distance: f32,
-    /// Home, ENU metres.
+    /// Home position, ENU metres.
     pub home: Point,
-    /// Charge left, 0 to 1.
+    /// Remaining battery charge, 0 to 1.
     pub battery: f32,
 }
 
-/// Control of the vehicle in this step.
+/// Output of the mode logic in one step, for the vehicle's controller.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlDemand {
-    /// Motors carry weight.
+    /// Whether the motors carry weight; false while they idle or are off.
     pub lift: bool,
-    /// Treatment of the controller's integral.
+    /// What to do with the velocity controller's integral.
     pub integral: IntegralAction,
-    /// Demand of the mode.
+    /// Position, velocity and limits that the mode demands.
     pub demand: Demand,
 }
 
-/// Treatment of the velocity controller's integral in a step.
+/// What to do with the velocity controller's integral in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegralAction {
-    /// The integral continues.
+    /// Continue integrating.
     Keep,
-    /// The integral is zero, as on the ground.
+    /// Set it to zero, as on the ground.
     Clear,
-    /// The integral is the demanded acceleration beyond what the demand itself produces, as where
-    /// ArduCopter initialises its controller in flight.
+    /// Set it to the demanded acceleration minus the true one, as ArduCopter does when its
+    /// controller starts in flight.
     Match,
 }
 
-/// Airframe, estimator, ports, home and stored missions.
+/// The state that does not depend on the kind of autopilot: vehicle, errors of the estimate, ports,
+/// home, missions, camera.
 #[derive(Clone, Debug)]
 pub struct Platform {
     pub(super) config: Config,
@@ -84,9 +84,9 @@ pub struct Platform {
     pub(super) disturbance: Disturbance,
     pub(super) errors: EstimateErrors,
     pub(super) position_offset: Point,
-    /// Estimated minus true velocity that a replay imposes, ENU m/s.
+    /// Error of the velocity estimate (estimated minus true) that a replay imposes, ENU m/s.
     pub(super) velocity_bias: Point,
-    /// Change of the estimate's error in height, m/s.
+    /// Rate of change of the height estimate's error that a replay imposes, m/s.
     pub(super) height_error_rate: f32,
     pub(super) gps_ok: bool,
     pub(super) frame: LocalFrame,
@@ -98,7 +98,7 @@ pub struct Platform {
     pub(super) ports: Vec<Port>,
     pub(super) missions: Missions,
     pub(super) camera: CameraTrigger,
-    /// When to reboot, once that was commanded.
+    /// Time of the commanded reboot, microseconds since boot; `None` without one.
     pub(super) reboot_us: Option<u64>,
 }
 
@@ -145,7 +145,8 @@ impl Platform {
         }
     }
 
-    /// Lets time pass, wind change, and the ground be where it is.
+    /// Advances time, wind and estimate errors by `dt_s`, and computes the height above the ground
+    /// at `ground_up_m`.
     pub(super) fn advance_time(&mut self, dt_s: f32, ground_up_m: f32) {
         self.time_us += libm::roundf(dt_s * 1e6) as u64;
         if self.time_us >= self.next_noise_us {
@@ -175,7 +176,7 @@ impl Platform {
         }
     }
 
-    /// Estimated minus true position, ENU metres.
+    /// Error of the position estimate: estimated minus true, ENU metres.
     pub(super) fn position_error(&self) -> Point {
         self.disturbance.position_error + self.errors.position + self.position_offset
     }
@@ -187,7 +188,8 @@ impl Platform {
         self.send_on_all_ports(HOME_POSITION);
     }
 
-    /// Home where it stands, as both firmwares set it on arming.
+    /// Sets home to the estimated position and sends HOME_POSITION, as both autopilots do on
+    /// arming; not if home was set by command or configuration.
     pub(super) fn set_home_here(&mut self) {
         if self.home_fixed {
             return;
@@ -198,8 +200,8 @@ impl Platform {
         self.send_on_all_ports(HOME_POSITION);
     }
 
-    /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has
-    /// looked.
+    /// Executes DO_SET_CAM_TRIGG_DIST or DO_DIGICAM_CONTROL and queues its COMMAND_ACK. PX4 answers
+    /// at the camera driver's next check.
     pub(super) fn handle_camera_command(&mut self, from: Sender, command: &Command) {
         self.execute_camera_command(command);
         let soon_us = self.time_us + ANSWER_DELAY_US;
@@ -212,7 +214,7 @@ impl Platform {
         self.ports[from.port].pending_acks.push((answer_us, ack));
     }
 
-    /// As `handle_camera_command`, without an answer.
+    /// Executes the same commands as `handle_camera_command`, but queues no COMMAND_ACK.
     pub(super) fn execute_camera_command(&mut self, command: &Command) {
         if command.id == DO_DIGICAM_CONTROL {
             self.camera.handle_digicam_control(command);
@@ -221,7 +223,7 @@ impl Platform {
         }
     }
 
-    /// Takes the picture that is due, if one is, and says so.
+    /// Takes a picture if one is due, and queues the message about it on every port.
     pub(super) fn update_camera(&mut self) {
         let state = self.vehicle.state();
         let truth = Photo {
@@ -235,7 +237,7 @@ impl Platform {
         }
     }
 
-    /// Reboots when the answer is out.
+    /// Schedules a reboot, late enough for the COMMAND_ACK to be sent.
     pub(super) fn schedule_reboot(&mut self) {
         self.reboot_us = Some(self.time_us + REBOOT_DELAY_US);
     }
@@ -244,7 +246,7 @@ impl Platform {
         self.send_on_all_ports(GPS_GLOBAL_ORIGIN);
     }
 
-    /// Sends one message through every port in the next step.
+    /// Queues message `id` once on every port for the next step.
     pub(super) fn send_on_all_ports(&mut self, id: u32) {
         for port in &mut self.ports {
             if !port.requested_once.contains(&id) {
@@ -253,12 +255,12 @@ impl Platform {
         }
     }
 
-    /// Sends STATUSTEXT through every port.
+    /// Queues a STATUSTEXT on every port.
     pub(super) fn send_text(&mut self, severity: u8, text: &str) {
         self.ports.iter_mut().for_each(|port| port.send_text(severity, text));
     }
 
-    /// Takes a message of the mission protocol.
+    /// Handles a message of the mission protocol.
     pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &PayloadReader<'_>) {
         self.missions.handle_message(self.time_us, &mut self.ports[from.port], from, id, fields);
     }
@@ -268,8 +270,8 @@ impl Platform {
         self.ports[from.port].pending_acks.push((self.time_us + ANSWER_DELAY_US, ack));
     }
 
-    /// Target of DO_REPOSITION, ENU with NaN for coordinates that it leaves out; `None` for no
-    /// place on earth.
+    /// Target of DO_REPOSITION in ENU metres, NaN on axes that the command leaves out; `None` if
+    /// latitude, longitude or altitude is invalid.
     pub(super) fn reposition_target(&self, command: &Command) -> Option<Point> {
         let here = self.frame.geodetic_from_enu(self.vehicle.position());
         let [lat_deg, lon_deg] = command.place;
@@ -288,7 +290,7 @@ impl Platform {
         Some(Point::new(east, north, if command.z.is_finite() { enu.z } else { f32::NAN }))
     }
 
-    /// Executes DO_SET_HOME; false where its position is not valid.
+    /// Executes DO_SET_HOME. Returns false if the commanded position is invalid.
     pub(super) fn handle_set_home(&mut self, command: &Command) -> bool {
         let [lat_deg, lon_deg] = command.place;
         let home = if command.param[0] == 1.0 {
@@ -303,8 +305,9 @@ impl Platform {
         valid
     }
 
-    /// SET_MESSAGE_INTERVAL; 0 restores what `streams` says. `refused` is the firmware's answer to
-    /// an id it has not.
+    /// Executes SET_MESSAGE_INTERVAL and returns the MAV_RESULT. An interval of 0 restores the
+    /// default in `streams`, a negative one switches the stream off. `refused` is the result for an
+    /// unknown message id.
     pub(super) fn set_interval(
         &mut self,
         from: Sender,
@@ -322,7 +325,8 @@ impl Platform {
         if self.ports[from.port].set_interval(id, interval, now) { ACCEPTED } else { refused }
     }
 
-    /// GET_MESSAGE_INTERVAL.
+    /// Executes GET_MESSAGE_INTERVAL: queues MESSAGE_INTERVAL and returns the MAV_RESULT, `refused`
+    /// for an unknown message id.
     pub(super) fn report_interval(&mut self, from: Sender, id: f32, refused: u8) -> u8 {
         let port = &mut self.ports[from.port];
         let Some(stream) =

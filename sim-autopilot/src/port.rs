@@ -1,5 +1,5 @@
-//! One MAVLink port of the simulated autopilot: framing, its own sequence numbers, stream settings
-//! and send queue.
+//! One MAVLink port of the simulated autopilot: framing, sequence numbers, stream rates, send
+//! queue.
 
 use mavlink::MessageData;
 
@@ -7,11 +7,11 @@ use super::frame::{self, Frame, Framer, MAX_FRAME_LEN};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;
-/// Most bytes that wait to be sent before telemetry is dropped, as PX4 drops it when its buffer is
-/// full.
+/// Most bytes that may wait in the send queue while telemetry is still queued; beyond that
+/// telemetry is dropped, as PX4 drops it when its buffer is full.
 const MAX_QUEUED_TELEMETRY: usize = 4096;
-/// Rates of the port for a ground station: message id and interval in µs. A real one asks for about
-/// these itself.
+/// Stream rates of the ground station's port: message id and interval in µs. A real ground station
+/// requests about these.
 pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 1_000_000),   // SYS_STATUS
@@ -25,34 +25,34 @@ pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (242, 2_000_000), // HOME_POSITION
     (245, 500_000),   // EXTENDED_SYS_STATE
 ];
-/// Most bytes that a port queues: a port that is not drained does not grow.
+/// Most bytes in the send queue, so that a port that is not drained does not grow without limit.
 const MAX_QUEUED_BYTES: usize = 65_536;
-/// Most components remembered as reached by a port.
+/// Most components that a port remembers as reachable.
 const MAX_ROUTES: usize = 64;
 
-/// One telemetry stream.
+/// One telemetry stream of a port.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
     /// Message id.
     pub id: u32,
-    /// Microseconds between messages; 0 is off.
+    /// Interval between messages, microseconds; 0: off.
     pub interval_us: u32,
-    /// When the next is due.
+    /// Time at which the next message is due, microseconds since boot.
     pub due_us: u64,
 }
 
-/// An answer that goes out one step later.
+/// A COMMAND_ACK that waits until it is due.
 #[derive(Clone, Copy, Debug)]
 pub struct PendingAck {
-    /// MAV_CMD.
+    /// Number of the command (MAV_CMD).
     pub command: u16,
-    /// MAV_RESULT.
+    /// Result (MAV_RESULT).
     pub result: u8,
-    /// System and component id of the sender that it answers.
+    /// System and component id of the command's sender.
     pub to: (u8, u8),
 }
 
-/// Sender of a frame, and the port through which it came.
+/// Sender of a frame, and the port at which it arrived.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sender {
     pub(crate) port: usize,
@@ -66,7 +66,7 @@ impl Sender {
     }
 }
 
-/// A port. Frames in both directions; the transport around it is someone else's.
+/// A MAVLink port: bytes in, frames out, and back. It does not depend on the transport.
 #[derive(Clone, Debug)]
 pub struct Port {
     framer: Framer,
@@ -74,27 +74,28 @@ pub struct Port {
     sequence: u8,
     queue: Vec<u8>,
     sent: usize,
-    /// Telemetry dropped because nobody drained the queue, messages.
+    /// Number of messages dropped because the send queue was full.
     pub dropped: u64,
-    /// Streams, fixed in number and order.
+    /// Telemetry streams, in a fixed order.
     pub streams: Vec<Stream>,
     next_due_us: u64,
-    /// Acks, and when each is due.
+    /// COMMAND_ACKs that wait, each with the time at which it is due, microseconds since boot.
     pub pending_acks: Vec<(u64, PendingAck)>,
-    /// Messages to be sent once, in the next step.
+    /// Ids of messages to be sent once, in the next step.
     pub requested_once: Vec<u32>,
-    /// The next parameter of a list being sent.
+    /// Index of the next parameter of a PARAM_REQUEST_LIST that is being answered.
     pub param_cursor: Option<usize>,
-    /// PING messages sent.
+    /// Number of PING messages sent.
     pub pings: u32,
-    /// Senders heard here: system and component.
+    /// Components heard at this port: system and component id.
     heard: Vec<(u8, u8)>,
 }
 
 impl Port {
-    /// A port with the streams a personality starts with: message id and interval in µs.
+    /// A port with the default streams of an autopilot: message id and interval in µs.
     pub fn new(system_id: u8, streams: &[(u32, u32)]) -> Self {
-        // Spread over the first interval, so that not all fall due in the same step.
+        // Start times are spread over the first interval, so that not all messages are due in one
+        // step.
         let streams = streams
             .iter()
             .enumerate()
@@ -121,7 +122,7 @@ impl Port {
         }
     }
 
-    /// A port with the same messages at a ground station's rates.
+    /// A port for a ground station: the same messages at the rates of [`GROUND_STREAMS`].
     pub fn for_ground(system_id: u8, streams: &[(u32, u32)]) -> Self {
         let rate =
             |id| GROUND_STREAMS.iter().find(|ground| ground.0 == id).map_or(0, |ground| ground.1);
@@ -129,7 +130,8 @@ impl Port {
         Self::new(system_id, &streams)
     }
 
-    /// The next whole frame of `input`, from which it takes bytes.
+    /// The next whole frame in the received bytes; takes bytes from `input`. `None` if no frame is
+    /// complete.
     pub fn next_frame(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
         self.framer.next(now_us, input)
     }
@@ -140,7 +142,7 @@ impl Port {
         (self.system_id, AUTOPILOT_COMPONENT, sequence)
     }
 
-    /// Whether there is room for one more frame; what there is none for counts as dropped.
+    /// Whether the send queue has room for one more frame; if not, counts the frame as dropped.
     fn reserve_frame(&mut self) -> bool {
         if self.sent == self.queue.len() {
             self.queue.clear();
@@ -151,21 +153,22 @@ impl Port {
         room
     }
 
-    /// Remembers that a component is reached here.
+    /// Remembers that this component can be reached by this port.
     pub fn learn_route(&mut self, sender: (u8, u8)) {
         if !self.heard.contains(&sender) && self.heard.len() < MAX_ROUTES {
             self.heard.push(sender);
         }
     }
 
-    /// Whether the addressee of a message was heard on this port; 0 addresses all.
+    /// Whether a component that the target (system, component) addresses was heard at this port; 0
+    /// addresses all.
     pub fn is_route_to(&self, (system, component): (u8, u8)) -> bool {
         let meant =
             |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
         self.heard.iter().any(meant)
     }
 
-    /// Queues another sender's frame unchanged.
+    /// Queues another sender's frame with its ids and sequence number unchanged.
     pub fn forward_frame(&mut self, frame: &Frame) {
         if self.reserve_frame() {
             frame.write(&mut self.queue);
@@ -180,14 +183,15 @@ impl Port {
         }
     }
 
-    /// Queues a message whose payload the caller laid out, for what the crate's types cannot hold.
+    /// Queues a message with an encoded payload, for contents that the crate's types cannot hold.
+    /// An id that the dialect does not know is ignored.
     pub fn send_raw(&mut self, id: u32, payload: &[u8]) {
         if let Some(seed) = frame::crc_seed(id) {
             self.send_seeded(id, seed, payload);
         }
     }
 
-    /// Sends a message that the crate does not know, with its CRC seed.
+    /// Queues a message that the dialect does not know, with its CRC seed.
     pub fn send_seeded(&mut self, id: u32, seed: u8, payload: &[u8]) {
         if self.reserve_frame() {
             let sender = self.next_sender();
@@ -195,13 +199,13 @@ impl Port {
         }
     }
 
-    /// Queues a COMMAND_ACK; the command may be one the crate does not know.
+    /// Queues a COMMAND_ACK; the command may be unknown to the crate.
     pub fn send_ack(&mut self, ack: PendingAck) {
         let [low, high] = ack.command.to_le_bytes();
         self.send_raw(77, &[low, high, ack.result, 0, 0, 0, 0, 0, ack.to.0, ack.to.1]);
     }
 
-    /// Queues a STATUSTEXT of at most 50 bytes.
+    /// Queues a STATUSTEXT, cut to 50 bytes.
     pub fn send_text(&mut self, severity: u8, text: &str) {
         let mut payload = [0; 54];
         payload[0] = severity;
@@ -210,7 +214,7 @@ impl Port {
         self.send_raw(253, &payload);
     }
 
-    /// Queues the acks that are due.
+    /// Queues the COMMAND_ACKs that are due.
     pub fn send_due_acks(&mut self, now_us: u64) {
         let mut waiting = core::mem::take(&mut self.pending_acks);
         waiting.retain(|&(due_us, ack)| {
@@ -223,17 +227,18 @@ impl Port {
         self.pending_acks = waiting;
     }
 
-    /// Whether telemetry would be dropped now.
+    /// Whether the send queue is so full that telemetry is dropped.
     pub fn is_congested(&self) -> bool {
         self.queue.len() - self.sent > MAX_QUEUED_TELEMETRY
     }
 
-    /// Whether any stream is due.
+    /// Whether any stream has a message due.
     pub fn is_due(&self, now_us: u64) -> bool {
         now_us >= self.next_due_us
     }
 
-    /// Takes the streams that are due, in order, and sets when they are due again.
+    /// Puts the ids of all due streams into `due`, in order, and schedules their next messages. If
+    /// the queue is congested they are dropped.
     pub fn take_due(&mut self, now_us: u64, due: &mut Vec<u32>) {
         due.clear();
         let mut next = u64::MAX;
@@ -254,7 +259,7 @@ impl Port {
         }
     }
 
-    /// Sets a stream's interval; false where there is no such stream.
+    /// Sets a stream's interval (0: off); false if the port has no such stream.
     pub fn set_interval(&mut self, id: u32, interval_us: u32, now_us: u64) -> bool {
         let Some(stream) = self.streams.iter_mut().find(|stream| stream.id == id) else {
             return false;
@@ -265,8 +270,8 @@ impl Port {
         true
     }
 
-    /// Moves whole frames into `out`, as many as fit; the bytes moved. A buffer of 280 bytes fits
-    /// any frame.
+    /// Moves queued bytes into `out`, as many whole frames as fit, and returns their number. 280
+    /// bytes hold any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
         let waiting = &self.queue[self.sent..];
         let mut len = 0;

@@ -1,15 +1,15 @@
-//! Passing on what is for others, from port to port, as ArduPilot always does and PX4 where
-//! `MAV_x_FORWARD` is set: so a ground station on one port reaches a companion on another.
+//! Forwarding of messages between ports, as ArduPilot always does and PX4 if `MAV_x_FORWARD` is
+//! set: so a ground station at one port reaches a companion at another.
 //!
-//! A port leads to every component that was heard on it. A message to one goes to the ports that
-//! lead there, a message to nobody in particular to all other ports on which a sender was heard;
-//! what is for this autopilot alone goes no further.
+//! A component is reachable by every port at which it was heard. A message with a target is
+//! forwarded to the ports that reach the target, a broadcast to all other ports at which any
+//! component was heard. A message for this autopilot alone is not forwarded.
 
 use super::frame::Frame;
 use super::port::{AUTOPILOT_COMPONENT, Port};
 
-/// Offset at which a message names its target system, the component after it: in its payload. Other
-/// messages are for every system.
+/// Offset of the target system id in the payload of a message; the target component id follows it.
+/// `None`: the message has no target, so it is a broadcast.
 fn target_system_offset(message_id: u32) -> Option<usize> {
     Some(match message_id {
         21 | 43 | 45 => 0,
@@ -24,7 +24,7 @@ fn target_system_offset(message_id: u32) -> Option<usize> {
     })
 }
 
-/// Passes a frame that came in at `from` on, by the other ports.
+/// Forwards a frame that arrived at port `from` to the other ports that reach its target.
 pub fn forward_to_other_ports(ports: &mut [Port], from: usize, own_system: u8, frame: &Frame) {
     let sender = (frame.system, frame.component);
     if sender == (own_system, AUTOPILOT_COMPONENT) {
@@ -33,7 +33,7 @@ pub fn forward_to_other_ports(ports: &mut [Port], from: usize, own_system: u8, f
     ports[from].learn_route(sender);
     let target = target_system_offset(frame.message_id).map_or((0, 0), |at| {
         let payload = frame.padded();
-        // SET_MODE names no component.
+        // SET_MODE has no target component.
         (payload[at], if frame.message_id == 11 { AUTOPILOT_COMPONENT } else { payload[at + 1] })
     });
     if target == (own_system, AUTOPILOT_COMPONENT) {

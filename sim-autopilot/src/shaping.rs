@@ -1,7 +1,7 @@
-//! How autopilots approach what is asked for within limits on acceleration and jerk.
+//! Shaping functions of autopilots: approach a target value within limits of acceleration and jerk.
 
-/// Rate at which an error is closed: proportional near zero, and no faster than can be stopped
-/// (`sqrt_controller`).
+/// Rate at which an error is reduced (`sqrt_controller`): `gain` · error near zero, beyond that the
+/// rate from which a deceleration of `limit` stops at zero.
 pub fn approach_rate(error: f32, gain: f32, limit: f32) -> f32 {
     let linear = limit / (gain * gain);
     if error.abs() <= linear {
@@ -10,20 +10,21 @@ pub fn approach_rate(error: f32, gain: f32, limit: f32) -> f32 {
     libm::copysignf(libm::sqrtf(2.0 * limit * (error.abs() - 0.5 * linear)), error)
 }
 
-/// Rate at which a ramp closes the rest of its change at its end, 1/s.
+/// Gain with which a [`JerkLimitedRate`] approaches its target at the end, 1/s.
 const RAMP_END_RATE_PER_S: f32 = 6.0;
 
-/// A rate that changes within limits, as PX4's `VelocitySmoothing` changes it.
+/// A rate that changes within limits of its first and second derivative, as in PX4's
+/// `VelocitySmoothing`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JerkLimitedRate {
-    /// m/s.
+    /// The rate, m/s.
     pub rate: f32,
-    /// Rate of change of the ramp's value, m/s².
+    /// Derivative of the rate, m/s².
     pub change: f32,
 }
 
 impl JerkLimitedRate {
-    /// One step of `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
+    /// Advances `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
         let wanted =
             approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);

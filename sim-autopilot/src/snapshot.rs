@@ -1,4 +1,4 @@
-//! Everything that telemetry is made of, at one instant.
+//! The state from which all telemetry messages of one step are made.
 
 use core::cell::OnceCell;
 
@@ -8,53 +8,53 @@ use planner_core::frames::Geodetic;
 use super::status::FirmwareStatus;
 use crate::AutopilotKind;
 
-/// Everything telemetry is made of, at one instant.
+/// The state of one step from which telemetry messages are made.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// Microseconds since boot.
+    /// Time since boot, microseconds.
     pub time_us: u64,
-    /// Microseconds of UTC.
+    /// UTC, microseconds since 1970.
     pub unix_us: u64,
-    /// System id.
+    /// MAVLink system id.
     pub system_id: u8,
-    /// The firmware's state.
+    /// State of the autopilot's mode logic.
     pub status: FirmwareStatus,
-    /// Armed.
+    /// Whether the motors are armed.
     pub armed: bool,
-    /// The item of the mission under way, and how many there are.
+    /// Mission: number of the current item, and number of items.
     pub mission: (u16, u16),
-    /// Pictures taken since boot.
+    /// Number of pictures since boot.
     pub pictures: u32,
-    /// Estimated NED about the EKF origin, metres.
+    /// Estimated position, NED about the EKF origin, metres.
     pub ned: Vector3<f64>,
-    /// Estimated NED velocity, m/s.
+    /// Estimated velocity, NED m/s.
     pub velocity: Vector3<f64>,
-    /// Estimated position.
+    /// Estimated latitude, longitude and altitude.
     pub geodetic: Geodetic,
-    /// GPS receiver: position error north and east in metres beyond the estimate's, and whether it
+    /// GPS receiver: position error north and east beyond the estimate's (metres), and whether it
     /// has a fix.
     pub gps: (f32, f32, bool),
-    /// Home, and in NED about the EKF origin.
+    /// Home as latitude, longitude and altitude, and as NED about the EKF origin (metres).
     pub home: (Geodetic, Vector3<f64>),
     /// EKF origin.
     pub ekf_origin: Geodetic,
-    /// Thrust over mass, NED, m/s²; points up.
+    /// Acceleration by thrust alone, NED m/s²; it points up.
     pub specific_force: Vector3<f32>,
-    /// Heading and its change, radians.
+    /// Heading (radians clockwise from north) and rate of turn (rad/s).
     pub heading: (f32, f32),
-    /// Position, velocity and acceleration the controller flies, NED.
+    /// Position, velocity and acceleration setpoints of the controller, NED.
     pub target: [Vector3<f64>; 3],
-    /// Height over ground, metres.
+    /// Height of the body above where it would rest on the ground, metres.
     pub height: f32,
-    /// Accuracy that the estimator reports, across and in height, metres.
+    /// Horizontal and vertical accuracy that the estimator reports, metres.
     pub accuracy: [f32; 2],
-    /// Charge left, 0 to 1.
+    /// Remaining battery charge, 0 to 1.
     pub battery: f32,
-    /// Filled by the first message that needs it.
+    /// Computed when the first message needs it.
     pub attitude: OnceCell<Attitude>,
 }
 
-/// Attitude as angles and as a quaternion (w, x, y, z), NED to body.
+/// Attitude as Euler angles and as a quaternion (w, x, y, z).
 #[derive(Clone, Copy, Debug)]
 pub struct Attitude {
     /// Roll, pitch, yaw, radians.
@@ -63,12 +63,13 @@ pub struct Attitude {
     pub quaternion: [f32; 4],
 }
 
-/// The attitude whose thrust axis lies along a specific force (NED, pointing up) at a heading.
+/// The attitude at this heading whose thrust axis points along `force` (specific force, NED,
+/// upward).
 pub fn attitude_from_force(force: &Vector3<f32>, heading: f32) -> Attitude {
     let norm = force.norm().max(0.1);
     let (sin, cos) = libm::sincosf(heading);
-    // The body's z axis, down, in a frame turned by the heading: (cos φ sin θ, −sin φ, cos φ cos
-    // θ).
+    // The body's downward axis in a level frame turned by the heading: (cos φ sin θ, −sin φ, cos φ
+    // cos θ).
     let (ahead, right) = (cos * force.x + sin * force.y, cos * force.y - sin * force.x);
     let axis = [-ahead / norm, -right / norm, -force.z / norm];
     let roll = libm::asinf((-axis[1]).clamp(-1.0, 1.0));
@@ -99,7 +100,7 @@ impl Snapshot {
     }
 
     pub(super) fn battery_volts(&self) -> f32 {
-        // Four cells between BAT1_V_EMPTY and BAT1_V_CHARGED.
+        // Four cells, each from BAT1_V_EMPTY (3.6 V) to BAT1_V_CHARGED (4.05 V).
         4.0 * (3.6 + 0.45 * self.battery)
     }
 

@@ -1,30 +1,30 @@
-//! What a firmware reports of its state.
+//! State of the autopilot that telemetry reports.
 
 use crate::AutopilotKind;
 
-/// State of the firmware that telemetry reports.
+/// State of the autopilot in one step, for telemetry.
 #[derive(Clone, Copy, Debug)]
 pub struct FirmwareStatus {
-    /// Which firmware it is.
+    /// Which autopilot it is.
     pub autopilot: AutopilotKind,
     /// `custom_mode` of HEARTBEAT.
     pub custom_mode: u32,
-    /// The mode that was asked for, whatever a failsafe flies.
+    /// `custom_mode` of the mode that was last requested, even while a failsafe flies another.
     pub intended_mode: u32,
-    /// MAV_MODE_FLAG.
+    /// `base_mode` of HEARTBEAT (MAV_MODE_FLAG).
     pub flags: u8,
-    /// MAV_STATE.
+    /// `system_status` of HEARTBEAT (MAV_STATE).
     pub system_status: u8,
-    /// The arming checks pass.
+    /// Whether the arming checks pass.
     pub armable: bool,
     /// MAV_LANDED_STATE.
     pub landed_state: u8,
-    /// Follows setpoints.
+    /// Whether the mode reports its target by POSITION_TARGET_LOCAL_NED.
     pub guided: bool,
-    /// ArduPilot's flags of EKF_STATUS_REPORT.
+    /// `flags` of ArduPilot's EKF_STATUS_REPORT.
     pub ekf_flags: u16,
-    /// The estimator has an origin.
+    /// Whether the estimator has an origin.
     pub origin_known: bool,
-    /// The estimator has a position.
+    /// Whether the estimator has a position.
     pub position_known: bool,
 }

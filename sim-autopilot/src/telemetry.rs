@@ -1,8 +1,8 @@
-//! What the simulated autopilot says. PX4's streams of an onboard link are here as 1.17 was seen to
-//! send them unasked; ArduCopter's are with its personality.
+//! Telemetry of the simulated autopilots. The stream rates here are those that PX4 1.17 was
+//! observed to send on an onboard link without a request; ArduCopter's are in `ardupilot`.
 //!
-//! A message is put together only when it is due, from a [`Snapshot`] taken once for all that are
-//! due in the same step.
+//! A message is encoded only when it is due, from a [`Snapshot`] that is taken once for all
+//! messages of a step.
 
 use mavlink::dialects::ardupilotmega as dialect;
 
@@ -11,7 +11,7 @@ use super::messages::{self, to_mavlink_units};
 use super::port::Port;
 use super::snapshot::Snapshot;
 
-/// Message id and interval in microseconds of each stream; 0 is off until asked for.
+/// PX4's telemetry streams: message id and default interval in µs; 0: off until requested.
 pub const STREAMS: [(u32, u32); 32] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 200_000),     // SYS_STATUS
@@ -48,7 +48,7 @@ pub const STREAMS: [(u32, u32); 32] = [
 ];
 
 impl Snapshot {
-    /// Sends one message; false where there is no such message.
+    /// Queues message `id` at a port; false if there is no such message.
     pub fn send(&self, id: u32, port: &mut Port) -> bool {
         self.send_state(id, port)
             || self.send_attitude(id, port)
@@ -57,7 +57,7 @@ impl Snapshot {
             || self.send_camera(id, port)
     }
 
-    /// Sends the autopilot's identity and state.
+    /// Queues a message about the autopilot's identity or state; false for any other id.
     fn send_state(&self, id: u32, port: &mut Port) -> bool {
         match id {
             0 => self.send_heartbeat(port),
@@ -81,13 +81,13 @@ impl Snapshot {
             111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
             AUTOPILOT_VERSION => self.send_version(port),
             245 => {
-                // Two bytes: vtol_state undefined or, as ArduCopter says, multicopter; and the
-                // landed state.
+                // Two bytes: vtol_state undefined (PX4) or multicopter (ArduCopter), then
+                // landed_state.
                 let vtol = if self.is_px4() { 0 } else { 3 };
                 port.send_raw(245, &[vtol, self.status.landed_state]);
             }
             PROTOCOL_VERSION => {
-                // Version 2.00, 1.00 at least, 2.00 at most; no hashes.
+                // Version 2.00, at least 1.00, at most 2.00; no hashes.
                 let mut payload = [0; 22];
                 for (at, version) in [(0, 200_u16), (2, 100), (4, 200)] {
                     payload[at..at + 2].copy_from_slice(&version.to_le_bytes());
@@ -105,7 +105,7 @@ impl Snapshot {
         true
     }
 
-    /// Sends attitude messages.
+    /// Queues an attitude message; false for any other id.
     fn send_attitude(&self, id: u32, port: &mut Port) -> bool {
         match id {
             30 => {
@@ -147,10 +147,10 @@ impl Snapshot {
         true
     }
 
-    /// Sends position, motion and setpoint.
+    /// Queues a message about position, motion or setpoint; false for any other id.
     fn send_position(&self, id: u32, port: &mut Port) -> bool {
         match id {
-            // PX4 sends it only while the estimate is valid.
+            // Sent only while the position estimate is valid, as PX4 does.
             32 if !self.status.position_known => {}
             32 => {
                 let (p, v) = (self.ned.cast::<f32>(), self.velocity.cast::<f32>());
@@ -165,7 +165,7 @@ impl Snapshot {
                 });
             }
             33 => self.send_global_position(port),
-            // Not before there is an origin.
+            // Not sent before there is an origin.
             49 if !self.status.origin_known => {}
             49 => {
                 let (latitude, longitude, altitude) = to_mavlink_units(&self.ekf_origin);
@@ -201,7 +201,7 @@ impl Snapshot {
         true
     }
 
-    /// Sensors, motors, battery and what the estimator thinks of itself.
+    /// Queues a message about sensors, motors, battery or estimator; false for any other id.
     fn send_sensor(&self, id: u32, port: &mut Port) -> bool {
         match id {
             24 => self.send_gps(port),
@@ -247,7 +247,7 @@ impl Snapshot {
     }
 }
 
-/// The payload of PING, whose type the crate calls deprecated.
+/// Encodes the payload of PING, whose type is deprecated in the crate.
 pub fn ping_payload(time_us: u64, seq: u32, system: u8, component: u8) -> [u8; 14] {
     let mut payload = [0; 14];
     payload[..8].copy_from_slice(&time_us.to_le_bytes());

@@ -1,29 +1,30 @@
-//! The multicopter itself: what its controller demands and how it moves.
+//! The simulated multicopter: position controller and motion.
 //!
-//! The controller is the cascade of PX4's `mc_pos_control`: position P, velocity PID (integral with
-//! anti-windup, derivative on measured acceleration), and the acceleration it asks for bounded by
-//! tilt and thrust. The airframe answers through a jerk limit and a first-order lag (attitude and
-//! motors together), and drag towards the wind. Because drag is not fed forward, a velocity asked
-//! for is flown 10–20 % slow until the integral has caught up, as PX4 was seen to do.
+//! The controller is the cascade of PX4's `mc_pos_control`: P on position, PID on velocity
+//! (integral with anti-windup, derivative of the measured acceleration); tilt and thrust limit the
+//! acceleration that it commands. The airframe responds to that with a jerk limit and a first-order
+//! lag (attitude and motors together); drag acts on it. Drag is not fed forward, so a commanded
+//! velocity is flown 10–20 % too slow until the integral has compensated, as in recordings of PX4.
 //!
-//! ENU, metres, seconds. One step is about a hundred floating-point operations; no trigonometry.
+//! ENU, metres, seconds. One step takes about a hundred floating-point operations, none of them
+//! trigonometric.
 
 use nalgebra::Vector3;
 use planner_core::Point;
 
 /// Standard gravity, m/s².
 pub const GRAVITY: f32 = 9.806_65;
-/// Height over its resting place below which a vehicle touches the ground, metres.
+/// Height above its resting position below which a vehicle counts as touching the ground, metres.
 const GROUND_CONTACT_M: f32 = 0.002;
 
-/// Vertical push of wind as a share of the horizontal push: rotors meet the air edge-on when it
-/// comes from the side.
+/// Factor on the vertical acceleration by wind, relative to the horizontal: rotors have little area
+/// against vertical air.
 const VERTICAL_WIND_SHARE: f32 = 0.2;
 
-/// Limits of the airframe.
+/// Limits and dynamics of the airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleLimits {
-    /// Radius of the body, metres: it rests with its centre this far above the ground.
+    /// Radius of the body, metres: at rest its centre is this high above the ground.
     pub radius_m: f32,
     /// Horizontal speed limit, m/s (`MPC_XY_VEL_MAX`).
     pub speed_max_mps: f32,
@@ -37,22 +38,23 @@ pub struct VehicleLimits {
     pub jerk_max_mps3: f32,
     /// Tilt limit, degrees (`MPC_TILTMAX_AIR`).
     pub tilt_max_deg: f32,
-    /// Time constant of attitude and motors, seconds.
+    /// Time constant of the response to commanded acceleration (attitude and motors), seconds.
     pub lag_s: f32,
-    /// Drag: acceleration for each m/s flown in still air, 1/s.
+    /// Drag: deceleration for each m/s of velocity, 1/s.
     pub drag_per_s: f32,
     /// Acceleration for each m/s of wind, 1/s.
     pub wind_per_s: f32,
-    /// Time in the hover from full to empty, seconds.
+    /// Time to hover from full to empty battery, seconds.
     pub endurance_s: f32,
 }
 
 impl Default for VehicleLimits {
-    /// PX4's quadrotor defaults, and the drag of its SIH (`SIH_KDV` 1 N s/m at `SIH_MASS` 1 kg),
-    /// with which the recorded flights are flown again to 0.2 m. No real vehicle has that much, so
-    /// wind moves it half as much, and still rather too much: PX4's estimator assumes 0.17 1/s at 3
-    /// m/s (`EKF2_MCOEF` 0.15 1/s beside `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured at 0.39
-    /// and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
+    /// PX4's quadrotor defaults, with the drag of its simulator SIH (`SIH_KDV` 1 N s/m at
+    /// `SIH_MASS` 1 kg): with it a replay of the recorded flights stays within 0.2 m. Real vehicles
+    /// have less drag. So wind accelerates half as much as drag would suggest, still rather too
+    /// much: PX4's estimator assumes 0.17 1/s at 3 m/s (`EKF2_MCOEF` 0.15 1/s beside `EKF2_BCOEF_X`
+    /// 100 kg/m²); a light racer was measured at 0.39 and 0.54 1/s (Faessler, Franchi and
+    /// Scaramuzza 2018).
     fn default() -> Self {
         Self {
             radius_m: 0.3,
@@ -75,72 +77,72 @@ impl Default for VehicleLimits {
 pub struct TrueState {
     /// Centre of the body, ENU metres.
     pub position: Point,
-    /// ENU, m/s.
+    /// Velocity, ENU m/s.
     pub velocity: Point,
-    /// Acceleration without gravity's share carried by the ground, ENU, m/s².
+    /// Acceleration, ENU m/s²; zero while the ground carries the vehicle.
     pub acceleration: Point,
     /// Heading, radians clockwise from north.
     pub heading_rad: f32,
-    /// Change of heading, rad/s.
+    /// Rate of turn, rad/s clockwise.
     pub heading_rate: f32,
     /// Whether the body touches the ground.
     pub touching: bool,
-    /// Motors on.
+    /// Whether the motors are on.
     pub armed: bool,
-    /// The autopilot believes to be on the ground.
+    /// Whether the autopilot's land detector reports the vehicle on the ground.
     pub landed: bool,
-    /// Battery charge left, 0 to 1.
+    /// Remaining battery charge, 0 to 1.
     pub battery: f32,
 }
 
-/// Demand of a flight mode to the controller, ENU. NaN on an axis demands nothing of it, as in
+/// What a flight mode demands of the position controller, ENU. NaN on an axis: no demand, as in
 /// PX4's `trajectory_setpoint`.
 #[derive(Clone, Copy, Debug)]
 pub struct Demand {
-    /// Position, metres.
+    /// Demanded position, metres.
     pub position: Point,
-    /// Velocity, or the feed-forward beside a position, m/s.
+    /// Demanded velocity, m/s; feed-forward on axes with a demanded position.
     pub velocity: Point,
     /// Acceleration feed-forward, m/s².
     pub acceleration: Point,
-    /// Heading, radians clockwise from north.
+    /// Demanded heading, radians clockwise from north; NaN: `heading_rate` counts.
     pub heading: f32,
-    /// Change of heading where no heading is asked for, rad/s.
+    /// Demanded rate of turn if `heading` is NaN, rad/s.
     pub heading_rate: f32,
-    /// Bound on horizontal speed, m/s.
+    /// Limit of horizontal speed, m/s.
     pub speed_max: f32,
-    /// Bound on climbing, m/s; below zero it keeps the vehicle pressed to the ground.
+    /// Limit of the climb rate, m/s; a negative one keeps the vehicle on the ground.
     pub climb_max: f32,
-    /// Bound on sinking, m/s.
+    /// Limit of the descent rate, m/s.
     pub descend_max: f32,
-    /// Acceleration up that is flown whatever else is asked for, m/s²; NaN leaves height to the
-    /// cascade.
+    /// Upward acceleration that replaces the vertical control, m/s²; NaN: the cascade controls the
+    /// height.
     pub lift_off: f32,
-    /// Least thrust as a share of the weight.
+    /// Least thrust, as a fraction of the weight.
     pub thrust_min: f32,
-    /// Share of the change of the height in the rate of climb that is controlled, 0 to 1; the rest
-    /// is the estimated velocity.
+    /// Weight (0 to 1) of the height's rate of change in the climb rate that is controlled; the
+    /// rest is the estimated velocity.
     pub height_rate_share: f32,
 }
 
-/// Gains and bounds, from the parameters of the same name.
+/// Gains and limits of the controller, read from the parameters named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
-    /// `MPC_XY_P`, `MPC_Z_P`, 1/s.
+    /// Position gains, horizontal and vertical: `MPC_XY_P`, `MPC_Z_P`, 1/s.
     pub position: [f32; 2],
-    /// `MPC_XY_VEL_P_ACC`, `MPC_Z_VEL_P_ACC`, 1/s.
+    /// Proportional gains of velocity: `MPC_XY_VEL_P_ACC`, `MPC_Z_VEL_P_ACC`, 1/s.
     pub velocity_p: [f32; 2],
-    /// `MPC_XY_VEL_I_ACC`, `MPC_Z_VEL_I_ACC`, 1/s².
+    /// Integral gains of velocity: `MPC_XY_VEL_I_ACC`, `MPC_Z_VEL_I_ACC`, 1/s².
     pub velocity_i: [f32; 2],
-    /// `MPC_XY_VEL_D_ACC`, `MPC_Z_VEL_D_ACC`.
+    /// Derivative gains of velocity: `MPC_XY_VEL_D_ACC`, `MPC_Z_VEL_D_ACC`.
     pub velocity_d: [f32; 2],
-    /// Tangent of `MPC_TILTMAX_AIR`.
+    /// Tangent of the largest tilt, `MPC_TILTMAX_AIR`.
     pub tilt_tan: f32,
-    /// `MPC_YAWRAUTO_MAX`, rad/s.
+    /// Largest rate of turn, `MPC_YAWRAUTO_MAX`, rad/s.
     pub heading_rate_max: f32,
 }
 
-/// One simulated airframe with its position controller.
+/// One simulated airframe with its position controller and true state.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
     limits: VehicleLimits,
@@ -148,14 +150,14 @@ pub struct Vehicle {
     position: Vector3<f64>,
     thrust: Point,
     integral: Point,
-    /// Velocity the cascade asks for, for telemetry.
+    /// Velocity that the cascade commands, ENU m/s; for telemetry.
     pub velocity_setpoint: Point,
-    /// Acceleration the cascade asks for, for telemetry.
+    /// Acceleration that the cascade commands, ENU m/s²; for telemetry and the airframe.
     pub acceleration_setpoint: Point,
 }
 
 impl Vehicle {
-    /// A vehicle at rest.
+    /// A vehicle at rest at `position`, disarmed, with a full battery.
     pub fn new(limits: VehicleLimits, position: Point) -> Self {
         let state = TrueState {
             position,
@@ -179,53 +181,55 @@ impl Vehicle {
         }
     }
 
-    /// The truth.
+    /// The true state.
     pub fn state(&self) -> &TrueState {
         &self.state
     }
 
-    /// Position in full precision, ENU metres.
+    /// True position in double precision, ENU metres.
     pub fn position(&self) -> &Vector3<f64> {
         &self.position
     }
 
-    /// Limits of the airframe.
+    /// Limits and dynamics of the airframe.
     pub fn limits(&self) -> &VehicleLimits {
         &self.limits
     }
 
-    /// Acceleration of thrust and gravity, m/s²: it points as the tilted body does.
+    /// Acceleration by thrust alone, without gravity, ENU m/s²: it points along the body's vertical
+    /// axis.
     pub fn specific_force(&self) -> Point {
         Point::new(self.thrust.x, self.thrust.y, self.thrust.z + GRAVITY)
     }
 
-    /// Sets the armed and landed flags that the autopilot's state machine decided.
+    /// Records whether the autopilot is armed and reports landed.
     pub fn set_flags(&mut self, armed: bool, landed: bool) {
         self.state.armed = armed;
         self.state.landed = landed;
     }
 
-    /// Turns the vehicle at rest, radians clockwise from north.
+    /// Sets the heading of a vehicle at rest, radians clockwise from north.
     pub fn set_heading(&mut self, heading_rad: f32) {
         self.state.heading_rad = wrap_pi(heading_rad);
     }
 
-    /// Sets the charge left, 0 to 1.
+    /// Sets the remaining battery charge, 0 to 1.
     pub fn set_battery(&mut self, charge: f32) {
         self.state.battery = charge.clamp(0.0, 1.0);
     }
 
-    /// Forgets the integral, as PX4 does on the ground.
+    /// Sets the velocity controller's integral to zero, as PX4 does on the ground.
     pub fn reset_integral(&mut self) {
         self.integral = Point::zeros();
     }
 
-    /// Sets the integral to what was asked of the airframe beyond what it does.
+    /// Sets the integral to the commanded acceleration minus the true one.
     pub fn match_integral_to_demand(&mut self) {
         self.integral = self.acceleration_setpoint - self.state.acceleration;
     }
 
-    /// Runs the cascade for one step from the *estimated* position and velocity.
+    /// Computes commanded velocity, acceleration and heading for one step of `dt` seconds.
+    /// `position` and `velocity` are those of the estimate.
     pub fn control(
         &mut self,
         demand: &Demand,
@@ -265,7 +269,8 @@ impl Vehicle {
             self.integral.z = 0.0;
             error.z = 0.0;
         }
-        // Thrust never reverses and gives at most twice the weight (hover at half throttle).
+        // Thrust is never negative and at most twice the weight, since hovering takes half
+        // throttle.
         let bounded_z = asked.z.clamp((demand.thrust_min - 1.0) * GRAVITY, GRAVITY);
         let across = libm::sqrtf(asked.x * asked.x + asked.y * asked.y);
         let across_max =
@@ -279,7 +284,8 @@ impl Vehicle {
         }
         for axis in 0..3 {
             let saturated = if axis == 2 { saturated_z } else { saturated_xy };
-            // Anti-windup: while saturated only what shrinks the integral is added.
+            // Anti-windup: while the limit is reached, only an error that reduces the output is
+            // integrated.
             if !saturated || error[axis] * asked[axis] < 0.0 {
                 let k = usize::from(axis == 2);
                 self.integral[axis] = (self.integral[axis]
@@ -296,15 +302,15 @@ impl Vehicle {
         let rate = if demand.heading.is_nan() {
             if demand.heading_rate.is_nan() { 0.0 } else { demand.heading_rate.clamp(-max, max) }
         } else {
-            // MC_YAW_P 2.8, eased as the attitude loop eases it.
+            // Gain `MC_YAW_P` 2.8; the filter below stands for the attitude controller.
             (2.8 * wrap_pi(demand.heading - self.state.heading_rad)).clamp(-max, max)
         };
         self.state.heading_rate += (rate - self.state.heading_rate) * (dt / (dt + 0.1));
         self.state.heading_rad = wrap_pi(self.state.heading_rad + self.state.heading_rate * dt);
     }
 
-    /// Moves the body for one step. `lift` is false while the motors idle or are off; the ground
-    /// under the body lies at `ground_up_m`.
+    /// Moves the body for one step of `dt` seconds. `lift` is false while the motors idle or are
+    /// off; `ground_up_m` is the height of the ground below the body, metres ENU.
     pub fn advance(&mut self, lift: bool, wind: &Point, ground_up_m: f32, dt: f32) {
         let rest = f64::from(ground_up_m + self.limits.radius_m);
         let clearance = (self.position.z - rest) as f32;
@@ -320,7 +326,7 @@ impl Vehicle {
             wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE)) * self.limits.wind_per_s;
         let mut acceleration = self.thrust + push - self.state.velocity * self.limits.drag_per_s;
         if clearance <= GROUND_CONTACT_M && acceleration.z <= 0.0 {
-            // The ground carries what thrust does not, and friction holds the feet.
+            // The ground carries the weight that thrust does not, and friction prevents sliding.
             acceleration = Point::zeros();
             self.state.velocity = Point::zeros();
             self.position.z = rest;
@@ -340,8 +346,8 @@ impl Vehicle {
         self.drain_battery(lift, dt);
     }
 
-    /// Power grows with the acceleration beyond hovering and, slightly, with speed; idle motors and
-    /// the board take 4 %.
+    /// Discharges the battery. Power grows with the upward acceleration and slightly with speed;
+    /// idle motors and electronics take 4 % of the hover power.
     fn drain_battery(&mut self, lift: bool, dt: f32) {
         let load = if lift {
             power_ratio_at_speed(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0)
@@ -352,8 +358,7 @@ impl Vehicle {
     }
 }
 
-/// The angle within ±π; exact for one turn too many either way, which is all that adding bounded
-/// rates can cause.
+/// The angle within ±π. Correct for angles within ±3π, which adding a bounded rate never exceeds.
 pub fn wrap_pi(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {
@@ -365,7 +370,7 @@ pub fn wrap_pi(angle: f32) -> f32 {
     }
 }
 
-/// Power at this speed, as a multiple of that in a hover.
+/// Power at this speed relative to hovering.
 pub fn power_ratio_at_speed(speed_mps: f32) -> f32 {
     1.0 + 0.004 * speed_mps * speed_mps
 }

@@ -1,17 +1,17 @@
-//! Reading payloads by field.
+//! Reads MAVLink payloads field by field.
 //!
-//! The crate's types refuse a whole message for one enum value they do not know (a COMMAND_LONG
-//! with an unknown command, say), but such a command has to be answered UNSUPPORTED. So what comes
-//! in is read at the byte offsets of the wire order (fields sorted by size, extensions last); what
-//! V2 cut from the end reads as zero.
+//! The `mavlink` crate's types reject a whole message for one unknown enum value (such as a
+//! COMMAND_LONG with an unknown command), but such a command must be answered UNSUPPORTED. So
+//! fields are read at their byte offsets in wire order (sorted by size, extensions last). Zeros
+//! that MAVLink 2 cut from the payload's end read as zero.
 
 use super::frame::Frame;
 
-/// A payload with its cut zeros put back.
+/// A payload padded with zeros to 255 bytes.
 pub struct PayloadReader<'a>(&'a [u8; 255]);
 
 impl<'a> PayloadReader<'a> {
-    /// Fields of a frame.
+    /// The payload of `frame`.
     pub fn new(frame: &'a Frame) -> Self {
         Self(frame.padded())
     }
@@ -57,7 +57,7 @@ impl<'a> PayloadReader<'a> {
         f32::from_le_bytes(self.bytes(at))
     }
 
-    /// A text of at most `N` bytes up to its first zero; `None` if it is not UTF-8.
+    /// A text of at most `N` bytes that ends at its first zero byte; `None` if it is not UTF-8.
     pub fn text<const N: usize>(&self, at: usize) -> Option<&str> {
         let bytes = &self.0[at..at + N];
         let end = bytes.iter().position(|&b| b == 0).unwrap_or(N);

@@ -1,5 +1,5 @@
-//! Programs for boards: by rustup's target where there is one, else by Debian's toolchain, which
-//! builds `core` itself.
+//! Builds programs for boards: by rustup's compiler if it has the target, else by Debian's, which
+//! also builds `core`.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::install;
 use crate::shell::{cargo, command, target_dir};
 
-/// A board of the firmware.
+/// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Board {
     /// QEMU's mps2-an500, a Cortex-M7 with the memory of the STM32H743.
@@ -22,25 +22,25 @@ pub enum Board {
     Pico2,
 }
 
-/// A memory of a board.
+/// A RAM of a board.
 pub struct Region {
-    /// Name of its row.
+    /// Name of its row in `cargo xtask size`.
     pub name: &'static str,
-    /// Its first byte.
+    /// Address of its first byte.
     pub at: u64,
-    /// Its bytes.
+    /// Its size, bytes.
     pub len: usize,
-    /// Bytes that statics may take.
+    /// Budget of statics in it, bytes.
     pub most: usize,
-    /// Whether the stack lies in it too.
+    /// Whether it holds the stack too.
     pub has_stack: bool,
 }
 
 impl Board {
-    /// All of them.
+    /// All boards.
     pub const ALL: [Self; 3] = [Self::Qemu, Self::NucleoH743, Self::Pico2];
 
-    /// Its name, which is the firmware's feature.
+    /// Name on the command line, which is also the firmware's cargo feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::Qemu => "qemu",
@@ -49,7 +49,7 @@ impl Board {
         }
     }
 
-    /// Most bytes of flash that the program may take.
+    /// Budget of the program in flash, bytes.
     pub fn flash_budget(self) -> usize {
         match self {
             Self::Qemu | Self::NucleoH743 => 512 << 10,
@@ -57,7 +57,7 @@ impl Board {
         }
     }
 
-    /// Its memories, as its `memory.x` has them, and how much of each statics may take.
+    /// The board's RAMs, as in its `memory.x`, with the budget of statics in each.
     pub fn regions(self) -> &'static [Region] {
         const fn region(
             name: &'static str,
@@ -68,7 +68,7 @@ impl Board {
         ) -> Region {
             Region { name, at, len: len << 10, most: most << 10, has_stack }
         }
-        // The companion, crash record and guard have 40 kB of DTCM, the stack the rest.
+        // In DTCM companion, crash record and stack guard have 40 kB; the stack has the rest.
         const H743: &[Region] = &[
             region("axi_bytes", 0x2400_0000, 512, 400, false),
             region("dtcm_bytes", 0x2000_0000, 128, 36, true),
@@ -77,7 +77,7 @@ impl Board {
             region("sram4_bytes", 0x3800_0000, 64, 32, false),
             region("itcm_bytes", 0x400, 63, 63, false),
         ];
-        // The same, elsewhere; its UARTs' 10 kB of bytes lie in AXI SRAM.
+        // The same sizes at other addresses; the emulated UARTs' buffers (10 kB) lie in AXI SRAM.
         const QEMU: &[Region] = &[
             region("axi_bytes", 0x2000_0000, 512, 400, false),
             region("dtcm_bytes", 0x2008_0000, 128, 36, true),
@@ -111,7 +111,7 @@ impl Board {
         }
     }
 
-    /// The programs made for it.
+    /// The programs that are built for the board.
     pub fn programs(self) -> &'static [&'static str] {
         match self {
             Self::Qemu => &["flockmate", "measure", "calls", "limits"],
@@ -120,15 +120,15 @@ impl Board {
     }
 }
 
-/// A board's programs.
+/// The programs that were built for a board.
 pub struct Built {
-    /// The directory they are in.
+    /// Directory that holds them.
     pub folder: PathBuf,
-    /// What the compiler warned of, if not in this build then in an earlier one.
+    /// Number of the compiler's warnings, repeated ones of earlier builds included.
     pub warnings: usize,
 }
 
-/// Builds a board's programs.
+/// Builds a board's programs and copies them to a directory of that board.
 pub fn build(board: Board) -> Result<Built> {
     let target = board.target();
     let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
@@ -154,24 +154,25 @@ pub fn build(board: Board) -> Result<Built> {
         cargo.args(["-Zbuild-std=core,alloc", "-Zbuild-std-features=compiler-builtins-mem"]);
         cargo
     };
-    // Level 2, below, inlines as much as level 3: roadmaps are built as fast.
+    // With this threshold opt-level 2 (below) inlines as much as 3: building a roadmap takes no
+    // longer.
     flags += &format!("-Ctarget-cpu={} -Cllvm-args=-inline-threshold=275", board.cpu());
     building
         .args(arguments)
         .arg(board.name())
         .args(programs)
         .env(variable(target, "RUSTFLAGS"), flags);
-    // Either would take the place of the flags above.
+    // Either variable would replace the flags set above.
     building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
     building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
-    // A tenth less code than level 3, for no more instructions of a control step.
+    // A tenth less code than opt-level 3, and a control step takes no more instructions.
     building.args(["--config", "profile.release.opt-level=2"]);
     building.args(["--config", "profile.release.package.planner-core.opt-level=3"]);
-    // The chip's drivers set registers: small is as fast.
+    // The chip's drivers only set registers: optimized for size they are as fast.
     building.args(["--config", "profile.release.package.embassy-stm32.opt-level='s'"]);
     let warnings = compile(&mut building)?;
-    // Programs of two boards have one name, and what they are made of is shared: so the programs
-    // are put aside.
+    // The programs of two boards have the same names, and cargo shares their directory: so they are
+    // copied.
     let aside = products.join(board.name());
     std::fs::create_dir_all(&aside)?;
     for program in board.programs() {
@@ -180,7 +181,7 @@ pub fn build(board: Board) -> Result<Built> {
     Ok(Built { folder: aside, warnings })
 }
 
-/// Runs a `cargo build`, shows what the compiler says, and counts its warnings.
+/// Runs a `cargo build`, prints the compiler's messages and returns the number of warnings.
 fn compile(building: &mut Command) -> Result<usize> {
     let mut child = building
         .arg("--message-format=json")
@@ -189,7 +190,7 @@ fn compile(building: &mut Command) -> Result<usize> {
         .with_context(|| format!("cannot start {building:?}"))?;
     let mut warnings = 0;
     for line in BufReader::new(child.stdout.take().context("its output is piped")?).lines() {
-        // What is no message of cargo's is nothing to us.
+        // A line that is no JSON message of cargo is ignored.
         let line: Value = serde_json::from_str(&line?).unwrap_or_default();
         let message = &line["message"];
         eprint!("{}", message["rendered"].as_str().unwrap_or_default());
@@ -200,7 +201,7 @@ fn compile(building: &mut Command) -> Result<usize> {
     Ok(warnings)
 }
 
-/// Cargo's environment variable for a target's setting.
+/// Name of cargo's environment variable for a setting of a target.
 fn variable(target: &str, name: &str) -> String {
     format!("CARGO_TARGET_{}_{name}", target.to_uppercase().replace(['-', '.'], "_"))
 }

@@ -1,4 +1,5 @@
-//! `cargo xtask bench`: builds the C++ baseline, then runs the bench beside it.
+//! `cargo xtask bench`: builds the C++ baseline, then runs the bench that compares our programs
+//! with it.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +9,10 @@ use crate::bare_metal::{self, Board};
 use crate::install;
 use crate::shell::{cargo, command, root, run, target_dir};
 
-/// Where the baseline lies, seen from the checkout.
+/// Source of the C++ baseline, relative to the checkout.
 const PEER: &str = "../shared/peers/algorithm1.cpp";
 
-/// What may be chosen.
+/// Arguments of `bench`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Write the rows to this file as JSON.
@@ -22,22 +23,23 @@ pub struct Args {
     /// range.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
-    /// A checkout of cvar-upm/multi_uav_planning_binpat, which the coverage rows are beside.
+    /// A checkout of cvar-upm/multi_uav_planning_binpat, with which the coverage rows are compared.
     #[arg(long, value_name = "DIR")]
     binpat: Option<PathBuf>,
-    /// A checkout of Fields2Cover/Fields2Cover, which its rows are beside.
+    /// A checkout of Fields2Cover/Fields2Cover, with which its rows are compared.
     #[arg(long, value_name = "DIR")]
     fields2cover: Option<PathBuf>,
-    /// Seeds of each case of the deconfliction suite, or of each range.
+    /// Number of random seeds: for each case of the deconfliction suite, or each of the range
+    /// suite.
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// How many meetings, or forged frames of the hostile suite.
+    /// Number of meetings, or of forged frames in the hostile suite.
     #[arg(long, value_name = "N")]
     n: Option<u64>,
 }
 
-/// Runs every bench; the rows that need the baseline are skipped with a line where it cannot be
-/// built.
+/// Runs the chosen bench, or all. Where the C++ baseline cannot be built, its rows are skipped and
+/// a line gives the reason.
 pub fn run_bench(args: &Args) -> Result<()> {
     let run_release = ["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin"];
     let mut bench = cargo();
@@ -87,7 +89,8 @@ pub fn run_bench(args: &Args) -> Result<()> {
     run(&mut bench)
 }
 
-/// The baseline built as its own header says, if its source is newer than the program.
+/// Builds the C++ baseline with the options that its file's header gives, if its source is newer
+/// than the program. Returns the program's path.
 fn peer() -> Result<PathBuf> {
     let source = root().join(PEER);
     let modified = |file: &Path| file.metadata().and_then(|m| m.modified());

@@ -1,18 +1,18 @@
-//! `cargo xtask build`.
+//! `cargo xtask build`: builds the firmware.
 
 use anyhow::Result;
 
 use crate::bare_metal::{self, Board};
 
-/// What to build.
+/// Arguments of `build`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// For which board; all of them if it is not given.
+    /// Board to build for; all boards if not given.
     #[arg(long, value_name = "BOARD")]
     board: Option<Board>,
 }
 
-/// Builds the firmware and says where it is.
+/// Builds the firmware and prints the paths of its programs.
 pub fn run(args: &Args) -> Result<()> {
     for board in
         Board::ALL.into_iter().filter(|board| args.board.is_none_or(|wanted| wanted == *board))

@@ -1,8 +1,8 @@
-//! `cargo xtask emulate`: the demo's first vehicles flown by boards in QEMU.
+//! `cargo xtask emulate`: flies the demo's first vehicles by boards emulated in QEMU.
 //!
-//! Each board is the firmware as it is flashed, roadmap and mission in its flash.
-//! `host-sim fly --emulate` is autopilots, radio and ground station to them, in lock step: the
-//! flight depends on no clock and no load.
+//! Each board runs the firmware as it is flashed, with roadmap and mission in its flash.
+//! `host-sim fly --emulate` simulates autopilots, radio and ground station in lock step with the
+//! boards: the flight does not depend on the machine's clock or load.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -16,31 +16,32 @@ use crate::shell::{cargo, command, root, run, target_dir};
 
 /// The scenario whose first vehicles fly.
 const DEMO: &str = "host-sim/scenarios/demo.toml";
-/// Where the tables of its vehicles begin.
+/// Line with which each vehicle's table begins in the scenario.
 const VEHICLE: &str = "[[vehicles]]";
-/// Setpoints are 50 ms apart; a board whose tasks keep their time adds less than a millisecond.
+/// Longest permitted gap between two setpoints, milliseconds: they are due every 50 ms, and a board
+/// whose tasks run in time adds less than 1 ms.
 const GAP_MS: usize = 51;
 
-/// What to fly.
+/// Arguments of `emulate`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// How many boards
+    /// Number of boards
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=10))]
     vehicles: u8,
-    /// Directory for what `host-sim fly` writes, and what each board logs
+    /// Directory for the files of `host-sim fly` and each board's log
     #[arg(long, value_name = "DIR", default_value = "out/emulate")]
     out: PathBuf,
 }
 
 impl Default for Args {
-    /// What CI flies.
+    /// The flight that CI runs.
     fn default() -> Self {
         Self { vehicles: 3, out: target_dir().join("emulate") }
     }
 }
 
-/// Builds and flies; fails if the mission was not complete and clean. Returns how much of its stack
-/// a board used at most, bytes.
+/// Builds firmware and host-sim and flies. An error if the mission is not completed cleanly or
+/// setpoints come too late. Returns the deepest stack use of all boards, bytes.
 pub fn run_emulate(args: &Args) -> Result<usize> {
     install::debian(install::EMULATOR)?;
     let firmware = bare_metal::build(Board::Qemu)?.folder.join("flockmate");
@@ -62,16 +63,16 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
     stacks.into_iter().max().context("no board reported its stack")
 }
 
-/// What boards reported.
+/// Numbers that boards reported by STATUSTEXT or log, one of each board.
 #[derive(Default)]
 struct Reported {
-    /// The longest time between two setpoints, milliseconds.
+    /// Longest gap between two setpoints of each board, milliseconds.
     gaps_ms: Vec<usize>,
-    /// Bytes of the stack that were used.
+    /// Deepest use of each board's stack, bytes.
     stacks: Vec<usize>,
 }
 
-/// Flies, and shows what comes of it.
+/// Runs `host-sim fly`, prints its output and collects the boards' reports from it.
 fn fly(firmware: &Path, scenario: &Path, out: &Path) -> Result<Reported> {
     let mut fly = command(target_dir().join("release/host-sim"));
     fly.arg("fly").arg(scenario).arg("--out").arg(out).arg("--emulate").arg(firmware);
@@ -87,13 +88,13 @@ fn fly(firmware: &Path, scenario: &Path, out: &Path) -> Result<Reported> {
     Ok(reported)
 }
 
-/// The number after `before` in what follows `name` in a line.
+/// The number that follows `before`, searched in the part of `line` after `name`.
 fn number(line: &str, name: &str, before: &str) -> Option<usize> {
     let (_, rest) = line.split_once(name)?.1.split_once(before)?;
     rest.split(' ').next()?.parse().ok()
 }
 
-/// The demo's first vehicles.
+/// The demo scenario cut to its first vehicles.
 fn cut_demo(vehicles: usize) -> Result<String> {
     let demo = std::fs::read_to_string(root().join(DEMO))
         .with_context(|| format!("cannot read: {DEMO}"))?;

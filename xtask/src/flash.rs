@@ -1,11 +1,11 @@
-//! `cargo xtask flash`: builds the firmware and gives it to a board on the desk, by probe-rs.
+//! `cargo xtask flash`: builds the firmware and writes it to a connected board, by probe-rs.
 
 use anyhow::{Result, bail, ensure};
 
 use crate::bare_metal::{self, Board};
 use crate::shell::{command, find, run};
 
-/// What to flash.
+/// Arguments of `flash`.
 #[derive(clap::Args)]
 pub struct Args {
     /// The board, behind a debug probe
@@ -13,7 +13,7 @@ pub struct Args {
     board: Board,
 }
 
-/// Builds and flashes.
+/// Builds the firmware, writes it to the board's flash, and resets the board.
 pub fn run_flash(args: &Args) -> Result<()> {
     let chip = match args.board {
         Board::Qemu => bail!("the board qemu is not flashed: cargo xtask emulate"),

@@ -1,4 +1,5 @@
-//! What the tests need beyond Rust: Debian packages when root, a venv for the Python clients.
+//! Installs what the tests need beyond Rust: Debian packages (if root), and a venv for the Python
+//! clients.
 
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -7,37 +8,38 @@ use anyhow::{Result, bail};
 
 use crate::shell::{command, find, run, target_dir};
 
-/// A Debian package and the file that shows it is there.
+/// A Debian package, and a file whose presence shows that it is installed.
 pub struct Package {
-    /// Its name.
+    /// Name of the package.
     pub name: &'static str,
-    /// A file it brings.
+    /// A file that the package installs.
     pub file: &'static str,
 }
 
-/// Debian's own Rust with the sources of `core`, for boards where rustup has no target.
+/// Debian's Rust with the sources of `core`: builds the firmware where rustup has no target for the
+/// boards.
 pub const BARE_METAL: &[Package] = &[
     Package { name: "rustc-web", file: "/usr/bin/rustc" },
     Package { name: "cargo-web", file: "/usr/bin/cargo" },
     Package { name: "rust-web-src", file: "/usr/share/doc/rust-web-src/copyright" },
     Package { name: "lld", file: "/usr/bin/ld.lld" },
 ];
-/// What emulates a board.
+/// The emulator of the board `qemu`.
 pub const EMULATOR: &[Package] =
     &[Package { name: "qemu-system-arm", file: "/usr/bin/qemu-system-arm" }];
-/// The browser that opens reports.
+/// The browser in which tests open reports.
 pub const BROWSER: &[Package] = &[Package { name: "chromium", file: "/usr/bin/chromium" }];
-/// The program the roadmap bench is measured beside.
+/// What the C++ baseline of the roadmap bench needs.
 pub const PEER: &[Package] = &[
     Package { name: "liboctomap-dev", file: "/usr/include/octomap/octomap.h" },
     Package { name: "g++", file: "/usr/bin/g++" },
 ];
-/// What counts instructions.
+/// The program that counts instructions on the host.
 pub const COUNTER: &[Package] = &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
 const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink", "MAVProxy"];
 
-/// Installs what is missing of `packages`, as root on Debian; else says in one line what to
-/// install.
+/// Installs those of `packages` that are missing, if root on Debian; otherwise the error names
+/// them.
 pub fn debian(packages: &[Package]) -> Result<()> {
     let missing: Vec<_> =
         packages.iter().filter(|p| !Path::new(p.file).exists()).map(|p| p.name).collect();
@@ -64,8 +66,8 @@ fn is_root() -> bool {
     id.is_ok_and(|out| out.stdout.trim_ascii() == b"0")
 }
 
-/// The Python of a venv with MAVSDK, pymavlink and MAVProxy, made in the target directory at the
-/// first call.
+/// Path of the Python of a venv with MAVSDK, pymavlink and MAVProxy. The first call creates the
+/// venv in the target directory.
 pub fn python_clients() -> Result<PathBuf> {
     let venv = target_dir().join("venv");
     let python = venv.join("bin/python");

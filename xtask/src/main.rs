@@ -1,5 +1,5 @@
-//! The developer's one entry: `cargo xtask test`, `bench`, and the firmware's `build`, `size`,
-//! `emulate` and `flash`.
+//! The developer's commands: `cargo xtask test`, `bench`, `structure`, and for the firmware
+//! `build`, `size`, `emulate` and `flash`.
 #![forbid(unsafe_code)]
 
 mod bare_metal;
@@ -20,19 +20,19 @@ use clap::Parser;
 #[derive(Parser)]
 #[command(about = "Flockmate developer commands")]
 enum Command {
-    /// Everything CI runs; installs what is missing, or says in one line what to install.
+    /// Runs everything that CI runs; installs missing packages, or names them in one line.
     Test(test::Args),
-    /// Our times beside those of other programs.
+    /// Measures our times beside those of other programs.
     Bench(bench::Args),
-    /// The firmware for a board.
+    /// Builds the firmware for a board.
     Build(build::Args),
-    /// The demo's first vehicles flown by boards in QEMU.
+    /// Flies the demo's first vehicles by boards emulated in QEMU.
     Emulate(emulate::Args),
-    /// What the firmware takes of a board's memory.
+    /// Shows how much of a board's memory the firmware takes.
     Size(size::Args),
-    /// Import cycles, large structs and long functions.
+    /// Checks the sources for import cycles, large structs and long functions.
     Structure,
-    /// The firmware onto a board behind a debug probe.
+    /// Writes the firmware to a board behind a debug probe.
     Flash(flash::Args),
 }
 

@@ -1,8 +1,8 @@
-//! `cargo xtask size`: what the firmware takes of a board's memory, by part.
+//! `cargo xtask size`: how much of a board's memory the firmware takes, part by part.
 //!
-//! Flash and statics are read from the linked program. The stack is measured in emulation: it is
-//! painted at the start, and what lost its paint in the emulated flight was used. The other boards
-//! run the same code, on nearly the same core: they get the same figure.
+//! Flash and statics are read from the linked program. The deepest stack is measured in emulation:
+//! the start fills the stack with a pattern, and words that lost it were used. The other boards run
+//! the same code on similar cores, so the figure is used for them too.
 
 use std::path::{Path, PathBuf};
 
@@ -14,10 +14,10 @@ use serde_json::json;
 use crate::bare_metal::{self, Board, Region};
 use crate::emulate;
 
-/// What to size.
+/// Arguments of `size`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The board
+    /// The board whose firmware is sized
     #[arg(long, value_name = "BOARD", default_value = "nucleo-h743")]
     board: Board,
     /// Write the rows to this file as JSON
@@ -25,7 +25,7 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Builds, flies for the stack, prints.
+/// Flies emulated boards for the stack, then builds the firmware for the board and prints its rows.
 pub fn run(args: &Args) -> Result<()> {
     let stack = emulate::run_emulate(&emulate::Args::default())?;
     let rows = rows(args.board, stack)?;
@@ -41,10 +41,10 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// A row: name, bytes, bytes there are or that are planned.
+/// A row: name, bytes taken, bytes available or budgeted.
 pub type Row = (&'static str, usize, usize);
 
-/// The rows of a board, printed. Too much is an error.
+/// Prints and returns the rows of a board. An error if a part takes more than its budget.
 pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
     let program = bare_metal::build(board)?.folder.join("flockmate");
     let Parts { code, constants, initialised, regions } = parts(&program, board)?;
@@ -70,7 +70,7 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
     for (name, ours, most) in &rows {
         ensure!(ours <= most, "{}: {name}: {ours} bytes are more than {most}", board.name());
     }
-    // The stack lies behind the statics of one memory.
+    // The stack shares one memory with statics: both together must fit.
     for region in board.regions().iter().filter(|region| region.has_stack) {
         let statics = rows.iter().find(|row| row.0 == region.name).map_or(0, |row| row.1);
         let all = statics + stack;
@@ -85,21 +85,21 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Most bytes of a stack.
+/// Budget of the stack, bytes.
 const STACK: usize = 64 << 10;
 
-/// Bytes of a program.
+/// Bytes that a program takes, by kind of section.
 #[derive(Default)]
 struct Parts {
     code: usize,
     constants: usize,
-    /// In flash and in memory.
+    /// Statics with initial values, which take flash and RAM.
     initialised: usize,
-    /// Statics of each of the board's memories.
+    /// Statics in each of the board's memories, in the order of [`Board::regions`].
     regions: Vec<usize>,
 }
 
-/// Adds up the sections of a program that take memory.
+/// Adds up the sizes of a program's sections by kind and memory.
 fn parts(program: &Path, board: Board) -> Result<Parts> {
     let bytes =
         std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;

@@ -1,8 +1,9 @@
-//! `cargo xtask structure`: which file imports which, and the shape of structs and functions.
+//! `cargo xtask structure`: checks the sources for import cycles between files, large structs and
+//! long functions.
 //!
-//! Read from the sources with `syn`. An import is any path that leaves its file: a `use`, a type, a
-//! call. What a `pub use` passes on counts as an import of the file that defines it. Test modules
-//! may import what they like; a `mod` line is no import.
+//! The sources are parsed with `syn`. Any path that names an item of another file is an import of
+//! that file: in a `use`, a type, a call. An item behind a `pub use` counts as an import of the
+//! file that defines it. Test modules may import anything; a `mod` line is no import.
 
 mod distances;
 mod imports;
@@ -15,12 +16,12 @@ use anyhow::{Result, ensure};
 
 use self::sources::Tree;
 
-/// The crates that are checked, by folder.
+/// Folders of the crates that are checked.
 const CRATES: [&str; 8] =
     ["fpu", "planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 
-/// Prints every cycle of imports and every struct or function beyond the limits; fails if there is
-/// one without a reason, or if docs/margins.md is not that of the sources.
+/// Prints every import cycle and every struct or function beyond the limits. An error if one of
+/// them has no listed reason, or if docs/margins.md does not match the sources.
 pub fn run() -> Result<()> {
     let mut wrong = 0;
     for name in CRATES {

@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything CI runs.
+//! `cargo xtask test`: runs everything that CI runs.
 
 use std::time::Instant;
 
@@ -8,11 +8,11 @@ use crate::bare_metal::{self, Board, Built};
 use crate::shell::{self, cargo};
 use crate::{emulate, install, size, structure};
 
-/// Packages and their examples, each a program that checks itself.
+/// Packages and an example of each, which fails if its own checks fail.
 const EXAMPLES: [(&str, &str); 3] =
     [("planner-core", "ten_uavs"), ("companion", "run_loop"), ("firmware", "smallest_board")];
 
-/// Which steps to run.
+/// Arguments of `test`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Only formatting, lints and the host's tests: no browser, no Python clients, no boards.
@@ -20,7 +20,7 @@ pub struct Args {
     quick: bool,
 }
 
-/// What is judged from the sources.
+/// Steps that check the sources only: format, lints, documentation, structure.
 fn sources() -> Result<()> {
     step("format", || shell::run(cargo().args(["fmt", "--all", "--check"])))?;
     step("lints", || {
@@ -52,7 +52,7 @@ fn sources() -> Result<()> {
     step("structure", structure::run)
 }
 
-/// Runs every step; the first failure ends it.
+/// Runs every step; stops at the first that fails.
 fn steps(args: &Args) -> Result<()> {
     sources()?;
     if args.quick {
@@ -75,7 +75,7 @@ fn steps(args: &Args) -> Result<()> {
         python = Some(install::python_clients()?);
         Ok(())
     })?;
-    // Release once, so that tests can hold it beside debug.
+    // The release build comes first, because tests compare it with the debug build.
     step("release build", || {
         shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))
     })?;
@@ -118,12 +118,13 @@ fn steps(args: &Args) -> Result<()> {
     })
 }
 
-/// At least four: those of boards and clients mostly wait for the clock.
+/// Number of tests that run at once: at least four, since those with boards and clients mostly
+/// wait.
 fn tests_at_once() -> usize {
     std::thread::available_parallelism().map_or(4, |cores| cores.get().max(4))
 }
 
-/// Runs the steps and says how long each took.
+/// Runs the steps and prints the time each took.
 pub fn run(args: &Args) -> Result<()> {
     let begun = Instant::now();
     steps(args)?;

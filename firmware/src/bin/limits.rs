@@ -1,5 +1,6 @@
-//! Every public call of planner-core at its limits and beyond, on a board: run in QEMU, read by
-//! `tests/tests/board.rs`, which knows what the desk comes to. A call that panics is named.
+//! Test program: calls every public function of planner-core with extreme and invalid arguments on
+//! a board. It runs in QEMU; `tests/tests/board.rs` reads its output and compares the sums with the
+//! host's. If a call panics, its name is printed.
 #![no_std]
 #![no_main]
 
@@ -13,7 +14,7 @@ use semihosting::println;
 use static_cell::ConstStaticCell;
 
 static LENT: ConstStaticCell<RouteWorkspaces> = ConstStaticCell::new(RouteWorkspaces::new());
-/// The call under way.
+/// Name of the call that runs.
 static CALL: Mutex<Cell<&str>> = Mutex::new(Cell::new("none"));
 
 #[panic_handler]
@@ -22,7 +23,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     semihosting::process::exit(1)
 }
 
-/// Counts calls, and keeps the name of the last.
+/// Counts calls and keeps the last call's name.
 struct CallCounter(usize);
 
 impl Listener for CallCounter {

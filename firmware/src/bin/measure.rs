@@ -1,6 +1,6 @@
-//! What the board's work costs, in instructions, and what it computes, bit by bit: run in QEMU with
-//! `-icount shift=0`, read by `tests/tests/board.rs`. A roadmap lies in bank 2, a map beyond it.
-//! Every line is a name and numbers.
+//! Test program: counts the instructions of the board's main work and prints checksums of its
+//! results. It runs in QEMU with `-icount shift=0`; `tests/tests/board.rs` reads its output. A
+//! roadmap lies in bank 2, a map in memory behind it. Each output line is a name and numbers.
 #![no_std]
 #![no_main]
 
@@ -56,7 +56,8 @@ fn main() -> ! {
     semihosting::process::exit(0)
 }
 
-/// Instructions that the work takes, those of asking the clock left out.
+/// Runs `work` and returns its result and the instructions it took, without those of reading the
+/// clock.
 fn count_instructions<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let idle = clock::instructions();
     let before = clock::instructions();
@@ -70,7 +71,8 @@ fn print_instructions<T>(name: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The plan of a swarm of ten, step by step.
+/// Counts the steps of planning one swarm, the roadmap's starts and goals: costs, assignment,
+/// paths, schedule.
 fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
     let plan = PLAN.take();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
@@ -85,7 +87,7 @@ fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
     println!("plan {:08x}", plan.crc);
 }
 
-/// The shortest path of each vehicle to its goal.
+/// Finds the shortest path of each vehicle to its goal, by A*.
 fn measure_paths(
     view: &RoadmapView<'_>,
     goals: &Goals<VEHICLES>,
@@ -100,7 +102,7 @@ fn measure_paths(
     }
 }
 
-/// One step of advice among 32 neighbours; the worst of many.
+/// Counts [`StepCase`]s: advice among 32 neighbours. Prints the largest and the mean count.
 fn measure_steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);
@@ -114,7 +116,7 @@ fn measure_steps() {
     println!("count mean-step {}", sum / cases::STEP_CASES as u64);
 }
 
-/// A roadmap built from the map.
+/// Counts the building of a roadmap from the map, with this clearance.
 fn measure_build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);

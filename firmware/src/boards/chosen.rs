@@ -1,4 +1,4 @@
-//! The board that the firmware is built for.
+//! The board that the firmware is built for, chosen by a cargo feature.
 
 #[cfg(feature = "nucleo-h743")]
 pub use super::nucleo_h743::*;

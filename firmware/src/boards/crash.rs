@@ -1,5 +1,5 @@
-//! What brought the firmware down, kept in memory that a warm reset leaves alone
-//! ([`kept`](crate::kept)), and reported at the next start.
+//! The crash record in memory that a warm reset leaves unchanged ([`kept`](crate::kept)): written
+//! at a panic or fault, reported at the next start.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::fmt::Write;
@@ -16,20 +16,21 @@ use crate::kept::{CrashRecord, FileWork, RECORD_WORDS, TEXT};
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();
 
-/// Reads the kept record. Interrupts are off: tasks and the end of the program use it.
+/// Reads the crash record; `None` if its checksum is wrong. To be called with interrupts off, since
+/// tasks and fault handlers use it.
 fn read_record() -> Option<CrashRecord> {
-    // SAFETY: nobody else runs, and any bytes are words.
+    // SAFETY: interrupts are off, and any bytes are valid `u32`s.
     CrashRecord::from_words(&unsafe {
         (&raw const RECORD).cast::<[u32; RECORD_WORDS]>().read_volatile()
     })
 }
 
 fn write_record(kept: &CrashRecord) {
-    // SAFETY: as above.
+    // SAFETY: as in `read_record`.
     unsafe { (&raw mut RECORD).cast::<[u32; RECORD_WORDS]>().write_volatile(kept.to_words()) };
 }
 
-/// Changes what is kept.
+/// Reads the crash record, changes it by `change` and writes it back, with interrupts off.
 fn update_record<T>(change: impl FnOnce(&mut CrashRecord) -> T) -> T {
     critical_section::with(|_| {
         let mut kept = read_record().unwrap_or_default();
@@ -39,7 +40,8 @@ fn update_record<T>(change: impl FnOnce(&mut CrashRecord) -> T) -> T {
     })
 }
 
-/// Text that the last start left, once; none after the power came.
+/// Evaluates the crash record at the start. Returns the STATUSTEXT about the last run's end; `None`
+/// if there is nothing to report, as after power-on. To be called once.
 pub fn take_report(cause: ResetCause) -> Option<String<TEXT>> {
     critical_section::with(|_| {
         let (kept, said) = CrashRecord::on_start(read_record(), cause);
@@ -48,30 +50,32 @@ pub fn take_report(cause: ResetCause) -> Option<String<TEXT>> {
     })
 }
 
-/// Whether work with files may begin.
+/// Whether `work` on the files with checksum `files` may begin: false if it crashed three starts in
+/// a row.
 pub fn may_begin(work: FileWork, files: u32) -> bool {
     update_record(|kept| kept.may_begin(work, files))
 }
 
-/// Begins work with files; false if it brought three starts in a row down, and is not to be done.
+/// Records that `work` on `files` begins; false, and nothing is recorded, if it crashed three
+/// starts in a row. Then it must not be done.
 pub fn begin_work(work: FileWork, files: u32) -> bool {
     update_record(|kept| kept.begin_work(work, files))
 }
 
-/// Notes that the work has ended.
+/// Records that the work that runs has ended without a crash.
 pub fn finish_work() {
     update_record(CrashRecord::finish_work);
 }
 
-/// Restarts on request: there is no crash to report.
+/// Restarts the board on request; the next start reports no crash.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
     update_record(CrashRecord::note_requested_restart);
     chosen::reset()
 }
 
-/// Keeps what happened, logs it and restarts. Kept first, and logged once: what is wrong may be the
-/// log.
+/// Records `text`, logs it and restarts the board. It is recorded before it is logged, and logged
+/// only once a run, because the log itself may be what crashes.
 fn record_and_restart(text: &str) -> ! {
     cortex_m::interrupt::disable();
     let ended = update_record(|kept| {
@@ -87,30 +91,31 @@ fn record_and_restart(text: &str) -> ! {
     chosen::reset()
 }
 
-/// Records where the panic was, and restarts the board: no task or interrupt of higher priority
-/// runs on after a panic.
+/// Handles a panic: records file and line, and restarts the board. Interrupts are off from here on,
+/// so no task runs any more.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     let mut text = String::<200>::new();
     if let Some(place) = info.location() {
         let file = place.file().rsplit('/').next().unwrap_or_default();
-        // Text that does not fit is left out.
+        // Text that does not fit is cut.
         let _ = write!(text, "Restarted: panic at {file}:{}", place.line());
     }
     record_and_restart(&text)
 }
 
-/// Keeps the program counter of a fault and restarts.
+/// Handles a hard fault: records the program counter `pc`, or a stack overflow, and restarts the
+/// board.
 pub fn faulted(pc: u32) -> ! {
-    // SAFETY: registers that are read.
+    // SAFETY: fault registers, which are only read.
     let scb = unsafe { &*SCB::PTR };
     let (cfsr, mmfar) = (scb.cfsr.read(), scb.mmfar.read());
     if fault::is_overflow(cfsr, mmfar, &stack::guard()) {
-        // The place of the overflow lies on the stack that was too small.
+        // The program counter is not reported: it lies on the stack that overflowed.
         record_and_restart("Restarted: stack overflow")
     }
     let mut text = String::<TEXT>::new();
-    // The text fits.
+    // Cannot fail: the text has room.
     let _ = write!(text, "Restarted: fault at {pc:#010x}");
     record_and_restart(&text)
 }

@@ -1,4 +1,4 @@
-//! The two executors that run in interrupts.
+//! The two Embassy executors, which run in interrupt handlers.
 #![expect(unsafe_code, reason = "executors in interrupts")]
 
 use cortex_m::interrupt::InterruptNumber;
@@ -7,31 +7,31 @@ use embassy_executor::{InterruptExecutor, SendSpawner};
 static LINKS: InterruptExecutor = InterruptExecutor::new();
 static PLANS: InterruptExecutor = InterruptExecutor::new();
 
-/// Starts the executor of links and setpoints in an interrupt that no device has, its priority set.
-/// To be called once.
+/// Starts the executor of links and setpoints in the interrupt `irq`, which no device uses and
+/// whose priority is set. To be called once.
 pub(super) fn start_links(irq: impl InterruptNumber) -> SendSpawner {
     LINKS.start(irq)
 }
 
-/// Starts the executor of plans and flash.
+/// Starts the executor of plans and flash in the interrupt `irq`. To be called once.
 pub(super) fn start_plans(irq: impl InterruptNumber) -> SendSpawner {
     PLANS.start(irq)
 }
 
-/// The handler of the interrupt given to [`start_links`].
+/// Body of the handler of the interrupt given to [`start_links`].
 ///
 /// # Safety
-/// Only that handler may call it: the executor is there once its interrupt is enabled.
+/// Only that handler may call it: the executor exists once its interrupt is enabled.
 pub(super) unsafe fn poll_links_executor() {
-    // SAFETY: as the caller says.
+    // SAFETY: the caller is the interrupt's handler.
     unsafe { LINKS.on_interrupt() }
 }
 
-/// The handler of the interrupt given to [`start_plans`].
+/// Body of the handler of the interrupt given to [`start_plans`].
 ///
 /// # Safety
-/// As [`poll_links_executor`].
+/// Only that handler may call it, as for [`poll_links_executor`].
 pub(super) unsafe fn poll_plans_executor() {
-    // SAFETY: as the caller says.
+    // SAFETY: the caller is the interrupt's handler.
     unsafe { PLANS.on_interrupt() }
 }

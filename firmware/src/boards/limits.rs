@@ -1,7 +1,8 @@
-//! What every board keeps to.
+//! Limits that are the same on every board.
 
-/// Time after it was last fed at which the watchdog resets the board, microseconds.
+/// Time after its last feeding at which the watchdog resets the board, microseconds.
 pub(crate) const WATCHDOG_TIMEOUT_US: u32 = 1_000_000;
 
-/// Bytes below the stack that no access may touch; frames of the stack are larger than a few bytes.
+/// Length of the guard below the stack, bytes, in which every access faults: an overflow hits it
+/// unless one stack frame is longer than this.
 pub(crate) const GUARD_LEN: u32 = 4096;

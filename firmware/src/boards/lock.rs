@@ -1,4 +1,4 @@
-//! What the tasks of both executors share, held for the time of one call.
+//! The mutex around state that tasks of both executors share.
 #![expect(unsafe_code, reason = "the priority below which nothing runs")]
 
 use cortex_m::register::{basepri, basepri_max};
@@ -6,13 +6,15 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 
 use super::chosen::LINKS_PRIORITY;
 
-/// Blocks both executors, but no device: bytes are still received. An asynchronous mutex would not
-/// do. It knows one task that waits for it; two tasks of the higher executor that wait while the
-/// lower one holds it wake each other for ever, and the lower one never comes to let it go.
+/// Raw mutex that raises BASEPRI to the priority of the links' executor: while it is held neither
+/// executor runs another task, but device interrupts still receive bytes. An asynchronous mutex
+/// cannot be used: it keeps one waiting task. Two waiting tasks of the higher executor would wake
+/// each other for ever, and the lower executor, which holds the mutex, would never run to release
+/// it.
 pub struct HoldsExecutors(());
 
-// SAFETY: a task that takes it runs at the priority of an executor or below, never in a device's
-// interrupt. Then nothing that may take it runs beside.
+// SAFETY: it is locked by tasks only, never in a device's interrupt; so while it is held no code
+// that may lock it runs.
 unsafe impl RawMutex for HoldsExecutors {
     const INIT: Self = Self(());
 
@@ -20,7 +22,7 @@ unsafe impl RawMutex for HoldsExecutors {
         let before = basepri::read();
         basepri_max::write(LINKS_PRIORITY);
         let result = work();
-        // SAFETY: as it was found.
+        // SAFETY: restores the value read before.
         unsafe { basepri::write(before) };
         result
     }

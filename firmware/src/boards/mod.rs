@@ -1,4 +1,5 @@
-//! What differs from board to board: registers, clocks, memory. The only place with `unsafe`.
+//! What differs between boards: registers, clocks, memory. `unsafe` is allowed here (and in
+//! `scratch`).
 
 use crate::kept::FileWork;
 
@@ -30,22 +31,22 @@ pub mod stack;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub use lock::HoldsExecutors;
 
-/// Sleeps until an interrupt comes.
+/// Halts the processor until an interrupt.
 #[cfg(all(target_os = "none", feature = "qemu"))]
 pub use qemu::sleep;
 
-/// Sleeps until an interrupt comes.
+/// Halts the processor until an interrupt (WFI).
 #[cfg(all(target_os = "none", feature = "board", not(feature = "qemu")))]
 pub fn sleep() {
     cortex_m::asm::wfi();
 }
 
-/// On the desk there is no other executor to hold back.
+/// On the host: a critical section in place of the boards' BASEPRI mutex.
 #[cfg(not(all(target_os = "none", feature = "board")))]
 pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 
-/// Work with uploaded files begins; false if it brought three starts in a row down, and is not to
-/// be done. A desk has no starts.
+/// Records that `work` on the uploaded files with checksum `files` begins; false if it crashed
+/// three starts in a row, then it must not be done. On the host it may always begin.
 pub fn begin_work(work: FileWork, files: u32) -> bool {
     #[cfg(all(target_os = "none", feature = "board"))]
     return crash::begin_work(work, files);
@@ -53,7 +54,7 @@ pub fn begin_work(work: FileWork, files: u32) -> bool {
     return crate::kept::CrashRecord::default().begin_work(work, files);
 }
 
-/// Notes that the work has ended.
+/// Records that the work that runs has ended without a crash.
 pub fn finish_work() {
     #[cfg(all(target_os = "none", feature = "board"))]
     crash::finish_work();

@@ -1,4 +1,4 @@
-//! The memory protection unit: the guard below the stack, and what a board does not cache.
+//! Sets up the memory protection unit: the guard below the stack, and memory that is not cached.
 #![expect(unsafe_code, reason = "registers")]
 
 use cortex_m::asm::{dsb, isb};
@@ -8,20 +8,21 @@ use super::limits::GUARD_LEN;
 use super::stack;
 use crate::chips::mpu::{Access, Region};
 
-/// MPU_CTRL: what no region has is as without the unit (PRIVDEFENA); on; off in the handlers of
-/// hard faults, which may have to use the guard's memory as a stack (HFNMIENA is not set).
+/// Value of MPU_CTRL: unit enabled; PRIVDEFENA: addresses outside all regions have the default
+/// memory map; HFNMIENA clear: the unit is off in hard fault handlers, whose stack may reach into
+/// the guard.
 const ON: u32 = 1 << 2 | 1;
 
-/// The guard below the stack: a processor whose stack reaches it takes a fault.
+/// The guard below the stack: an access to it is a fault.
 pub(super) fn stack_guard_region() -> Region {
     Region::new(stack::guard().start, GUARD_LEN, Access::None)
 }
 
-/// Sets regions, each of which counts more than those before it, and switches the unit on. To be
+/// Sets regions 0, 1, …; where two overlap the higher number applies. Then enables the unit. To be
 /// called once, at the start.
 pub(super) fn enable_regions(regions: &[Option<Region>]) {
-    // SAFETY: nobody else uses the unit but `set`, later. What runs uses none of what the regions
-    // take away.
+    // SAFETY: after this only `set` uses the unit. No code or data in use lies where a region
+    // forbids access.
     unsafe {
         for (number, region) in regions.iter().enumerate() {
             set(number as u32, region.as_ref());
@@ -32,12 +33,12 @@ pub(super) fn enable_regions(regions: &[Option<Region>]) {
     isb();
 }
 
-/// Sets one region, or takes it away.
+/// Sets region `number`, or disables it for `None`.
 ///
 /// # Safety
-/// What runs uses none of what it takes away.
+/// No code or data in use lies where the region forbids access.
 pub(super) unsafe fn set(number: u32, region: Option<&Region>) {
-    // SAFETY: registers of the unit, which tasks do not use; what it means the caller knows.
+    // SAFETY: registers of the unit, which no task uses; the caller guarantees the rest.
     unsafe {
         let mpu = &*MPU::PTR;
         mpu.rnr.write(number);

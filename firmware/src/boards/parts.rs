@@ -1,25 +1,25 @@
-//! What every board hands over at its start.
+//! What every board's `start` returns.
 
 use embassy_executor::SendSpawner;
 use heapless::Vec;
 
-/// Most warnings.
+/// Most warnings of a board's start.
 pub const MAX_WARNINGS: usize = 2;
 
-/// A board, ready: with its receivers, transmitters, flash and watchdog.
+/// The started board: executors' spawners, UARTs, flash, watchdog, warnings.
 pub struct BoardResources<R, T, F, W> {
-    /// Runs links and setpoints, by interrupt.
+    /// Spawns tasks of links and setpoints, on the executor of higher priority.
     pub links: SendSpawner,
-    /// Runs what takes long, by an interrupt below that.
+    /// Spawns tasks that take long, on the executor of lower priority.
     pub plans: SendSpawner,
-    /// UART to the autopilot.
+    /// UART to the autopilot: receiver and transmitter.
     pub autopilot: (R, T),
-    /// UART to the swarm's radio.
+    /// UART to the swarm's radio: receiver and transmitter.
     pub swarm: (R, T),
     /// Flash for files and parameters.
     pub flash: F,
-    /// Awake.
+    /// The watchdog, which already runs.
     pub watchdog: W,
-    /// Warnings about the board for a person.
+    /// Warnings about the board's setup, sent to the operator by STATUSTEXT.
     pub warnings: Vec<&'static str, MAX_WARNINGS>,
 }

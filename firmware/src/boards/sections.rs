@@ -1,6 +1,6 @@
-//! Statics that `memory.x` places by name, outside `.bss`: the start code of `cortex-m-rt` zeroes
-//! `.bss` alone, so this zeroes them before anything uses them. Only what is all zeros lies in a
-//! section `.bss.NAME`, from which the linker takes it: one that is not would stay in `.data`.
+//! Zeroes the statics that `memory.x` places by name outside `.bss`: the start code of
+//! `cortex-m-rt` zeroes `.bss` alone. The linker takes them from sections `.bss.NAME`, which hold
+//! only statics whose initial value is all zeros; any other static would stay in `.data`.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::ptr::addr_of_mut;
@@ -18,10 +18,10 @@ unsafe extern "C" {
     static mut __e_dma: u32;
 }
 
-/// Zeroes them.
+/// Zeroes these statics.
 ///
 /// # Safety
-/// Only once, before any of these statics is used; the memories' clocks run.
+/// To be called once, before any of these statics is used, and after the memories' clocks are on.
 pub unsafe fn zero_sections() {
     let sections = [
         (addr_of_mut!(__s_shell), addr_of_mut!(__e_shell)),
@@ -32,8 +32,8 @@ pub unsafe fn zero_sections() {
     ];
     for (mut word, end) in sections {
         while word < end {
-            // SAFETY: between the linker's two symbols lie statics that nothing uses yet; both are
-            // aligned to 8 bytes.
+            // SAFETY: between the linker's two symbols lie statics that no code uses yet; both
+            // symbols are aligned to 8 bytes.
             unsafe {
                 word.write_volatile(0);
                 word = word.add(1);

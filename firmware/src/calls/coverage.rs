@@ -1,6 +1,6 @@
-//! The calls of a coverage mission: plans of one area for three vehicles, division of what is left
-//! after a loss, and areas at a board's capacities. What they answer is summed up bit by bit, to be
-//! compared with the desk's.
+//! Calls of coverage planning: plans of one area for three vehicles, division of the work left
+//! after a loss, and areas at a board's capacities. Their results go into a checksum, by which a
+//! test compares board and host bit by bit.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -19,15 +19,15 @@ use super::Meter;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::scratch::CoverageWorkspace;
 
-/// Changes of the lanes' order that are tried.
+/// Most changes of the lanes' order that the planner tries.
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
-/// Vehicles of the plans that have a limit.
+/// Vehicles in the plans for which the bench sets a limit of instructions.
 const LIMITED_VEHICLES: usize = 3;
-/// Packings that POWELL tries.
+/// Number of packings that the POWELL search tries.
 const POWELL_SEARCH: powell::PowellConfig = powell::PowellConfig::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 
-/// A sum of bits in which order counts.
+/// Checksum of numbers that depends on their order.
 struct Checksum(u32);
 
 impl Checksum {
@@ -57,16 +57,16 @@ impl Checksum {
     }
 }
 
-/// Makes all of them; the sum of the answers.
+/// Makes all calls of coverage planning; returns the checksum of their results.
 #[inline(never)]
 pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageWorkspace) -> u32 {
     let mut sum = Checksum(1);
     measure_cameras(meter, &mut sum);
-    // Five vertices, 300 by 150 m, lanes of 10 m.
+    // Area of five vertices, 300 by 150 m; its lanes are 10 m apart.
     let five = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]].map(flat);
     let area = Area::new(&five, &[Ring { end: 5, kind: RingKind::Outer }]).expect("an area");
     measure_plans(meter, area, lent, &mut sum);
-    // The most lanes, for the most vehicles.
+    // Area that takes the most lanes, for the most vehicles.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(flat);
     let area = Area::new(&wide, &[Ring { end: 4, kind: RingKind::Outer }]).expect("an area");
     measure_division(meter, area, lent, &mut sum);
@@ -105,7 +105,7 @@ fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {
     sum.add(height_m.expect("a sensor").to_bits());
 }
 
-/// The whole plan of three vehicles, and its parts.
+/// Plans the area for three vehicles, as a whole and step by step, and again after the loss of one.
 fn measure_plans(
     meter: &mut impl Meter,
     area: Area<'_>,
@@ -152,7 +152,7 @@ fn measure_plans(
     let bound_s =
         meter.call("bound::lower_bound_s, 3", 0, || lower_bound_s(&work)).expect("a bound");
     sum.add(bound_s.to_bits());
-    // Each has flown ten waypoints, and the first is lost.
+    // Each vehicle has photographed its first ten waypoints when the first vehicle is lost.
     let done = flown_ranges(plan, 10);
     let rest = &few[1..];
     let bytes = size_of_val(left) + size_of_val(pack);
@@ -181,7 +181,7 @@ fn flown_ranges(plan: &Plan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLE
     done
 }
 
-/// The division of the rest after a loss, of 512 lanes among 32 vehicles.
+/// Divides 512 lanes among 32 vehicles, and divides the rest again after a loss.
 fn measure_division(
     meter: &mut impl Meter,
     area: Area<'_>,
@@ -192,7 +192,7 @@ fn measure_division(
     let many = vehicles(VEHICLES);
     let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let pack = &mut powell.pack;
-    // The order is unchanged yet, and each step compares all lanes.
+    // Lanes along y: 2559 m / 5 m are 512; in this convex area their order is not searched.
     let pattern = pattern(Some(90.0), 5.0);
     meter
         .call("tracks::build, 512 lanes", size_of_val(build), || {
@@ -221,7 +221,7 @@ fn measure_division(
         });
         sum.add_floats(&[place.x, place.y, along_m]);
     }
-    // Whole lanes from where each began: no lane is cut in two, so all fit again.
+    // Widened to whole lanes: no lane is cut in two, so the rest fits the capacity.
     let whole = |range: WaypointRange| {
         let lane = |number: u32| &tracks.lanes()[tracks.lane_of(number)];
         let (from, to) = (lane(range.first), lane(range.end - 1));
@@ -252,7 +252,7 @@ fn measure_division(
     }));
 }
 
-/// The way home, and aside, among zones and four things of each vehicle.
+/// Plans detours home, and one that leaves a column, among no-fly zones and 128 keep-out zones.
 fn measure_ways_home(
     meter: &mut impl Meter,
     transit: &Transit<'_, AREA_CORNERS>,
@@ -282,7 +282,7 @@ fn measure_ways_home(
             required_clearance_m: 1.2,
             fence: None,
         };
-        // That no path exists is an answer too.
+        // That no path exists is a valid result too.
         let found = meter.call("around::plan_detour, 128 things", 0, || {
             around::plan_detour(transit, None, &request, &mut things, &mut own.path)
         });
@@ -294,8 +294,7 @@ fn measure_ways_home(
     }
 }
 
-/// An area with as many vertices as there may be, some of them of no-fly zones with as many
-/// corners.
+/// Plans an area with the most vertices, some of them of no-fly zones with the most corners.
 fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
     const ZONES: usize = AREA_CORNERS / 4;
     const OUTER: usize = AREA_VERTICES - AREA_CORNERS;

@@ -1,6 +1,6 @@
-//! A coverage mission planned whole, as a board does where its companion asks for a plan, and
-//! divided again after a loss: lanes, routes and the flights of all vehicles with their departures.
-//! What is planned is summed up bit by bit, to be compared with the desk's.
+//! Whole plans of a coverage mission, as a board makes them when its companion requests one: lanes,
+//! routes and all vehicles' flights with departure times; also divisions after losses. The results
+//! go into a checksum, by which a test compares board and host bit by bit.
 
 use companion::planner::coverage::{self, Request};
 use companion::storage::mission_file::coverage::{
@@ -29,10 +29,10 @@ use super::{Meter, flight};
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::scratch;
 
-/// The flights of a swarm as large as this board's.
+/// Flights of the largest swarm that the board holds.
 pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-/// Vehicles of the plans that have a limit.
+/// Vehicles in the plans for which the bench sets a limit of instructions.
 const LIMITED_VEHICLES: usize = 3;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 const CRUISE_MPS: f32 = 5.0;
@@ -44,7 +44,7 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     cruise_mps: CRUISE_MPS,
     vertical_mps: DESCEND_MPS,
 };
-/// A swarm without vehicles, on lanes 10 m apart.
+/// Flight settings for lanes 10 m apart; its list of pads is empty, to be filled in.
 pub(super) const SWARM: FlightInputs<'static> = FlightInputs {
     pads: &[],
     capture: CaptureSettings {
@@ -59,20 +59,20 @@ pub(super) const SWARM: FlightInputs<'static> = FlightInputs {
     held_layers: 0,
     following: None,
 };
-/// Height of a path's first point above the pad, metres.
+/// Height of a path's first point above its pad, metres.
 const CLIMB_M: f32 = 2.0;
-/// Distance from pad to pad, metres.
+/// Distance between neighbouring pads, metres.
 const PAD_SPACING_M: f32 = 5.0;
-/// Area of five vertices, 300 by 150 m.
+/// Vertices of the area, metres: 300 by 150 m.
 const FIVE_VERTICES: [[f32; 2]; 5] =
     [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
-/// No-fly zones within that area.
+/// Vertices of two no-fly zones within that area.
 const NO_FLY_ZONES: [[[f32; 2]; 4]; 2] = [
     [[80.0, 40.0], [110.0, 45.0], [105.0, 80.0], [75.0, 70.0]],
     [[200.0, 60.0], [240.0, 60.0], [240.0, 110.0], [200.0, 110.0]],
 ];
 
-/// Counts all coverage plans and divisions; returns a checksum of the results.
+/// Makes and measures all coverage plans and divisions; returns a checksum of the results.
 #[inline(never)]
 pub fn measure_coverage_flights(
     meter: &mut impl Meter,
@@ -82,7 +82,7 @@ pub fn measure_coverage_flights(
     measure_whole_plans(meter, lent.area(), out) ^ measure_plan_parts(meter, lent.coverage(), out)
 }
 
-/// Whole plans.
+/// Measures plans from a mission file, without and with no-fly zones.
 #[inline(never)]
 fn measure_whole_plans(
     meter: &mut impl Meter,
@@ -100,7 +100,7 @@ fn add_to_checksum(sum: &mut u32, flights: &Flights) {
     *sum = sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ flights.crc;
 }
 
-/// The rings of an area with so many zones.
+/// The rings of an area with `zones` no-fly zones of four vertices.
 fn rings(zones: usize) -> Vec<Ring, 4> {
     let zone =
         |k: usize| Ring { end: (FIVE_VERTICES.len() + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
@@ -108,7 +108,7 @@ fn rings(zones: usize) -> Vec<Ring, 4> {
     core::iter::once(outer).chain((0..zones).map(zone)).collect()
 }
 
-/// The mission file of three vehicles.
+/// Writes the mission file of three vehicles and returns its length.
 fn mission_file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
     let header = MissionHeader {
         roadmap_crc: 0,
@@ -166,7 +166,8 @@ fn spacing(lane_m: f32) -> Spacing {
     }
 }
 
-/// The plans that a board makes from its mission file, before the start and after two losses.
+/// Measures the plans that a board makes from its mission file: before take-off, and after each of
+/// two losses.
 fn measure_mission_plans(
     meter: &mut impl Meter,
     zones: &[[[f32; 2]; 4]],
@@ -194,8 +195,8 @@ fn measure_mission_plans(
     let mut losses: Vec<[DivisionInput; LIMITED_VEHICLES], 2> = Vec::new();
     for lost in [None, Some(0), Some(1)] {
         if let Some(lost) = lost {
-            // Each in the air stands in the middle of its path; one that was lost before is on the
-            // ground.
+            // At each loss every flying vehicle is halfway along its path; a vehicle lost before is
+            // on the ground.
             let lot = |k: usize| {
                 let flies = out.flights[k].task.leaves_pad();
                 let along_dm =
@@ -227,7 +228,7 @@ fn measure_mission_plans(
     }
 }
 
-/// The flights of routes alone, and divisions of what a vehicle leaves.
+/// Measures the flights of given routes, and the division of a lost vehicle's work.
 #[inline(never)]
 fn measure_plan_parts(
     meter: &mut impl Meter,
@@ -248,7 +249,7 @@ fn measure_plan_parts(
         };
         measure_division(meter, &case, names, lent, out, &mut sum);
     }
-    // The most lanes, for the most vehicles.
+    // Area that takes the most lanes, for the most vehicles.
     let wide =
         [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
     let rings = [Ring { end: 4, kind: RingKind::Outer }];
@@ -269,7 +270,7 @@ fn measure_plan_parts(
     sum
 }
 
-/// An area, its lanes, and how many vehicles photograph it.
+/// An area, the direction and spacing of its lanes, and the number of vehicles.
 struct Case<'a> {
     area: Area<'a>,
     angle_deg: Option<f32>,
@@ -339,7 +340,7 @@ fn measure_division(
         .expect("flights");
     add_to_checksum(sum, out);
     let bytes = size_of_val(losses) + size_of_val(pack) + size_of_val(schedule);
-    // Each lives on from where it holds, and the first is lost.
+    // The first vehicle is lost; all others go on from halfway along their paths.
     let fate =
         |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
     let fates: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();

@@ -1,8 +1,8 @@
-//! A companion in flight by script, 32 neighbours around it: whole control steps to be counted.
+//! Scripted flights of a companion among 32 neighbours, to count whole control steps.
 //!
-//! The script is a PX4 that goes where its setpoint says, and neighbours that send random places,
-//! intents and flags, or nothing. Half of the flights are hard: everybody is near, and off the
-//! plan, out of it, or silent for up to 90 s.
+//! The script acts as a PX4 that moves to each setpoint, and as neighbours that send random
+//! positions, intents and flags, or fall silent. In half of the flights (hard) all neighbours are
+//! near, and off the plan, out of it, or silent for up to 90 s.
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
@@ -23,42 +23,42 @@ use crate::capacity::BoardCompanion;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{random_below, random_between, random_point};
 
-/// Mission and EKF origin of every flight.
+/// Origin of the mission frame, and EKF origin, of every flight.
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-/// Name of a control step in the table where all neighbours are heard.
+/// Row of the table: a control step while all neighbours are heard.
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
-/// Name of a control step where most neighbours have left the plan or fell silent.
+/// Row of the table: a control step after most neighbours left the plan or fell silent.
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
-/// Name of a control step where all neighbours are near and off the plan, and few are on the path:
-/// the safety filter compares all of them.
+/// Row of the table: a control step while all neighbours are near and off the plan but few are on
+/// the path, so that the safety filter compares all of them.
 pub const NEAR_STEP: &str = "a control step, 32 near";
-/// Name of a control step of a coverage mission, in flight or while it divides, beside as many
-/// neighbours.
+/// Row of the table: a control step of a coverage mission beside 32 neighbours, in flight or while
+/// the work is divided.
 pub const AREA_STEP: &str = "a control step, coverage, 32 near";
-/// Name of the safety filter alone, which is part of each control step.
+/// Row of the table: the safety filter alone, which is part of each control step.
 pub const FILTER: &str = "Companion::query_filter, 32 near";
-/// Name of any other control step.
+/// Row of the table: any other control step.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
 const SYSTEM: u8 = 1;
-/// Cruise speed, m/s: faster than indoors, so that many corners are within its braking distance of
+/// Cruise speed, m/s: faster than indoors, so that many corners lie within the braking distance of
 /// 8 m.
 pub const CRUISE_MPS: f32 = 5.0;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
-/// Least distance of a neighbour that is beside, metres.
+/// Least distance of a neighbour beside this vehicle, metres.
 const MIN_BESIDE_M: f32 = 4.0;
-/// Least distance of a neighbour that is far away, metres.
+/// Least additional distance of a silent neighbour that is far away, metres.
 const MIN_FAR_M: f32 = 70.0;
-/// Greatest distance of a neighbour that is far away, metres.
+/// Greatest additional distance of a silent neighbour that is far away, metres.
 const MAX_FAR_M: f32 = 120.0;
 /// Control steps counted in each flight.
 const COUNTED_STEPS: usize = 200;
-/// Most steps of 0.9 s before the counted ones, in which silent neighbours grow old. A longer step
-/// would be a gap in the position.
+/// Most steps of 0.9 s before the counted ones, in which silent neighbours' last messages grow old.
+/// After a longer step the companion would find its own position stale.
 const MAX_AGEING_STEPS: usize = 100;
 const STEP_TIME: Duration = Duration::from_millis(50);
 const AGEING_TIME: Duration = Duration::from_millis(900);
-/// Steps of 50 ms within which the vehicle is in the air.
+/// Steps of 50 ms in which the vehicle must have taken off.
 const MAX_TAKE_OFF_STEPS: usize = 400;
 
 const HEARTBEAT: u32 = 0;
@@ -83,7 +83,7 @@ struct SimulatedNeighbour {
     silent: bool,
 }
 
-/// One flight.
+/// One scripted flight: companion, autopilot and neighbours.
 pub struct BenchFlight<'a, M> {
     companion: &'a mut BoardCompanion,
     meter: &'a mut M,
@@ -97,28 +97,28 @@ pub struct BenchFlight<'a, M> {
     plan: &'a VehiclePlan<WAYPOINTS, GATES>,
 }
 
-/// Whether most of a flight's neighbours leave the plan or fall silent.
+/// Whether most neighbours of flight `seed` leave the plan or fall silent.
 pub fn has_many_off_plan(seed: u64) -> bool {
     seed.is_multiple_of(2)
 }
 
-/// Whether those of a flight's neighbours that fall silent are far away, at the edge of what a
-/// search for a detour looks at.
+/// Whether the silent neighbours of flight `seed` are far away, at the edge of the range in which a
+/// detour considers them.
 fn has_silent_far_away(seed: u64) -> bool {
     seed % 8 == 2
 }
 
-/// Vector from this vehicle to a neighbour. In every other hard flight the neighbour is beside, so
-/// that the path is checked to its end.
+/// Random vector from this vehicle to a neighbour. In every other hard flight it is at least 4 m
+/// long: the neighbour is beside the path, so that the filter checks the path to its end.
 fn offset_to_neighbour(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
     let at = random_point(rng, reach_m);
     if seed.is_multiple_of(4) { at + at * (MIN_BESIDE_M / at.norm().max(0.1)) } else { at }
 }
 
-/// One flight, its control steps counted by `meter`; how many there were.
+/// Flies flight `seed` and measures its control steps by `meter`; returns their number.
 ///
 /// # Panics
-/// The companion does not take off: the script is wrong.
+/// The companion does not take off, so the script is wrong.
 pub fn measure_flight<M: Meter>(
     seed: u64,
     plan: &VehiclePlan<WAYPOINTS, GATES>,
@@ -131,12 +131,12 @@ pub fn measure_flight<M: Meter>(
     flight.take_off();
     for (i, other) in flight.others.iter_mut().enumerate() {
         let (flags, silent) = match seed % 4 {
-            // All on ways of their own: each is checked along the whole path ahead.
+            // All neighbours fly detours: each is compared with the whole path ahead.
             1 => (AIR | intent::ON_DETOUR, false),
             3 => EASY[random_below(&mut rng, EASY.len())],
             _ => HARD[random_below(&mut rng, HARD.len())],
         };
-        // One neighbour is always heard, so that this vehicle is not alone.
+        // The first neighbour is always heard, so that this vehicle does not lose its swarm link.
         (other.flags, other.silent) = (flags, silent && i > 0);
         other.place =
             flight.place + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
@@ -172,11 +172,11 @@ pub fn measure_flight<M: Meter>(
     COUNTED_STEPS
 }
 
-/// One flight among neighbours that are near but rarely on the path, the safety filter alone
-/// counted by `meter`: in full flight, and stopped, when it looks further ahead.
+/// Flies flight `seed` among neighbours that are near but rarely on the path, and measures the
+/// safety filter alone by `meter`: at cruise speed, and stopped, when it checks further ahead.
 ///
 /// # Panics
-/// The companion does not take off: the script is wrong.
+/// The companion does not take off, so the script is wrong.
 pub fn measure_filter<M: Meter>(
     seed: u64,
     plan: &VehiclePlan<WAYPOINTS, GATES>,
@@ -208,22 +208,22 @@ pub fn measure_filter<M: Meter>(
         flight.send_states_from(&mut rng, |_| true);
         let (now, companion) = (flight.now, &mut *flight.companion);
         flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.query_filter(now));
-        // The whole step beside them; and time passes, so that what they say next is new.
+        // A whole step beside these neighbours. Time passes, so that their next messages are newer.
         flight.tick(NEAR_STEP, STEP_TIME);
     }
 }
 
-/// A place where vehicles do not meet.
+/// Offset of a neighbour that is too far away to matter, metres.
 fn far_away() -> Point {
     Point::new(300.0, 0.0, 0.0)
 }
 
-/// Rounds of a flight in which the filter is counted.
+/// Rounds of a flight in which the filter is measured.
 const FILTER_ROUNDS: usize = 40;
 const FILTERED: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
-/// Flags of a neighbour, and whether it falls silent.
+/// Pairs from which a neighbour is drawn: its intent's flags, and whether it falls silent.
 const EASY: [(u8, bool); 4] = [
     (AIR, false),
     (intent::GROUNDED | intent::ON_PLAN | intent::WAITING, false),
@@ -238,7 +238,7 @@ const HARD: [(u8, bool); 4] = [
 ];
 
 impl<'a, M: Meter> BenchFlight<'a, M> {
-    /// On its pad, all others far away, and past every gate.
+    /// This vehicle on its pad; all neighbours far away, with a progress beyond every gate.
     fn on_pad(
         plan: &'a VehiclePlan<WAYPOINTS, GATES>,
         companion: &'a mut BoardCompanion,
@@ -290,7 +290,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         panic!("it does not take off: {:?}", self.companion.state());
     }
 
-    /// One step of this length: the companion's, then the autopilot's.
+    /// One step of `time`: first the companion's control step, recorded as `name`, then the
+    /// autopilot's motion and telemetry.
     fn tick(&mut self, name: &'static str, time: Duration) {
         self.now = self.now + time;
         let name = if self.has_area() { AREA_STEP } else { name };
@@ -316,7 +317,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
             let mut status = [0; 31];
             status[30] = 90;
             self.feed_frame(Link::Autopilot, (SYSTEM, 1), SYS_STATUS, &status);
-            // An accuracy of 0.
+            // All accuracies of the estimator are 0 m.
             self.feed_frame(Link::Autopilot, (SYSTEM, 1), ESTIMATOR_STATUS, &[0; 42]);
         }
         let ned = swap_enu_ned(&self.place);
@@ -326,7 +327,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         self.feed_frame(Link::Autopilot, (SYSTEM, 1), LOCAL_POSITION_NED, &position);
     }
 
-    /// Gives the companion a frame.
+    /// Passes a frame with this payload to the companion, as received on `link` from `from`
+    /// (system, component).
     fn feed_frame(&mut self, link: Link, from: (u8, u8), id: u32, payload: &[u8]) {
         let sequence = &mut self.sequences[usize::from(from.0)];
         *sequence = sequence.wrapping_add(1);
@@ -350,7 +352,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         }
     }
 
-    /// A neighbour sends its intent and its position.
+    /// Passes neighbour `i`'s intent and position to the companion.
     fn send_state_from(&mut self, i: usize, rng: &mut Pcg32) {
         let SimulatedNeighbour { place, flags, progress_m, .. } = self.others[i];
         let system_id = 2 + i as u8;
@@ -395,7 +397,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         );
     }
 
-    /// Gives the companion the roster message of a neighbour: all fly.
+    /// Passes a neighbour's roster message to the companion, which reports that all vehicles fly.
     fn send_roster_from(&mut self, system_id: u8) {
         for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES) {
             let known = VEHICLES.min(first + roster::MAX_ENTRIES) - first;
@@ -419,7 +421,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         }
     }
 
-    /// Takes all that the companion has to say, and does as it asks.
+    /// Takes the companion's frames and events: executes commands to the autopilot, answers plan
+    /// requests with the plan. Detours are unreachable.
     fn drain_outputs(&mut self) {
         for link in [Link::Autopilot, Link::Swarm] {
             loop {
@@ -454,7 +457,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         }
     }
 
-    /// Does what a frame commands the autopilot.
+    /// Executes a command that the companion sends to the autopilot.
     fn execute_command(&mut self, frame: &[u8]) {
         let mut p = [0; 255];
         let payload = &frame[10..frame.len() - 2];

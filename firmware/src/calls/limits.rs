@@ -1,9 +1,8 @@
-//! Every public call of `planner-core` at its limits and beyond: numbers that are NaN, infinite,
-//! zero, negative, huge; indices that there are none of; memory that is too small. Each gives its
-//! answer or its error; none panics.
+//! Calls every public function of `planner-core` with extreme and invalid arguments: numbers that
+//! are NaN, infinite, zero, negative or huge; indices out of range; memory that is too small. Each
+//! call must return a result or an error; none may panic.
 //!
-//! Runs on the desk and on a board. The answers are summed up, so that a test sees both give the
-//! same.
+//! Runs on host and board. The results go into a checksum, by which a test compares both.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -18,7 +17,7 @@ use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
 
-/// Numbers that break code which does not check them.
+/// Numbers that make code fail which does not check its arguments.
 pub(super) const HARD_NUMBERS: [f32; 14] = [
     0.0,
     -0.0,
@@ -36,31 +35,31 @@ pub(super) const HARD_NUMBERS: [f32; 14] = [
     f32::NAN,
 ];
 
-/// Receives the name of each call before it is made.
+/// Is given the name of each call before it is made, so that a panic can be attributed.
 pub trait Listener {
-    /// `name` is its file, its type if it has one, and its own name.
+    /// Called before each call; `name` is the callee's file, type (if any) and function.
     fn next(&mut self, name: &'static str);
 }
 
-/// Reported answers, and their sum.
+/// Makes calls and keeps a checksum of their results.
 pub struct Results<'a, L> {
     listener: &'a mut L,
     sum: u32,
 }
 
 impl<'a, L: Listener> Results<'a, L> {
-    /// No answers yet.
+    /// No results yet.
     pub fn new(listener: &'a mut L) -> Self {
         Self { listener, sum: 0 }
     }
 
-    /// Makes a call.
+    /// Reports `name` to the listener, then calls `work`.
     pub(super) fn call<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         self.listener.next(name);
         work()
     }
 
-    /// Adds an answer; every NaN is the same.
+    /// Adds a number to the checksum; all NaNs count as the same.
     pub(super) fn add(&mut self, answer: f32) {
         let bits = if answer.is_nan() { 0x7fc0_0000 } else { answer.to_bits() };
         self.add_count(bits as usize);
@@ -78,13 +77,13 @@ impl<'a, L: Listener> Results<'a, L> {
         self.add_count(usize::from(answer));
     }
 
-    /// The sum of all answers so far.
+    /// The checksum of all results so far.
     pub fn sum(&self) -> u32 {
         self.sum
     }
 }
 
-/// Points of hard numbers.
+/// Points whose coordinates are [`HARD_NUMBERS`].
 pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
     let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
     (0..HARD_NUMBERS.len() * 3)
@@ -126,7 +125,7 @@ fn call_frames(to: &mut Results<'_, impl Listener>) {
     }
 }
 
-/// A grid of 5 × 6 × 3 cells with one obstacle.
+/// A grid of 5 × 6 × 3 cells with one occupied cell.
 const SHAPE: GridShape =
     GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
 const WORDS: [u64; 4] = [1 << 17, 0, 0, 0];
@@ -144,7 +143,7 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         to.add_count(word ^ mask as usize);
         let grid =
             to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
-        // Of these shapes only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
+        // None of these shapes needs four words, so `new` must refuse the words of [`SHAPE`].
         assert!(grid.is_err(), "{shape:?}");
     }
     for hard in HARD_NUMBERS {
@@ -157,7 +156,8 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         }
         to.call("voxel::GridShape::center", || shape.center([u32::MAX; 3]));
     }
-    // Bits of words that no cell has, and their neighbours that one has.
+    // Padding bits, which belong to no cell and must be 0, and neighbouring bits that belong to a
+    // cell.
     for (word, bit, padding) in
         [(1, 1, true), (1, 0, false), (2, 8, true), (2, 4, false), (0, 48, true)]
     {
@@ -279,7 +279,7 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
         assert_eq!(indexed.is_ok(), p.iter().all(|c| c.abs() <= 1e6));
         let len = to.call("neighbours::Workspace::len", || index.len());
         assert_eq!(len, if indexed.is_ok() { 2 } else { 0 });
-        // Places that there are none of have no edges.
+        // Ranges of nodes that do not exist yield no edges.
         for range in [0..2, 1..usize::MAX, usize::MAX..usize::MAX] {
             let found = to.call("prm::connect_range", || {
                 prm::connect_range(&grid, &index, &good, range.clone(), |_| {
@@ -371,7 +371,7 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
     assert!(!to.call("flight::Path::waypoints", || path.waypoints().is_empty()));
 }
 
-/// Pictures along a path, whatever their spacing.
+/// Calls of the pictures along a path, with extreme spacings.
 fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
     let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
     let waypoints = WaypointRange {

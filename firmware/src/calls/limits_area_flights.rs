@@ -1,5 +1,5 @@
-//! The calls on the flights of a divided area, on divisions after losses and on ways home at their
-//! limits and beyond.
+//! Calls on the flights of a divided area, on divisions after losses, and on detours home above the
+//! area, with extreme and invalid arguments.
 
 use planner_core::Point;
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
@@ -21,13 +21,13 @@ use super::limits_coverage::{
     self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, ZoneTransit,
 };
 
-/// Waypoints and gates of one vehicle.
+/// Capacities of these calls: waypoints and gates of one vehicle's plan.
 const WAYPOINTS: usize = 24;
 const GATES: usize = 8;
 
 type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-/// Memory lent to the calls.
+/// Memory that is lent to the calls.
 pub(super) struct FlightWorkspaces {
     area: coverage::CoverageMemory,
     losses: losses::Workspace<LANES, VEHICLES>,
@@ -36,7 +36,7 @@ pub(super) struct FlightWorkspaces {
 }
 
 impl FlightWorkspaces {
-    /// Creates it empty: all zeros.
+    /// Empty; its bytes are all zeros.
     pub(super) const fn new() -> Self {
         Self {
             area: coverage::CoverageMemory::new(),
@@ -71,7 +71,7 @@ const SWARM: FlightInputs<'_> = FlightInputs {
     ..coverage_flights::SWARM
 };
 
-/// Makes all calls on coverage.
+/// Makes all calls on coverage: areas and lanes, flights, divisions, detours home.
 pub(super) fn call_area_flights(
     to: &mut Results<'_, impl Listener>,
     schedule: &mut ScheduleWorkspace,
@@ -96,7 +96,7 @@ fn is_good(number: f32) -> bool {
     number > 0.0 && number.is_finite()
 }
 
-/// Whether every place of every flight is one.
+/// Whether all waypoints of all flights have finite coordinates.
 fn is_finite(out: &Flights) -> bool {
     let places = out.flights.iter().flat_map(|flight| flight.path.waypoints());
     places.into_iter().all(|waypoint| waypoint.position.iter().all(|c| c.is_finite()))
@@ -184,8 +184,8 @@ fn call_flight_plans(
     call_field_plans(&mut plan, good, routes);
 }
 
-/// Plans with routes of an unknown vehicle or a wrong waypoint range, which must be refused; with
-/// an odd heading or layer, where any answer will do; and with no routes, which must succeed.
+/// Plans with unusual routes. An unknown vehicle or a wrong waypoint range must be refused; an odd
+/// heading or layer may be planned or refused; no routes at all must be planned.
 fn unusual_routes(
     plan: &mut impl FnMut(
         &Work<'_, LANES, CORNERS>,
@@ -221,7 +221,7 @@ fn unusual_routes(
     assert_eq!(plan(good, &Plan::new(), &SWARM), Ok(()));
 }
 
-/// Lanes over a field.
+/// Plans flights above a height field, with extreme settings of terrain following.
 fn call_field_plans(
     plan: &mut impl FnMut(
         &Work<'_, LANES, CORNERS>,
@@ -246,7 +246,7 @@ fn call_field_plans(
     }
 }
 
-/// Uneven ground under the area.
+/// A height field with uneven ground below the area.
 fn uneven_field(file: &mut [u8]) -> FieldView<'_> {
     let shape = FieldShape { low: Flat::new(-20.0, -20.0), cell_m: 40.0, columns: 2, rows: 3 };
     let length = field::write(&shape, &[0, 20, 40, 10, -30, 50], file).expect("it fits");
@@ -298,7 +298,7 @@ fn call_divisions(
                 let setting = Err(CoverageError::Setting("along_m").into());
                 assert!(fates.len() != VEHICLES || hard >= 0.0 || divided == setting);
                 to.add_count(routes.routes.len());
-                // Once more: what is done stays done.
+                // The same loss again: waypoints that are already done must not be divided again.
                 let _ = call_redivide(to, &loss, memory, &mut routes);
                 if let Some(route) = routes.routes.first_mut() {
                     route.vehicle = u8::MAX;

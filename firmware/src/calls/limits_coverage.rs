@@ -1,4 +1,4 @@
-//! The calls on areas, lanes and their division at their limits and beyond.
+//! Calls on areas, lanes and their division with extreme and invalid arguments.
 
 use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -14,12 +14,12 @@ use planner_core::flight::{WaypointRange, WaypointSet};
 
 use super::limits::{HARD_NUMBERS, Listener, Results};
 
-/// Capacities: lanes, vertices, corners of no-fly zones, vehicles.
+/// Capacities of these calls: lanes, vertices, corners of no-fly zones, vehicles.
 pub(super) const LANES: usize = 8;
 pub(super) const VERTICES: usize = 12;
 pub(super) const CORNERS: usize = 4;
 pub(super) const VEHICLES: usize = 3;
-/// Places of waypoints and ends of ranges.
+/// Waypoint numbers and range ends that are tried.
 const NUMBERS: [u32; 6] = [0, 1, 7, 1 << 24, u32::MAX - 1, u32::MAX];
 
 const CORNERS_OF_ALL: [Flat; 8] = [
@@ -60,7 +60,7 @@ const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
 pub(super) type Lanes = Tracks<LANES>;
 pub(super) type ZoneTransit<'a> = Transit<'a, CORNERS>;
 
-/// Memory lent to the calls.
+/// Memory that is lent to the calls.
 pub(super) struct CoverageMemory {
     pub(super) tracks: Lanes,
     left: Lanes,
@@ -70,7 +70,7 @@ pub(super) struct CoverageMemory {
 }
 
 impl CoverageMemory {
-    /// Creates it empty: all zeros.
+    /// Empty; its bytes are all zeros.
     pub(super) const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
@@ -86,7 +86,8 @@ fn is_good(number: f32) -> bool {
     number > 0.0 && number.is_finite()
 }
 
-/// Makes all of them. Lent are afterwards the lanes and the routes of [`test_area`].
+/// Makes all calls on areas, lanes and divisions. Leaves lanes and routes of [`test_area`] in
+/// `lent`.
 pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut CoverageMemory) {
     call_waypoint_sets(to);
     call_cameras(to);
@@ -100,7 +101,7 @@ pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut Cove
     call_share_searches(to, &transit, lent);
 }
 
-/// 40 by 30 m, around a no-fly zone.
+/// An area of 40 by 30 m with a no-fly zone inside.
 pub(super) fn test_area() -> Area<'static> {
     Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
 }
@@ -280,7 +281,7 @@ fn call_lanes(
     call_waypoint_numbers(to, tracks);
 }
 
-/// Waypoints that there are and that there are not.
+/// Calls with waypoint numbers that exist and that do not.
 fn call_waypoint_numbers(to: &mut Results<'_, impl Listener>, tracks: &Lanes) {
     let count = to.call("lanes::Tracks::waypoint_count", || tracks.waypoint_count());
     let lanes = to.call("lanes::Tracks::lanes", || tracks.lanes().len());
@@ -333,7 +334,7 @@ fn call_divisions(
     assert!(divide::remaining_lanes(&none.clone(), &[], transit, &mut none).is_err());
 }
 
-/// [`FLEET`], one of which has a hard number.
+/// [`FLEET`] six times, each time with `hard` in another field of the second vehicle.
 fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     let with = |vehicle: Vehicle| [FLEET[0], vehicle, FLEET[2]];
     [
@@ -476,7 +477,7 @@ fn call_share_searches(
     assert_eq!(powell(&good, &powell::PowellConfig { evaluations: 50 }, ws, plan), Ok(()));
 }
 
-/// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
+/// Inserts ranges into a set of waypoints: reversed, touching, covering all, or without room.
 fn call_waypoint_sets(to: &mut Results<'_, impl Listener>) {
     let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
     let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);

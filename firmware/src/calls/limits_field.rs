@@ -1,4 +1,4 @@
-//! The field, and paths above it, at their limits.
+//! Calls of the height field, and of paths that follow it, with extreme and invalid arguments.
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -13,8 +13,8 @@ const NODES: [i16; 6] = [0, i16::MAX, i16::MIN, -1, 100, 7];
 const BYTES: usize = 64;
 
 const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
-/// Coordinates so far that a path to one of them has tens of thousands of samples: each is tried
-/// with one slope.
+/// Coordinates so far away that a path to them has tens of thousands of samples: to save time each
+/// is tried with one slope only.
 const FAR_COORDINATES: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
 pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {

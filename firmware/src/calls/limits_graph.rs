@@ -1,4 +1,4 @@
-//! The calls on roadmap files, searches and assignments at their limits and beyond.
+//! Calls on roadmap files, searches and assignments with extreme and invalid arguments.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -9,7 +9,7 @@ use planner_core::search::{self, RoadmapWithLengths, SearchError, SearchWorkspac
 
 use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
 
-/// Most nodes that a workspace holds.
+/// Most nodes of the search workspace in these calls.
 pub(super) const MAX_NODES: usize = 8;
 
 const HEADER: RoadmapHeader = RoadmapHeader {
@@ -22,7 +22,7 @@ const HEADER: RoadmapHeader = RoadmapHeader {
     goals: 2,
 };
 
-/// Places of the nodes: two starts, two goals opposite, two nodes between.
+/// Positions of the roadmap's nodes, m (ENU): two starts, two goals opposite, two nodes between.
 pub(super) const NODE_PLACES: [Point; 6] = [
     Point::new(0.0, 0.0, 2.0),
     Point::new(0.0, 6.0, 2.0),
@@ -32,7 +32,7 @@ pub(super) const NODE_PLACES: [Point; 6] = [
     Point::new(6.0, 5.0, 2.0),
 ];
 
-/// Height of each node over the ground, metres; the last has no ground below it.
+/// Height of each node above the ground, metres; infinite: no ground is known below the last one.
 const HEIGHTS_M: [f32; 6] = [2.0, 2.0, 2.0, 2.0, 2.0, f32::INFINITY];
 
 fn edges() -> Vec<Edge, 9> {
@@ -44,7 +44,8 @@ pub(super) fn any_edge_passable(_: u16, _: &HalfEdge) -> bool {
     true
 }
 
-/// Leaves a good file; returns its length.
+/// Writes roadmap files from good and bad inputs. Leaves a good file in `file` and returns its
+/// length.
 pub(super) fn call_roadmap_files(
     to: &mut Results<'_, impl Listener>,
     ws: &mut SearchWorkspace<MAX_NODES>,
@@ -69,7 +70,7 @@ pub(super) fn call_roadmap_files(
         ] {
             let written =
                 to.call("write::write", || roadmap::write(&header, &NODE_PLACES, &edges, file));
-            // A file that was written can be read.
+            // A file that `write` accepts must parse.
             let read =
                 written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
             assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
@@ -127,7 +128,7 @@ pub(super) fn call_roadmap_files(
     len
 }
 
-/// Indices of nodes: valid ones, and ones of which there is no node.
+/// Node numbers that are tried: the roadmap has nodes 0 to 5, so the last three are invalid.
 pub(super) const NODE_INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
 pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &RoadmapView<'_>) {
@@ -178,7 +179,7 @@ pub(super) fn call_searches(
     let fresh = to.call("search::SearchWorkspace::new", SearchWorkspace::<MAX_NODES>::new);
     let mut way: Vec<u16, MAX_NODES> = Vec::new();
     for node in NODE_INDICES {
-        // Before the first search nothing is reached.
+        // Before the first search every node is unreached.
         assert!(
             to.call("search::SearchWorkspace::distance_m", || fresh.distance_m(node)).is_infinite()
         );

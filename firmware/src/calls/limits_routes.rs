@@ -1,5 +1,5 @@
-//! The calls on plans, schedules and detours at their limits and beyond, after those on the roadmap
-//! that they need.
+//! Calls on plans, schedules and detours with extreme and invalid arguments, after those on the
+//! roadmap that they need.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -18,7 +18,7 @@ use super::limits_area_flights as area_flights;
 use super::limits_field as field;
 use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any_edge_passable};
 
-/// Capacities: vehicles, waypoints, timed segments, gates.
+/// Capacities of these calls: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;
 const WAYPOINTS: usize = 8;
 const PIECES: usize = 256;
@@ -27,7 +27,7 @@ const GATES: usize = 16;
 type Workspace = PlanWorkspace<MAX_NODES, VEHICLES, PIECES>;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-/// Memory lent to the calls.
+/// Memory that is lent to the calls.
 pub struct RouteWorkspaces {
     ws: Workspace,
     plan: Plan,
@@ -37,7 +37,7 @@ pub struct RouteWorkspaces {
 }
 
 impl RouteWorkspaces {
-    /// Creates it empty.
+    /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self {
             ws: Workspace::new(),
@@ -55,8 +55,8 @@ impl Default for RouteWorkspaces {
     }
 }
 
-/// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches,
-/// assignments, plans, schedules, detours, coverage.
+/// Makes all calls but those of `call_without_roadmap`. Returns the checksum after each part:
+/// fields and files, roadmaps, searches, assignments, plans, schedules, detours, coverage.
 pub fn call_all(to: &mut Results<'_, impl Listener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
     field::call_fields(to);
     let len = graph::call_roadmap_files(to, &mut lent.ws.search, &mut lent.file);
@@ -130,7 +130,7 @@ fn call_plans(
             VehicleTask { required_clearance_m: hard, ..TASKS[1] },
             VehicleTask { climb_m: hard, ..TASKS[1] },
         ] {
-            // A height of −0 is 0.
+            // A climb of −0 is not tested: it equals 0 and is valid.
             refused(&request(&[TASK, task], &heights), PlanError::BadTask(2));
         }
         refused(&request(&TASKS, &[1.5, hard]), PlanError::BadDescent(1));
@@ -156,8 +156,8 @@ fn call_plans(
             Err(PlanError::BadGoal(2))
         );
     }
-    // More or fewer vehicles than the roadmap has terminals, and more vehicles than the workspace
-    // holds.
+    // More or fewer vehicles or goals than the roadmap has starts and goals, and more vehicles than
+    // the workspace holds.
     let crowd = [5, 6, 7, 8].map(|id| VehicleTask { id, goal: None, ..TASK });
     for (vehicles, goals) in
         [(&TASKS[..1], 2), (&TASKS[..], 1), (&crowd[..3], 2), (&crowd[..], 4), (&[], 0)]
@@ -231,7 +231,7 @@ fn call_schedules(
             Flight { path: Path::new(), ..flights[0].clone() },
         ] {
             for cfg in [SCHEDULE, cfg] {
-                // A number that is none has no right answer; it must only end.
+                // For NaN or infinite inputs any result is accepted; the call must only return.
                 let answer = to.call("schedule::earliest_departure", || {
                     schedule::earliest_departure(
                         &cfg,

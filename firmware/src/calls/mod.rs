@@ -1,9 +1,9 @@
-//! Every public call of `planner-core` and `companion` that does work, on inputs made to be hard,
-//! each counted by a [`Meter`].
+//! Calls every public function of `planner-core` and `companion` that does work, on inputs chosen
+//! to be expensive; a [`Meter`] measures each call.
 //!
 //! The program `calls` runs them on a board in QEMU and counts instructions;
-//! `cargo xtask bench --only worst-case` prints the table. On the desk the same runs without
-//! counting, as a test.
+//! `cargo xtask bench --only worst-case` prints the table. A test runs them on the host without
+//! counting.
 
 pub mod coverage;
 pub mod coverage_flights;
@@ -19,9 +19,10 @@ mod limits_tests;
 #[cfg(test)]
 mod public_functions;
 
-/// Measures calls: a board counts instructions, the desk measures nothing.
+/// Measures calls: on a board it counts instructions, in host tests it only makes them.
 pub trait Meter {
-    /// Does the work and notes under a name what it cost; of several of one name the most counts.
-    /// `bytes` is what the call needs to be lent: its state or workspace, without its inputs.
+    /// Calls `work` and records its cost under `name`; of several calls of one name the largest
+    /// cost counts. `bytes` is the size of the state or workspace that the call is lent, without
+    /// its inputs.
     fn call<T>(&mut self, name: &'static str, bytes: usize, work: impl FnOnce() -> T) -> T;
 }

@@ -1,11 +1,12 @@
-//! The public functions of a source file, read line by line as rustfmt lays them out. The tests of
-//! `tests/` include this file.
+//! Lists the public functions of a source file, read line by line in rustfmt's layout. The tests in
+//! `tests/` include this file too.
 
 use std::borrow::ToOwned;
 use std::string::String;
 use std::vec::Vec;
 
-/// The type whose functions an `impl` line begins, without its parameters.
+/// The type that a line starting with `impl` implements, without generic parameters; `None` for any
+/// other line.
 fn impl_type_name(line: &str) -> Option<String> {
     let mut rest = line.strip_prefix("impl")?;
     if rest.starts_with('<') {
@@ -20,8 +21,8 @@ fn impl_type_name(line: &str) -> Option<String> {
     Some(of.split(['<', ' ', '{']).next()?.to_owned())
 }
 
-/// Each public function outside the file's module of tests, which comes last: the type that has it
-/// if one does, and its name.
+/// Every public function of a source, without those of its test module, which comes last: the type
+/// of its `impl`, `None` for a free function, and its name.
 pub fn public_functions(source: &str) -> Vec<(Option<String>, &str)> {
     let tests = source.match_indices("#[cfg(test)]\n").find(|(at, head)| {
         source[at + head.len()..].lines().next().is_some_and(|line| line.ends_with('{'))

@@ -1,20 +1,21 @@
-//! What a fault was, by the registers of a Cortex-M (ARMv7-M ARM, B3.2.15 "CFSR"; ARMv8-M ARM,
-//! "UFSR.STKOF").
+//! Tells a stack overflow from other faults, by the fault registers of a Cortex-M (ARMv7-M ARM,
+//! B3.2.15 "CFSR"; ARMv8-M ARM, "UFSR.STKOF").
 
 use core::ops::Range;
 
-/// An access to what the MPU guards, its address in MMFAR; or one while an exception was entered,
-/// which has none.
+/// CFSR bits: DACCVIOL is a data access that the MPU refused, its address in MMFAR if MMARVALID is
+/// set; MSTKERR is one while registers were pushed at an exception's entry, without an address.
 const DACCVIOL: u32 = 1 << 1;
 const MSTKERR: u32 = 1 << 4;
-/// The same access while the floating-point registers were saved; and the bit that MMFAR holds an
-/// address.
+/// CFSR bits: MLSPERR is a refused access while the floating-point registers were pushed; MMARVALID
+/// says that MMFAR holds an address.
 const MLSPERR: u32 = 1 << 5;
 const MMARVALID: u32 = 1 << 7;
-/// ARMv8-M alone: the stack pointer went below MSPLIM.
+/// CFSR bit of ARMv8-M alone: the stack pointer went below MSPLIM.
 const STKOF: u32 = 1 << 20;
 
-/// Whether the stack overflowed: it went below MSPLIM, or into the guard.
+/// Whether a fault with these CFSR and MMFAR values is a stack overflow: the stack pointer went
+/// below MSPLIM, or an access hit the address range `guard` below the stack.
 pub fn is_overflow(cfsr: u32, mmfar: u32, guard: &Range<u32>) -> bool {
     let in_guard = cfsr & DACCVIOL != 0 && cfsr & MMARVALID != 0 && guard.contains(&mmfar);
     cfsr & (STKOF | MSTKERR | MLSPERR) != 0 || in_guard

@@ -1,31 +1,33 @@
-//! STM32H743: RM0433 (the reference manual), DS12110 (the data sheet), ES0392 (the errata).
+//! Register values of the STM32H743, by RM0433 (reference manual), DS12110 (data sheet) and ES0392
+//! (errata).
 
 use super::ResetCause;
 use super::mpu::{Access, Region};
 
-/// Frequency of the oscillator that drives OSC_IN of the NUCLEO-H743ZI: its ST-LINK's MCO (UM1974,
-/// "OSC clock"), MHz.
+/// Frequency of the external clock at OSC_IN of the NUCLEO-H743ZI: MCO output of the on-board
+/// ST-LINK (UM1974, "OSC clock"), MHz.
 pub const HSE_MHZ: u32 = 8;
-/// Frequency of the chip's own oscillator, MHz.
+/// Frequency of the chip's internal oscillator, MHz.
 pub const HSI_MHZ: u32 = 64;
 
 /// Revision of the silicon: DBGMCU_IDC.REV_ID (RM0433, "DBGMCU identity code register").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Revision {
-    /// Z or Y (0x1001, 0x1003), and what is not known: 400 MHz at most, and the AXI SRAM's erratum.
+    /// Z or Y (0x1001, 0x1003), or unknown: at most 400 MHz, and the AXI SRAM needs its erratum's
+    /// workaround.
     Old,
     /// X, V and later (0x2001, 0x2003): 480 MHz.
     New,
 }
 
 impl Revision {
-    /// Revision by the register.
+    /// The revision that DBGMCU_IDC holds.
     pub const fn from_idcode(idc: u32) -> Self {
         if idc >> 16 >= 0x2000 { Self::New } else { Self::Old }
     }
 
-    /// The processor's clock (DS12110, "General operating conditions": VOS0, which Y does not have;
-    /// else VOS1), MHz.
+    /// Clock of the processor, MHz (DS12110, "General operating conditions": 480 at VOS0; revision
+    /// Y has only VOS1, 400).
     pub const fn core_mhz(self) -> u32 {
         match self {
             Self::Old => 400,
@@ -33,33 +35,33 @@ impl Revision {
         }
     }
 
-    /// Settings of PLL1 for the processor's clock: divider before it, factor. Twice that clock is
-    /// halved behind it. The input is 8 or 16 MHz, the output at most 960 (RM0433, "PLL
-    /// configuration").
+    /// Settings of PLL1 for [`Self::core_mhz`]: input divider and multiplication factor. The PLL
+    /// makes twice the processor's clock, which divider P halves. The divided input is 8 MHz from
+    /// HSE, else 16 MHz; the PLL's output is at most 960 MHz (RM0433, "PLL configuration").
     pub const fn pll_divider_and_factor(self, has_hse: bool) -> (u32, u32) {
         let (source, divider) = if has_hse { (HSE_MHZ, 1) } else { (HSI_MHZ, 4) };
         (divider, 2 * self.core_mhz() / (source / divider))
     }
 }
 
-/// Register AXI_TARG7_FN_MOD, and its READ_ISS_OVERRIDE: without it Y may read wrong data from AXI
-/// SRAM (ES0392, "Reading from AXI SRAM may lead to data read corruption").
+/// Address of AXI_TARG7_FN_MOD. Without its bit READ_ISS_OVERRIDE revision Y may read wrong data
+/// from AXI SRAM (ES0392, "Reading from AXI SRAM may lead to data read corruption").
 pub const AXI_TARG7_FN_MOD: u32 = 0x5100_8108;
 /// Bit READ_ISS_OVERRIDE of [`AXI_TARG7_FN_MOD`].
 pub const READ_ISS_OVERRIDE: u32 = 1;
 
-/// RCC_AHB2ENR's clocks of SRAM1, SRAM2 and SRAM3 (RM0433, "RCC AHB2 clock register"): off after a
-/// reset.
+/// Bits of RCC_AHB2ENR that switch on the clocks of SRAM1, SRAM2 and SRAM3 (RM0433, "RCC AHB2 clock
+/// register"); they are off after a reset.
 pub const D2_SRAM: u32 = 0b111 << 29;
 /// Address of RCC_AHB2ENR.
 pub const RCC_AHB2ENR: u32 = 0x5802_44DC;
 
-/// RCC_RSR's bit that clears the others.
+/// Bit of RCC_RSR that clears all reset flags.
 pub const RMVF: u32 = 1 << 16;
 
-/// Reason why it started: RCC_RSR (RM0433, "RCC reset status register", table of the reset
-/// sources). All causes but a wake-up press the reset pin too, and the power's coming is also a
-/// brown-out.
+/// Reset cause by RCC_RSR (RM0433, "RCC reset status register", table of the reset sources). All
+/// resets but a wake-up set the pin's flag too, and power-on sets the brown-out flag: so the flags
+/// are tested in this order.
 pub const fn reset_cause(rsr: u32) -> ResetCause {
     const BOR: u32 = 1 << 21;
     const PIN: u32 = 1 << 22;
@@ -77,26 +79,27 @@ pub const fn reset_cause(rsr: u32) -> ResetCause {
     }
 }
 
-/// The level of the brown-out reset, FLASH_OPTSR_CUR.BOR_LEV (RM0433): 0 is off, 3 resets below 2.7
-/// V. The option bytes are not written by the firmware: a supply that fails meanwhile might lock
-/// the chip.
+/// Brown-out reset level, FLASH_OPTSR_CUR.BOR_LEV (RM0433): 0 is off, 3 resets below 2.7 V. The
+/// firmware only reads it: if the supply failed while option bytes are written, the chip might be
+/// locked.
 pub const fn brown_out_level(optsr: u32) -> u8 {
     (optsr >> 2 & 0b11) as u8
 }
 
-/// Memory that the DMA reads and writes: SRAM3.
+/// SRAM3, which the UARTs' DMA reads and writes: not cached.
 pub const DMA: Region = Region::new(0x3004_0000, 32 << 10, Access::Uncached);
-/// Bank 2 of the flash: words of it may be torn, and others change.
+/// Bank 2 of the flash: not cached, because it is programmed at run time and torn words may be
+/// unreadable.
 pub const BANK2: Region = Region::new(0x0810_0000, 1 << 20, Access::Uncached);
-/// The address 0, ITCM's first bytes.
+/// The first 256 bytes of the address space (ITCM): no access, so null pointers fault.
 pub const NULL: Region = Region::new(0, 256, Access::None);
-/// Where external memory would be, 0x6000_0000 to 0xDFFF_FFFF: by default the processor may read
-/// ahead there, from controllers that are off. Four eighths of all there is.
+/// Address range of external memory, 0x6000_0000 to 0xDFFF_FFFF, four eighths of the address space:
+/// no access, else the processor might read speculatively from memory controllers that are off.
 pub const EXTERNAL: Region =
     Region { base: 0, len_log2: 32, access: Access::None, without: 0b1000_0111 };
 
-/// The sectors of bank 2 that a roadmap lies in, cached; the MPU then holds them read only. `at`
-/// and `len` count from the bank's first byte. An eighth of the bank is a sector of 128 kB.
+/// The sectors of bank 2 that hold a roadmap of `len` bytes at offset `at` of the bank: cached,
+/// read only. An eighth of the bank is one sector of 128 kB, so SRD bits disable the other sectors.
 pub const fn roadmap_region(at: u32, len: u32) -> Region {
     const SECTOR: u32 = 128 << 10;
     let (first, end) = (at / SECTOR, (at + len).div_ceil(SECTOR));

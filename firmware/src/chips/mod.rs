@@ -1,26 +1,26 @@
-//! What is written to and read from registers of the chips before anything runs: values that the
-//! manuals give, worked out where the desk can test them. `boards/` writes and reads them;
-//! `docs/firmware.md` names section and evidence of each.
+//! Register values of the chips that are set or read before the companion runs: computed from the
+//! manuals' definitions, without hardware access, so that the host can test them. `boards/` reads
+//! and writes the registers; `docs/firmware.md` lists manual section and evidence for each.
 
 pub mod fault;
 pub mod h743;
 pub mod mpu;
 pub mod rp2350;
 
-/// Reason why a chip started, by its own registers.
+/// Why a chip was reset, by its own registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
-    /// The power came.
+    /// Power-on.
     Power,
-    /// The supply was too low for a while.
+    /// The supply voltage was too low for a while.
     BrownOut,
-    /// A person pressed reset.
+    /// The reset pin was pulled, by the reset key.
     Key,
-    /// The watchdog was not fed.
+    /// The watchdog was not fed in time.
     Watchdog,
-    /// The program or a debugger asked for it.
+    /// Requested by the program or a debugger.
     Request,
-    /// The chip does not say.
+    /// The chip's registers show no cause.
     Unknown,
 }
 

@@ -1,35 +1,37 @@
 //! Regions of the memory protection unit of a Cortex-M7 (ARMv7-M ARM, B3.5 "Protected Memory System
 //! Architecture"), as values of MPU_RBAR and MPU_RASR.
 
-/// Access to a region, and how its data are cached.
+/// How code may access a region, and whether its data are cached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// No access: any access is a fault, and the processor fetches nothing ahead of time.
+    /// Every access is a fault, and the processor does no speculative reads.
     None,
-    /// Data that others write beside the processor, or that may not be readable: no cache.
+    /// Read and write, not cached: data that DMA also writes, or flash words that may be
+    /// unreadable.
     Uncached,
-    /// Data that are read only, cached.
+    /// Read only, cached.
     CachedReadOnly,
 }
 
-/// A region: `len` bytes from `base` on, a power of two of at least 32, on a multiple of itself.
+/// An MPU region: 2^`len_log2` bytes, at least 32, aligned to their length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
-    /// First byte.
+    /// Address of the first byte.
     pub base: u32,
-    /// Bytes, as a power of two.
+    /// Binary logarithm of the length in bytes.
     pub len_log2: u32,
-    /// Access to the region.
+    /// Access that the region allows.
     pub access: Access,
-    /// A bit for each eighth of it to which it does not apply; only from 256 bytes on.
+    /// SRD bits: a set bit disables the region in that eighth of it. Only for regions of 256 bytes
+    /// or more.
     pub without: u8,
 }
 
 impl Region {
-    /// A whole region.
+    /// A region without disabled eighths.
     ///
     /// # Panics
-    /// It cannot be one: too small, or not on a multiple of its length.
+    /// `len` is no power of two of at least 32, or `base` is no multiple of `len`.
     pub const fn new(base: u32, len: u32, access: Access) -> Self {
         assert!(
             len.is_power_of_two() && len >= 32,
@@ -39,22 +41,23 @@ impl Region {
         Self { base, len_log2: len.trailing_zeros(), access, without: 0 }
     }
 
-    /// MPU_RBAR for region `number`: its address, VALID and the number.
+    /// Value of MPU_RBAR for region `number`: base address, VALID bit, region number.
     pub const fn rbar(&self, number: u32) -> u32 {
         self.base | 1 << 4 | number
     }
 
-    /// MPU_RASR: XN, AP, TEX S C B, SRD, SIZE and ENABLE. Nothing is executed from any region.
+    /// Value of MPU_RASR: XN, AP, TEX, S, C, B, SRD, SIZE and ENABLE. Code is executed from no
+    /// region.
     pub const fn rasr(&self) -> u32 {
         const XN: u32 = 1 << 28;
         const ENABLE: u32 = 1;
         let attributes = match self.access {
-            // AP 0b000; strongly ordered, so nothing is read ahead.
+            // AP 0b000: no access; strongly ordered memory, so no speculative reads.
             Access::None => 0,
-            // AP 0b011 read and write; TEX 0b001, C 0, B 0: normal memory, not cached; S, as others
-            // share it.
+            // AP 0b011: read and write; TEX 0b001, C 0, B 0: normal memory, not cached; S: shared
+            // with DMA.
             Access::Uncached => 0b011 << 24 | 0b001 << 19 | 1 << 18,
-            // AP 0b110 read only; TEX 0b000, C 1, B 0: normal memory, write-through.
+            // AP 0b110: read only; TEX 0b000, C 1, B 0: normal memory, write-through cache.
             Access::CachedReadOnly => 0b110 << 24 | 1 << 17,
         };
         XN | attributes | (self.without as u32) << 8 | (self.len_log2 - 1) << 1 | ENABLE

@@ -1,9 +1,10 @@
-//! ArduCopter's AUTO: an uploaded mission.
+//! ArduCopter's mode AUTO, which flies an uploaded mission.
 //!
-//! It is entered only with a mission, on the ground armed only with one that begins with a
-//! take-off; it is not armed in. On the ground it waits for MISSION_START, as nobody raises a
-//! throttle; in the air it continues at once. It looks where it flies (`WP_YAW_BEHAVIOR` 2),
-//! whatever heading an item has. A return and a landing are flown within AUTO.
+//! It can be entered only with a mission; if armed on the ground, only with one that begins with a
+//! take-off. It cannot be armed in AUTO. On the ground it waits for MISSION_START (no throttle
+//! stick is simulated); in the air it continues at once. The vehicle faces its direction of flight
+//! (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. Return and landing items are flown within
+//! AUTO.
 
 use planner_core::Point;
 
@@ -13,13 +14,13 @@ use super::{Copter, Mode, ReturnLeg, TakeOff};
 use crate::itinerary::{MissionLeg, interpolate_height};
 use crate::platform::{Platform, SensorReadings};
 
-/// A place to land at is reached within this distance, metres.
+/// Distance within which the place of a landing is reached, metres.
 const ARRIVED_M: f32 = 0.5;
-/// Distance to the target beyond which the vehicle turns towards it, metres.
+/// Distance to the target beyond which the vehicle turns its heading towards it, metres.
 const TURN_BEYOND_M: f32 = 2.0;
 
 impl Copter {
-    /// Whether AUTO can be entered; says why not.
+    /// Whether AUTO can be entered; if the take-off is missing, sends a STATUSTEXT.
     pub(super) fn can_enter_auto(&self, platform: &mut Platform) -> bool {
         if platform.has_mission() && self.armed && self.landed && !platform.mission_takes_off() {
             platform.send_text(2, "Auto: Missing Takeoff Cmd");
@@ -28,7 +29,8 @@ impl Copter {
         platform.has_mission()
     }
 
-    /// MISSION_START.
+    /// Executes MISSION_START: enters AUTO and allows the take-off. False if AUTO cannot be
+    /// entered.
     pub(super) fn start_mission(&mut self, platform: &mut Platform) -> bool {
         let starts =
             self.can_enter_auto(platform) && self.set_mode(Mode::Auto, &platform.sensors());
@@ -36,7 +38,7 @@ impl Copter {
         starts
     }
 
-    /// The vehicle comes down by itself, in AUTO.
+    /// Whether the vehicle descends to land in AUTO (landing item, or the end of a return item).
     pub(super) fn is_landing_in_auto(&self) -> bool {
         self.mode == Mode::Auto
             && match self.auto.leg {
@@ -46,7 +48,8 @@ impl Copter {
             }
     }
 
-    /// Disarmed: what came down is done, and the mission is flown from its first item again.
+    /// Ends AUTO at disarming: a landing counts as completed, and the next flight starts with the
+    /// first item.
     pub(super) fn end_auto(&mut self, platform: &mut Platform) {
         if self.is_landing_in_auto() {
             platform.complete_item();
@@ -57,7 +60,7 @@ impl Copter {
         self.auto = Auto::default();
     }
 
-    /// One step of the mission.
+    /// Advances the mission by one step: updates the leg to fly, speed and take-off.
     pub(super) fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if self.mode != Mode::Auto {
             if self.auto.leg.take().is_some() {
@@ -74,7 +77,7 @@ impl Copter {
         }
         if leg != self.auto.leg {
             self.auto.from = MissionLeg::leg_end(self.auto.leg, &sensors.position);
-            // At least a metre up from the ground.
+            // The take-off climbs at least 1 m.
             self.takeoff = match leg {
                 Some(MissionLeg::TakeOff { up }) if self.landed => {
                     Some(TakeOff { since_us: sensors.now_us, up: up.max(sensors.position.z + 1.0) })
@@ -88,7 +91,7 @@ impl Copter {
         self.auto.leg = leg;
     }
 
-    /// The goal of the mission now.
+    /// The goal of the mission's current leg.
     pub(super) fn auto_goal(&mut self, sensors: &SensorReadings) -> Goal {
         if self.takeoff.is_some() {
             return self.take_off_goal();

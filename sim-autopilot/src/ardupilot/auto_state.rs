@@ -1,20 +1,20 @@
-//! What AUTO remembers.
+//! State of the mode AUTO.
 
 use planner_core::Point;
 
 use crate::itinerary::MissionLeg;
 
-/// State of AUTO.
+/// State of the mode AUTO.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Auto {
-    /// The vehicle may leave the ground (`auto_armed`).
+    /// Whether the vehicle may take off (`auto_armed`).
     pub may_lift: bool,
-    /// Leg that is flown now.
+    /// Leg of the mission that is flown now.
     pub leg: Option<MissionLeg>,
-    /// Start of that leg.
+    /// Start of that leg, ENU metres.
     pub from: Point,
-    /// Place where the vehicle stays without a commanded leg.
+    /// Point at which the vehicle holds while no leg moves it, ENU metres.
     pub stay: Option<Point>,
-    /// Commanded heading.
+    /// Heading of the last leg, radians clockwise from north.
     pub heading: Option<f32>,
 }

@@ -1,5 +1,5 @@
-//! ArduCopter's answers: commands and their acks, modes by SET_MODE, message intervals and stream
-//! requests.
+//! ArduCopter's handling of commands, SET_MODE, message intervals and stream requests, and its
+//! COMMAND_ACKs.
 
 use super::setpoint::Goal;
 use super::{Copter, Mode, STREAMS};
@@ -13,7 +13,7 @@ use crate::wire::PayloadReader;
 
 const SET_MODE: u16 = 11;
 
-/// MAV_DATA_STREAM and the messages it stands for (`SRn_*`).
+/// Values of MAV_DATA_STREAM, and the messages that each switches on (`SRn_*`).
 const DATA_STREAMS: [(u8, &[u32]); 8] = [
     (1, &[29, 105]),            // RAW_SENSORS
     (2, &[1, 24, 42, 62, 245]), // EXTENDED_STATUS
@@ -26,7 +26,7 @@ const DATA_STREAMS: [(u8, &[u32]); 8] = [
 ];
 
 impl Copter {
-    /// Takes a command and acknowledges it.
+    /// Executes a command and queues its COMMAND_ACK.
     pub(crate) fn handle_command(
         &mut self,
         platform: &mut Platform,
@@ -45,7 +45,7 @@ impl Copter {
             DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
                 return platform.handle_camera_command(from, command);
             }
-            // The height counts from home.
+            // NAV_TAKEOFF's height counts from home.
             22 => accepted_or_failed(self.take_off(sensors.home.z + command.z, &sensors)),
             21 => accepted_or_failed(self.set_mode(Mode::Land, &sensors)),
             20 => accepted_or_failed(self.set_mode(Mode::Rtl, &sensors)),
@@ -85,7 +85,7 @@ impl Copter {
         platform.acknowledge(from, command.id, result);
     }
 
-    /// Takes the old SET_MODE, which ArduPilot acknowledges as if it were a command.
+    /// Handles the message SET_MODE, to which ArduPilot sends a COMMAND_ACK as to a command.
     pub(crate) fn handle_set_mode(
         &mut self,
         platform: &mut Platform,
@@ -105,7 +105,7 @@ impl Copter {
         accepted_or_failed(mode.is_some_and(|mode| self.set_mode(mode, &platform.sensors())))
     }
 
-    /// DO_REPOSITION: Guided, to a place.
+    /// Executes DO_REPOSITION: flies to a point in Guided. Returns the MAV_RESULT.
     fn reposition(&mut self, platform: &Platform, command: &Command) -> u8 {
         let sensors = platform.sensors();
         let Some(to) = platform.reposition_target(command) else { return DENIED };
@@ -120,8 +120,8 @@ impl Copter {
     }
 }
 
-/// Takes REQUEST_DATA_STREAM: the way ground stations asked before SET_MESSAGE_INTERVAL. It is not
-/// answered.
+/// Handles REQUEST_DATA_STREAM, by which ground stations set stream rates before
+/// SET_MESSAGE_INTERVAL existed. It is not acknowledged.
 pub(crate) fn handle_stream_request(
     platform: &mut Platform,
     from: Sender,

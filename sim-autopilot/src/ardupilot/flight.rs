@@ -1,4 +1,4 @@
-//! What each flight mode asks of the position controller.
+//! The demand of each of ArduCopter's flight modes to the position controller.
 
 use planner_core::Point;
 
@@ -9,21 +9,21 @@ use crate::platform::SensorReadings;
 use crate::shaping::approach_rate;
 use crate::vehicle::Demand;
 
-/// The take-off is done within this distance of its height, metres: landed_state 2 came 9.3 s after
-/// the command to 10 m.
+/// Distance below its height at which a take-off is complete, metres: then landed_state 2 comes 9.3
+/// s after the command to 10 m, as recorded.
 const TAKEN_OFF_M: f32 = 0.12;
-/// Profile of the lift-off, as seen: seconds since the vehicle lifted, and the acceleration up
-/// until then, m/s². First the throttle creeps past hover; the controllers wind up meanwhile and
-/// then kick.
+/// Profile of a lift-off as recorded: time since lift-off until which each entry applies (s), and
+/// upward acceleration (m/s²). First the throttle slowly passes hover while the controllers'
+/// integrals wind up; then they push.
 const LIFT_OFF_PROFILE: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
-/// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts:
-/// the speed decays with 7.5 / 5 s.
+/// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). The jerk limit of 5 m/s³ acts first, so
+/// it is never reached: the speed decays with a time constant of 7.5 / 5 s.
 const BRAKE_MPS2: f32 = 7.5;
-/// A leg of the return ends within this distance of its target, metres.
+/// Distance within which a leg of RTL has reached its target, metres.
 const ARRIVED_M: f32 = 0.5;
 
 impl Copter {
-    /// Demand of the mode now.
+    /// The demand of the mode in this step.
     pub(super) fn demand(&mut self, sensors: &SensorReadings, dt: f32) -> Demand {
         let mut tuning = self.tuning;
         tuning.speed = self.speed.unwrap_or(tuning.speed);
@@ -43,7 +43,7 @@ impl Copter {
             Mode::Land => self.landing_goal(sensors),
         };
         self.reference.advance(&goal, &tuning, dt);
-        // Without a position there is nothing to hold across.
+        // Without a position estimate the horizontal position is not controlled.
         let across = self.position_known(sensors.now_us);
         let (p, v, a) =
             (self.reference.position, self.reference.velocity, self.reference.acceleration);
@@ -52,11 +52,11 @@ impl Copter {
             if across { p.y } else { f32::NAN },
             p.z,
         );
-        // ArduPilot's derivative acts on the error, not on what is measured: what the reference
-        // shall do is added back.
+        // The simulated controller's derivative acts on the measured acceleration, ArduPilot's on
+        // the error: the difference is added to the feed-forward.
         let d = 1.0 + tuning.gains.velocity_d[0];
         if sensors.touching && v.z < 0.0 {
-            // The reference does not run on below the ground.
+            // On the ground the reference does not continue below the vehicle.
             self.reference.position.z = sensors.position.z;
         }
         Demand {
@@ -70,7 +70,7 @@ impl Copter {
         }
     }
 
-    /// Acceleration up while it leaves the ground; NaN once it has.
+    /// Upward acceleration during lift-off, m/s²; NaN after it.
     fn lift_off_acceleration(&self, now_us: u64) -> f32 {
         let since_s = now_us.saturating_sub(self.since.lifted_us) as f32 * 1e-6;
         LIFT_OFF_PROFILE
@@ -90,7 +90,8 @@ impl Copter {
         goal
     }
 
-    /// Velocities end with `GUID_TIMEOUT`; until then they carry a position with them.
+    /// The goal of Guided in this step: moves a position with its velocity, and stops after
+    /// `GUID_TIMEOUT`.
     fn guided_goal(&mut self, now_us: u64, dt: f32) -> Goal {
         let age_us = now_us.saturating_sub(self.goal_us);
         if self.goal.expires && age_us > micros_from_s(self.tuning.guided_timeout_s) {
@@ -104,9 +105,9 @@ impl Copter {
         self.goal
     }
 
-    /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and
-    /// `WPNAV_SPEED_DN` at most (`Mode::land_run_vertical_control`): without a rangefinder it knows
-    /// no other ground.
+    /// Demand to land: descends as if to stop at `LAND_ALT_LOW` above home, at least at
+    /// `LAND_SPEED` and at most at `WPNAV_SPEED_DN` (`Mode::land_run_vertical_control`). Heights
+    /// count from home, since no rangefinder measures the ground.
     pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> Goal {
         let tuning = &self.tuning;
         let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);
@@ -123,7 +124,7 @@ impl Copter {
         if let ReturnLeg::Climb { up } = &mut self.leg
             && up.is_nan()
         {
-            // Near home the climb is cut by the cone `RTL_CONE_SLOPE`.
+            // Near home the cone `RTL_CONE_SLOPE` limits the climb.
             let height = self.tuning.return_height.min(away * self.tuning.return_cone);
             *up = (home.z + height).max(sensors.position.z);
         }

@@ -1,16 +1,16 @@
-//! ArduCopter 4.6's state machine: arming, modes, take-off, Guided, failsafes and landing, as it
-//! was seen to behave.
+//! ArduCopter 4.6's state machine: arming, modes, take-off, Guided, failsafes and landing, as
+//! observed.
 //!
 //! | state | leaves it |
 //! |---|---|
 //! | disarmed | arm command in a mode that allows it, with the estimator ready |
 //! | armed, on the ground | NAV_TAKEOFF in Guided; `DISARM_DELAY` disarms. Setpoints do not lift it |
 //! | take-off | lifts 2.3 s after the command and climbs; a setpoint ends it, before the lift-off for good |
-//! | flying | the ground, touched for 1.6 s without a demand to climb |
+//! | flying | on the ground for 1.6 s without a demand to climb: landed |
 //! | landed | in LAND and RTL disarms 0.4 s later, else after `DISARM_DELAY` |
 //!
 //! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever.
-//! Times are microseconds since boot and arguments; nothing here reads a clock.
+//! Times are arguments, in microseconds since boot; no clock is read.
 
 mod auto;
 mod auto_state;
@@ -39,31 +39,31 @@ use super::vehicle::VehicleLimits;
 use super::wire::PayloadReader;
 use crate::AutopilotKind;
 
-/// Time from arming to the lift-off where NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2
-/// s, spool-up 0.5 s, and the throttle's slew to hover.
+/// Time from arming to lift-off if NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2 s,
+/// spool-up 0.5 s, and the throttle's slew to hover.
 const ARM_TO_LIFT_S: f32 = 3.05;
-/// Time from a later NAV_TAKEOFF to the lift-off, seconds.
+/// Time from a later NAV_TAKEOFF to lift-off, seconds.
 const TAKEOFF_TO_LIFT_S: f32 = 2.07;
-/// `LAND_DETECTOR_TRIGGER_SEC` and its filters: 1.68 s seen.
+/// Time on the ground until landed, seconds: `LAND_DETECTOR_TRIGGER_SEC` and filters; 1.68 s seen.
 const LAND_DETECTOR_S: f32 = 1.6;
-/// Time from landed to disarmed in LAND and RTL: 0.4 s seen, HEARTBEAT 0.8 s.
+/// Time from landed to disarmed in LAND and RTL, seconds: 0.4 s seen; HEARTBEAT shows it at 0.8 s.
 const LAND_DISARM_S: f32 = 0.4;
-/// Time before `DISARM_DELAY` at which the autopilot disarms: 9.94 s of 10 seen.
+/// How much earlier than `DISARM_DELAY` it disarms, seconds: 9.94 s of 10 seen.
 const DISARM_EARLY_S: f32 = 0.06;
-/// Delay of the failsafe after `FS_GCS_TIMEOUT`: 5.1 s of 5 seen.
+/// Delay of the failsafe beyond `FS_GCS_TIMEOUT`, seconds: 5.1 s of 5 seen.
 const GCS_REACTION_S: f32 = 0.1;
-/// Time from the loss of the position to the EKF failsafe (`EKF_CHECK_ITERATIONS_MAX` and the
-/// estimator's own wait).
+/// Time from the loss of the position to the EKF failsafe, seconds (`EKF_CHECK_ITERATIONS_MAX` and
+/// the estimator's own timeout).
 const ESTIMATOR_REACTION_S: f32 = 1.5;
-/// Time from the boot until the estimator has an attitude: 5.8 s seen.
+/// Time from boot until the estimator has an attitude, seconds: 5.8 s seen.
 const BOOT_TO_ATTITUDE_S: f32 = 5.8;
-/// Share of the time until the estimator has a position after which the estimator has an origin: 20
-/// of 41.6 s seen.
+/// Share of the time until the estimator has a position after which it has an origin: 20 of 41.6 s
+/// seen.
 const ORIGIN_SHARE: f32 = 0.48;
-/// Time from the boot to the first STANDBY.
+/// Time from boot until HEARTBEAT reports STANDBY, seconds.
 const BOOT_TO_STANDBY_S: f32 = 3.0;
 
-/// Streams: message id and interval in µs, 0 off until asked for.
+/// Telemetry streams: message id and default interval in µs; 0: off until requested.
 pub const STREAMS: [(u32, u32); 25] = [
     (0, 1_000_000),    // HEARTBEAT
     (111, 10_000_000), // TIMESYNC
@@ -92,7 +92,7 @@ pub const STREAMS: [(u32, u32); 25] = [
     (245, 0),          // EXTENDED_SYS_STATE
 ];
 
-/// Reason for a failsafe.
+/// Which failsafe is active.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Failsafe {
     GroundStation,
@@ -100,7 +100,7 @@ enum Failsafe {
     Battery,
 }
 
-/// A take-off under way.
+/// A take-off in progress: time of the command, and target height (ENU up), metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct TakeOff {
     since_us: u64,
@@ -115,7 +115,7 @@ enum ReturnLeg {
     Land,
 }
 
-/// When each of these began last, microseconds since boot.
+/// Time at which each phase last began, microseconds since boot.
 #[derive(Clone, Copy, Debug, Default)]
 struct PhaseStartTimes {
     armed_us: u64,
@@ -125,19 +125,19 @@ struct PhaseStartTimes {
     touching_us: Option<u64>,
 }
 
-/// The firmware: state machine and parameters.
+/// Simulated ArduCopter: state machine and parameters.
 #[derive(Clone, Debug)]
 pub struct Copter {
-    /// The parameter table.
+    /// All parameters, as MAVLink reports them.
     pub params: Params,
-    /// Parameters that act.
+    /// Values of the parameters that have an effect.
     pub tuning: Tuning,
     ready_us: u64,
     reported: [bool; 2],
     runtime_us: u64,
     armed: bool,
     since: PhaseStartTimes,
-    /// The position controller starts in this step.
+    /// The position controller starts in flight in this step, so its integral is initialised.
     starts: bool,
     landed: bool,
     mode: Mode,
@@ -155,7 +155,7 @@ pub struct Copter {
 }
 
 impl Copter {
-    /// ArduCopter as it boots: disarmed in STABILIZE, without a position until `ready_s`.
+    /// ArduCopter as it boots: disarmed in STABILIZE; its estimator has a position after `ready_s`.
     pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
         let params = params::default_params(system_id, limits);
         Self {
@@ -183,22 +183,22 @@ impl Copter {
         }
     }
 
-    /// Motors on.
+    /// Whether the motors are armed.
     pub fn armed(&self) -> bool {
         self.armed
     }
 
-    /// The land detector's verdict.
+    /// Whether the land detector reports the vehicle on the ground.
     pub fn landed(&self) -> bool {
         self.landed
     }
 
-    /// A failsafe acts.
+    /// Whether a failsafe is active.
     pub fn in_failsafe(&self) -> bool {
         self.failsafe.is_some()
     }
 
-    /// The estimator lost or found its position.
+    /// Sets whether the estimator can have a position.
     pub fn set_position_ok(&mut self, ok: bool) {
         self.position_ok = ok;
     }
@@ -216,8 +216,8 @@ impl Copter {
             autopilot: AutopilotKind::Ardupilot,
             custom_mode: self.mode.number(),
             intended_mode: self.mode.number(),
-            // Custom, stabilised, manual input; with the guided flag in every mode that has a
-            // position.
+            // Flags custom mode, stabilized and manual input; and guided, except in STABILIZE and
+            // ALT_HOLD.
             flags: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
             system_status: match self.failsafe {
                 Some(_) => 5,
@@ -251,7 +251,7 @@ impl Copter {
         now_us as f32 >= ORIGIN_SHARE * self.ready_us as f32
     }
 
-    /// Takes a setpoint; outside Guided it is ignored.
+    /// Handles a setpoint message (`id` 84 or 86); ignored outside Guided.
     pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
         if self.mode != Mode::Guided {
             return;
@@ -264,7 +264,7 @@ impl Copter {
         self.fly_to(goal, &platform.sensors());
     }
 
-    /// A new goal in Guided: it ends a take-off.
+    /// Sets the goal of Guided, which ends a take-off in progress.
     fn fly_to(&mut self, goal: Goal, sensors: &SensorReadings) {
         if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some()
         {
@@ -273,7 +273,7 @@ impl Copter {
         (self.goal, self.goal_us) = (goal, sensors.now_us);
     }
 
-    /// HEARTBEAT of another system: only the ground station's counts.
+    /// Handles another system's HEARTBEAT: only that of `SYSID_MYGCS` counts for the failsafe.
     pub(super) fn handle_heartbeat(&mut self, platform: &mut Platform, from: Sender) {
         if from.system != self.tuning.gcs_system {
             return;
@@ -286,7 +286,7 @@ impl Copter {
         }
     }
 
-    /// Whether the arming checks pass, or why not.
+    /// Whether the arming checks pass; the error is the text of the STATUSTEXT.
     fn check_arming(&self, sensors: &SensorReadings) -> Result<(), &'static str> {
         if !self.mode.allows_arming() {
             Err("Arm: Mode not armable")
@@ -317,7 +317,7 @@ impl Copter {
         true
     }
 
-    /// Disarms; in the air only by force.
+    /// Disarms. Refused (false) in the air, unless `force`.
     fn disarm(&mut self, platform: &mut Platform, force: bool) -> bool {
         if self.armed && !self.landed && !force {
             return false;
@@ -333,7 +333,7 @@ impl Copter {
         true
     }
 
-    /// Changes the mode if it can run. Disarmed, Guided is accepted without a position.
+    /// Enters the mode. Refused (false) while armed, if it needs a position and there is none.
     fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> bool {
         if self.armed && mode.needs_position() && !self.position_known(sensors.now_us) {
             return false;
@@ -342,13 +342,12 @@ impl Copter {
         true
     }
 
-    /// Changes the mode as a pilot's switch does. The mode it is in is not entered again.
+    /// Enters the mode as a pilot's switch does, even if it cannot run; not if it is current.
     pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         if mode == self.mode {
             return;
         }
-        // Land continues with the reference of a controller that was running, the others start
-        // theirs.
+        // LAND continues with the running controller's reference; all other modes start a new one.
         let runs = self.mode.needs_position() && !self.landed;
         if mode != Mode::Land || !runs {
             self.reference = Reference::new(sensors.position, sensors.velocity);
@@ -362,7 +361,7 @@ impl Copter {
         self.leg = ReturnLeg::Climb { up: f32::NAN };
     }
 
-    /// NAV_TAKEOFF to a height in the mission frame.
+    /// Starts a take-off (NAV_TAKEOFF) to height `up` (mission frame); false if not possible.
     fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> bool {
         let possible =
             self.armed && self.landed && self.mode == Mode::Guided && up > sensors.position.z;
@@ -374,7 +373,7 @@ impl Copter {
         possible
     }
 
-    /// One step: timers, failsafes, phases, and the demand of the mode.
+    /// Advances one step: failsafes, timers, mission, land detector, and the demand of the mode.
     pub fn update(
         &mut self,
         platform: &mut Platform,
@@ -389,7 +388,7 @@ impl Copter {
             self.fly_mission(platform, sensors);
         }
         if !self.armed {
-            // A vehicle disarmed in the air falls, and has landed when it lies still.
+            // A vehicle disarmed in the air falls; it has landed when it touches the ground.
             self.landed |= sensors.touching;
             return self.idle_command();
         }
@@ -418,7 +417,7 @@ impl Copter {
         ControlDemand { lift: true, integral, demand }
     }
 
-    /// Motors off or idle.
+    /// Output while the motors are off or idle.
     fn idle_command(&self) -> ControlDemand {
         ControlDemand {
             lift: false,
@@ -427,7 +426,7 @@ impl Copter {
         }
     }
 
-    /// Origin and position, each once.
+    /// Starts the failsafes: lost position (LAND), silent ground station (RTL), low battery.
     fn update_failsafe(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         let now_us = sensors.now_us;
         let since = |start: u64| now_us.saturating_sub(start);
@@ -497,7 +496,7 @@ impl Copter {
     }
 }
 
-/// Microseconds of a time in seconds; what is negative or not a number is none.
+/// Seconds to microseconds; negative numbers and NaN give 0.
 fn micros_from_s(s: f32) -> u64 {
     (f64::from(s) * 1e6) as u64
 }

@@ -1,24 +1,24 @@
-//! ArduCopter's flight modes, and what each needs.
+//! ArduCopter's flight modes, their numbers, and what each needs.
 
-/// ArduCopter's flight modes, as far as the simulation flies them. The number is HEARTBEAT's
-/// `custom_mode`.
+/// ArduCopter's flight modes that the simulation supports; the number is HEARTBEAT's `custom_mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Sticks, which nobody holds: throttle low, it sinks.
+    /// Sticks control attitude and throttle; no remote control is simulated, the throttle is low:
+    /// it descends.
     Stabilize = 0,
-    /// Likewise.
+    /// Sticks control the altitude; the throttle is low: it descends.
     AltHold = 2,
-    /// The mission.
+    /// Flies the uploaded mission.
     Auto = 3,
-    /// Setpoints.
+    /// Follows setpoints.
     Guided = 4,
-    /// Likewise by sticks: with the throttle low it sinks at `PILOT_SPEED_UP`.
+    /// Sticks control the position; the throttle is low: it descends at `PILOT_SPEED_UP`.
     Loiter = 5,
-    /// Climbs, comes home and lands.
+    /// Climbs, flies home and lands.
     Rtl = 6,
-    /// Lands where it is.
+    /// Lands at its position.
     Land = 9,
-    /// Stops and holds.
+    /// Stops and holds its position.
     Brake = 17,
 }
 
@@ -40,12 +40,12 @@ impl From<Mode> for u32 {
 }
 
 impl Mode {
-    /// `custom_mode`.
+    /// Value of `custom_mode`.
     pub fn number(self) -> u32 {
         self as u32
     }
 
-    /// The mode of a number.
+    /// The mode of this number; `None` if it is not supported.
     pub fn from_number(number: u32) -> Option<Self> {
         MODES.into_iter().find(|mode| mode.number() == number)
     }

@@ -1,5 +1,5 @@
-//! The parameters of the simulated ArduCopter: names, types and defaults of 4.6, and the few that
-//! act.
+//! Parameters of the simulated ArduCopter: names, types and defaults of 4.6, and the few that have
+//! an effect.
 
 use planner_core::Point;
 
@@ -20,7 +20,7 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
     ("BATT_FS_LOW_ACT", Int8(0)),
     ("BATT_LOW_MAH", Real(0.0)),
     ("BATT_MONITOR", Int8(4)),
-    // An installer's, with a camera: 1 is a servo.
+    // Set by the user of a camera: 1 triggers by servo.
     ("CAM1_TYPE", Int8(1)),
     ("DISARM_DELAY", Int8(10)),
     ("EK3_ENABLE", Int8(1)),
@@ -71,7 +71,7 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
     ("WP_YAW_BEHAVIOR", Int8(2)),
 ];
 
-/// The defaults, with the airframe's limits in the parameters that carry them.
+/// The defaults, with `system_id` and the airframe's speed limit in the parameters that hold them.
 pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
     let own = [
         ("SYSID_THISMAV", Int16(i16::from(system_id))),
@@ -82,7 +82,7 @@ pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
 
 const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
-/// The parameters that act, by what they do. Metres, seconds, m/s.
+/// Values of the parameters that have an effect, named by it. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
 pub struct Tuning {
@@ -113,7 +113,7 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// A demand for nothing.
+    /// A demand without position, velocity or heading.
     pub(super) fn empty_demand(&self) -> Demand {
         Demand {
             position: NONE,
@@ -121,7 +121,7 @@ impl Tuning {
             acceleration: NONE,
             heading: f32::NAN,
             heading_rate: f32::NAN,
-            // The reference keeps the limits; the controller may correct beyond them.
+            // The reference keeps these limits; the controller may exceed them to correct errors.
             speed_max: 1.5 * self.speed,
             climb_max: 1.5 * self.speed_up,
             descend_max: 1.5 * self.speed_down.max(self.stick_sink),
@@ -131,7 +131,7 @@ impl Tuning {
         }
     }
 
-    /// The parameters that act, looked up once after each change.
+    /// Reads the values from the parameter table; to be called after each change of a parameter.
     pub fn new(params: &Params) -> Self {
         let cm = |name| 0.01 * params.f32_value(name);
         let whole_cm = |name| 0.01 * params.i32_value(name) as f32;

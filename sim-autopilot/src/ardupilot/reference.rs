@@ -1,9 +1,9 @@
-//! The reference the position controller follows: a point that moves to where the mode wants it
-//! within the limits on speed, acceleration and jerk, as ArduPilot's `shape_pos_vel_accel` moves it
+//! The reference that the position controller tracks: a point that moves to the mode's goal within
+//! limits of speed, acceleration and jerk, as by ArduPilot's `shape_pos_vel_accel`
 //! (`AP_Math/control.cpp`).
 //!
-//! The reference knows nothing of the vehicle: what is asked for is reached smoothly, and a
-//! velocity that is no longer asked for is braked as smoothly.
+//! It does not depend on the vehicle's position: a new goal is approached smoothly, and a velocity
+//! that is no longer demanded is reduced smoothly.
 
 use planner_core::Point;
 
@@ -11,30 +11,30 @@ use super::params::Tuning;
 use super::setpoint::Goal;
 use crate::shaping::approach_rate;
 
-/// Share of the acceleration that corrections of position may use.
+/// Fraction of the acceleration limit that corrections of the position may use.
 const CORRECTION_ACCEL_SHARE: f32 = 0.5;
 
-/// The moving point.
+/// Position, velocity and acceleration of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// ENU metres.
+    /// Position, ENU metres.
     pub position: Point,
-    /// ENU m/s.
+    /// Velocity, ENU m/s.
     pub velocity: Point,
-    /// ENU m/s².
+    /// Acceleration, ENU m/s².
     pub acceleration: Point,
 }
 
 impl Reference {
-    /// At the vehicle, moving as it does.
+    /// A reference at this position with this velocity, without acceleration.
     pub fn new(position: Point, velocity: Point) -> Self {
         Self { position, velocity, acceleration: Point::zeros() }
     }
 
-    /// One step towards a goal.
+    /// Moves the reference for one step of `dt` seconds towards `goal`.
     pub fn advance(&mut self, goal: &Goal, tuning: &Tuning, dt: f32) {
         let error = goal.position.map_or(Point::zeros(), |position| position - self.position);
-        // Across: a vector.
+        // Horizontal axes, limited as one vector.
         let (limit, jerk) = (tuning.acceleration, tuning.jerk);
         let mut wanted = with_length(error.x, error.y, |e| {
             approach_rate(e, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit)
@@ -50,7 +50,7 @@ impl Reference {
         let step = with_length(step.0, step.1, |change| change.min(jerk * dt));
         self.acceleration.x += step.0;
         self.acceleration.y += step.1;
-        // Up.
+        // Vertical axis.
         let (limit, jerk) = (tuning.acceleration_z, tuning.jerk_z);
         let rate = approach_rate(error.z, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit);
         let rate = rate.max(-tuning.speed_down).min(tuning.speed_up) + goal.velocity.z;
@@ -62,7 +62,7 @@ impl Reference {
     }
 }
 
-/// A vector of the same direction whose length is a function of its own.
+/// The vector (x, y) with its length changed by the function `length`.
 fn with_length(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
     let norm = libm::hypotf(x, y);
     if norm < 1e-6 {

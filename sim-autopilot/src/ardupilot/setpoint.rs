@@ -1,9 +1,9 @@
-//! What Guided flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as ArduCopter reads
-//! them (`GCS_MAVLINK_Copter::handle_message_set_position_target_*`).
+//! Guided setpoints: reads SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86) as ArduCopter
+//! does (`GCS_MAVLINK_Copter::handle_message_set_position_target_*`).
 //!
-//! An axis left out leaves out its whole vector. What asks for nothing, for a frame it does not
-//! know, for force, or for acceleration alone (which ArduCopter would fly and this does not) is not
-//! refused: it stops.
+//! If the type mask leaves out one axis, the whole vector is left out. A message without any
+//! demand, in an unsupported frame, with force, or with acceleration alone (which ArduCopter would
+//! fly, but this does not) is not refused: the vehicle stops.
 
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -23,25 +23,25 @@ const MASK_FORCE: u16 = 0x200;
 const MASK_YAW: u16 = 0x400;
 const MASK_YAW_RATE: u16 = 0x800;
 
-/// Target that Guided flies to, in the mission frame.
+/// Goal of the reference, in the mission frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
-    /// ENU metres; `None` flies the velocity alone.
+    /// Position, ENU metres; `None`: only the velocity is flown.
     pub position: Option<Point>,
-    /// ENU m/s; with a position its feed-forward.
+    /// Velocity, ENU m/s; feed-forward if there is a position.
     pub velocity: Point,
-    /// ENU m/s², as feed-forward.
+    /// Acceleration feed-forward, ENU m/s².
     pub acceleration: Point,
-    /// Radians clockwise from north; NaN keeps the heading.
+    /// Heading, radians clockwise from north; NaN keeps the current heading.
     pub heading: f32,
-    /// rad/s clockwise; NaN none.
+    /// Rate of turn, rad/s clockwise; NaN: none.
     pub heading_rate: f32,
-    /// Velocity and acceleration end with `GUID_TIMEOUT`.
+    /// Whether velocity and acceleration become zero after `GUID_TIMEOUT`.
     pub expires: bool,
 }
 
 impl Goal {
-    /// Stand still.
+    /// Stop and hold.
     pub const STOP: Self = Self {
         position: None,
         velocity: Point::new(0.0, 0.0, 0.0),
@@ -51,13 +51,13 @@ impl Goal {
         expires: false,
     };
 
-    /// Fly to a point and hold it for ever.
+    /// Fly to `position` and hold it for ever.
     pub fn hold(position: Point) -> Self {
         Self { position: Some(position), ..Self::STOP }
     }
 }
 
-/// Reads message 84.
+/// Reads the payload of SET_POSITION_TARGET_LOCAL_NED.
 pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
     let frame = fields.u8(52);
     let in_body = matches!(frame, FRAME_BODY_NED | FRAME_BODY_OFFSET_NED);
@@ -79,7 +79,7 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
     goal_from_fields(fields, position, rate(16), rate(28))
 }
 
-/// Reads message 86.
+/// Reads the payload of SET_POSITION_TARGET_GLOBAL_INT.
 pub fn read_global_int(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
     let base = match fields.u8(52) {
         0 | 5 => 0.0,

@@ -1,24 +1,25 @@
-//! What ArduCopter says unasked beside its streams: texts, the origin when it is set, and stray
-//! parameters.
+//! Messages that ArduCopter sends without a request, beside its streams: STATUSTEXTs, origin and
+//! home once set, PARAM_VALUE of its runtime.
 
 use super::Copter;
 use crate::platform::Platform;
 
 const PARAM_VALUE: u32 = 22;
 const HOME_POSITION: u32 = 242;
-/// Period at which the autopilot counts its time in STAT_RUNTIME and reports it, microseconds.
+/// Period at which it updates STAT_RUNTIME and sends it, microseconds.
 const RUNTIME_EVERY_US: u64 = 30_000_000;
-/// MAV_PARAM_TYPE_INT32.
+/// Value of MAV_PARAM_TYPE_INT32.
 const INT32: u8 = 6;
 
 impl Copter {
-    /// Messages that the autopilot sends when it has booted.
+    /// Sends the messages of a boot: a STATUSTEXT and one SYS_STATUS.
     pub fn send_boot_messages(&mut self, platform: &mut Platform) {
         platform.send_text(6, "ArduPilot Ready");
         platform.send_on_all_ports(1);
     }
 
-    /// Sends messages about changes since the last step.
+    /// Sends messages once the estimator gets its origin and its position, and STAT_RUNTIME every
+    /// 30 s.
     pub(super) fn send_progress_messages(&mut self, platform: &mut Platform, now_us: u64) {
         if !self.reported[0] && self.origin_known(now_us) {
             self.reported[0] = true;
@@ -36,7 +37,7 @@ impl Copter {
         }
     }
 
-    /// Unrequested PARAM_VALUE.
+    /// Sends a PARAM_VALUE of STAT_RUNTIME that nobody requested.
     fn send_runtime_param(&self, platform: &mut Platform, seconds: f32) {
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&seconds.to_le_bytes());

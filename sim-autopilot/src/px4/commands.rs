@@ -1,4 +1,5 @@
-//! PX4's answers: commands and their acks, modes by SET_MODE, message intervals and requests.
+//! PX4's handling of commands, SET_MODE, message intervals and message requests, and its
+//! COMMAND_ACKs.
 
 use planner_core::frames::Geodetic;
 
@@ -14,7 +15,7 @@ use crate::telemetry;
 use crate::wire::PayloadReader;
 
 impl Px4 {
-    /// Takes a command and acknowledges it.
+    /// Executes a command and queues its COMMAND_ACK.
     pub(crate) fn handle_command(
         &mut self,
         platform: &mut Platform,
@@ -22,8 +23,8 @@ impl Px4 {
         command: &Command,
     ) {
         let result = match command.id {
-            // DO_SET_MODE is acknowledged twice: that it was understood, then whether the mode
-            // changed.
+            // DO_SET_MODE gets two COMMAND_ACKs: at once ACCEPTED, and in the next step whether the
+            // mode changed.
             DO_SET_MODE => {
                 let mode =
                     mode_of(command.param[0] as u8, command.param[1] as u8, command.param[2] as u8);
@@ -79,7 +80,7 @@ impl Px4 {
         platform.acknowledge(from, command.id, result);
     }
 
-    /// Takes the old SET_MODE, which is not acknowledged.
+    /// Handles the message SET_MODE, to which PX4 sends no COMMAND_ACK.
     pub(crate) fn handle_set_mode(&mut self, platform: &Platform, fields: &PayloadReader<'_>) {
         let custom = fields.u32(0);
         if let Some(mode) = mode_of(fields.u8(5), (custom >> 16) as u8, (custom >> 24) as u8) {
@@ -108,7 +109,7 @@ impl Px4 {
         }
     }
 
-    /// MISSION_START: changes the mode and arms.
+    /// Executes MISSION_START: enters AUTO.MISSION and arms. Returns the MAV_RESULT.
     fn start_mission(&mut self, platform: &mut Platform) -> u8 {
         self.commander.set_mission_ready(platform.has_mission());
         if !platform.has_mission() || !self.change_mode(platform, Mode::Mission) {
@@ -128,8 +129,8 @@ impl Px4 {
     }
 
     fn take_off(&mut self, platform: &Platform, command: &Command) -> u8 {
-        // The altitude is above the sea; how high that is in the mission frame depends on where it
-        // is asked for.
+        // The altitude counts from sea level or home; converting it to the mission frame's height
+        // needs latitude and longitude, here the vehicle's.
         let up = if command.z.is_finite() && command.z != 0.0 {
             let base = if command.relative { platform.home.alt_m } else { 0.0 };
             let here = platform.frame.geodetic_from_enu(platform.vehicle.position());

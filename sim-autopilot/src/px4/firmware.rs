@@ -1,5 +1,5 @@
-//! PX4 as a whole: the commander, the parameters, a mode change that is under way, and what it says
-//! when a failsafe begins.
+//! PX4 as a whole: commander, parameters, a pending mode change, and the gimbal commands at the
+//! start of a failsafe.
 
 use super::params::{self, Tuning};
 use super::setpoint;
@@ -15,30 +15,30 @@ use crate::vehicle::VehicleLimits;
 use crate::wire::PayloadReader;
 
 const COMMAND_LONG: u32 = 76;
-/// DO_GIMBAL_MANAGER_CONFIGURE and DO_GIMBAL_MANAGER_PITCHYAW as they were recorded when a failsafe
-/// began: takes control of the gimbal, points it ahead, gives it up. To component 0, so to
-/// everybody; nobody answers.
+/// Gimbal commands that PX4 was recorded to send when a failsafe starts: take control (1001), point
+/// ahead (1000, DO_GIMBAL_MANAGER_PITCHYAW), release control (1001, DO_GIMBAL_MANAGER_CONFIGURE).
+/// They go to component 0, a broadcast, and are not answered.
 const GIMBAL: [(u16, [f32; 5]); 3] = [
     (1001, [1.0, 1.0, -1.0, -1.0, 0.0]),
     (1000, [f32::NAN, f32::NAN, f32::NAN, f32::NAN, 2.0]),
     (1001, [-3.0, -3.0, -1.0, -1.0, 0.0]),
 ];
 
-/// The firmware: state machine and parameters.
+/// Simulated PX4: state machine and parameters.
 #[derive(Clone, Debug)]
 pub struct Px4 {
-    /// Arming, modes, failsafe.
+    /// State machine for arming, modes and failsafe.
     pub commander: Commander,
-    /// The parameter table.
+    /// All parameters, as MAVLink reports them.
     pub params: Params,
-    /// Parameters that act.
+    /// Values of the parameters that have an effect.
     pub tuning: Tuning,
-    /// A pending DO_SET_MODE: sender, and the requested mode if it is valid.
+    /// A DO_SET_MODE to be decided in the next step: sender, and the requested mode if it is valid.
     pub(super) pending_mode: Option<(Sender, Option<Mode>)>,
 }
 
 impl Px4 {
-    /// PX4 as it boots, with the airframe's limits in its parameters.
+    /// PX4 as it boots. The airframe's limits replace the defaults of some parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
         let params = params::default_params(system_id, limits);
         Self {
@@ -49,8 +49,8 @@ impl Px4 {
         }
     }
 
-    /// One step. A requested mode is decided now: a setpoint that came just behind the command
-    /// counts.
+    /// Advances one step. A requested mode is decided here, so a setpoint that came just after the
+    /// command counts for it.
     pub(crate) fn update(
         &mut self,
         platform: &mut Platform,
@@ -71,7 +71,8 @@ impl Px4 {
         order
     }
 
-    /// Demand of the mission, while AUTO.MISSION flies it. Its return is AUTO.RTL.
+    /// Updates the leg of the mission while AUTO.MISSION is active. A return item changes to
+    /// AUTO.RTL.
     fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if !self.commander.armed() {
             if let Some(leg) = self.commander.mission.leg.take() {
@@ -119,12 +120,12 @@ impl Px4 {
             guided: true,
             ekf_flags: 0,
             origin_known: true,
-            // LOCAL_POSITION_NED comes only while the estimate is valid.
+            // PX4 sends LOCAL_POSITION_NED only while the estimate is valid.
             position_known: platform.gps_ok,
         }
     }
 
-    /// Takes a setpoint, if it counts.
+    /// Handles a setpoint message (`id` 84 or 86); invalid ones are ignored.
     pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
         let context = setpoint::FrameContext {
             frame: &platform.frame,

@@ -1,4 +1,4 @@
-//! What each flight mode asks of the position controller.
+//! The demand of each of PX4's flight modes to the position controller.
 
 use planner_core::Point;
 
@@ -9,25 +9,24 @@ use crate::itinerary::{MissionLeg, interpolate_height};
 use crate::shaping::JerkLimitedRate;
 use crate::vehicle::Demand;
 
-/// Least height above the present one that a setpoint must command to count as a climb, metres; a
-/// commanded speed of [`MIN_CLIMB_DEMAND_MPS`] counts too.
+/// Least height of a setpoint above the vehicle that counts as a demand to climb, metres; a
+/// velocity or acceleration of [`MIN_CLIMB_DEMAND_MPS`] counts too.
 const MIN_CLIMB_DEMAND_M: f32 = 0.15;
-/// Least commanded vertical speed that counts as a climb, m/s.
+/// Least commanded upward velocity (m/s) or acceleration (m/s²) that counts as a demand to climb.
 const MIN_CLIMB_DEMAND_MPS: f32 = 0.05;
-/// An automatic mode has reached its target within this distance, metres.
+/// Distance within which an automatic mode has reached its target, metres.
 const ARRIVED_M: f32 = 0.5;
-/// Distance to the target beyond which the vehicle turns towards it, metres.
+/// Distance to the target beyond which the vehicle turns its heading towards it, metres.
 const TURN_BEYOND_M: f32 = 2.0;
-/// Fastest sink that was seen in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its
-/// height, which is also what PX4 controls there; the velocity that it reported meanwhile went up
-/// to 1.6.
+/// Largest descent rate seen in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5. It is the rate of
+/// change of the height, which PX4 controls in Land; the velocity reported meanwhile reached 1.6.
 const MAX_LAND_MPS: f32 = 1.3;
-/// Lag of the measured distance to the ground, seconds: PX4 crawls from 0.85 m on, not from
-/// `MPC_LAND_ALT3`.
+/// Lag of the measured distance to the ground, seconds: PX4 starts to crawl at 0.85 m, not at
+/// `MPC_LAND_ALT3` (1 m).
 const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
-    /// Initialises the mode: its stopping point, and the next leg of a return.
+    /// Initialises a mode that is entered: stopping point, heading, first leg of a return.
     pub(super) fn enter_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         self.hold = sensors.position + glide::stopping_point(&sensors.velocity);
         self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
@@ -39,7 +38,7 @@ impl Commander {
         }
     }
 
-    /// Whether the demand lifts a vehicle off the ground. Hold, Return and Land never do.
+    /// Whether the demand makes a vehicle on the ground take off. Hold, Return and Land never do.
     pub(super) fn demands_lift_off(&self, sensors: &SensorReadings, demand: &Demand) -> bool {
         match self.mode() {
             Mode::Takeoff => true,
@@ -53,7 +52,7 @@ impl Commander {
         }
     }
 
-    /// Demand of the mode now.
+    /// The demand of the mode in this step.
     pub(super) fn demand(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Demand {
         let held = Demand {
             position: self.hold,
@@ -79,7 +78,7 @@ impl Commander {
                 let up = self.takeoff_up;
                 let up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
                 if !self.landed && sensors.position.z > up - ARRIVED_M {
-                    // Reached: PX4 continues in Hold at the height asked for.
+                    // The height is reached: PX4 continues in Hold at this height.
                     self.intended_mode = Mode::Hold;
                     self.after_disarm = Mode::Hold;
                     self.takeoff_up = f32::NAN;
@@ -101,7 +100,7 @@ impl Commander {
         }
     }
 
-    /// Demand to hold a place, which is approached as the automatic modes approach it across.
+    /// Demand to hold at `hold`: the horizontal approach is smoothed as in PX4's automatic modes.
     fn approach_demand(
         &mut self,
         sensors: &SensorReadings,
@@ -119,8 +118,8 @@ impl Commander {
         }
     }
 
-    /// Demand of an item of the mission. Without a heading the vehicle looks where it flies
-    /// (`MPC_YAW_MODE` 0).
+    /// Demand of the mission's current leg. Without a heading in the item the vehicle faces its
+    /// direction of flight (`MPC_YAW_MODE` 0).
     fn mission_demand(
         &mut self,
         sensors: &SensorReadings,
@@ -165,10 +164,10 @@ impl Commander {
         }
     }
 
-    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`,
-    /// then `MPC_LAND_SPEED`, these heights above home; and crawls (`MPC_LAND_CRWL`) once a
-    /// distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the rate is
-    /// smooth (`MPC_JERK_AUTO`).
+    /// Demand to land: descends at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to
+    /// `MPC_LAND_ALT2`, then at `MPC_LAND_SPEED`; these heights count from home. If a distance
+    /// sensor shows the ground nearer than `MPC_LAND_ALT3` it crawls (`MPC_LAND_CRWL`). The descent
+    /// rate changes within `MPC_JERK_AUTO`.
     fn landing_demand(
         &mut self,
         sensors: &SensorReadings,
@@ -201,7 +200,8 @@ impl Commander {
             position: Point::new(self.hold.x, self.hold.y, f32::NAN),
             velocity: Point::new(f32::NAN, f32::NAN, -descent.rate),
             acceleration: Point::new(f32::NAN, f32::NAN, -descent.change),
-            // A change of the height has less bias than the velocity (`z_deriv`).
+            // The rate of change of the height has less bias than the estimated velocity
+            // (`z_deriv`).
             height_rate_share: (descent.rate.abs() / tuning.land_speed.max(0.01)).min(1.0),
             ..held
         }
@@ -215,7 +215,7 @@ impl Commander {
         {
             let mut height = tuning.return_height;
             if away <= tuning.return_min_distance {
-                // Near home the climb is cut by the cone `RTL_CONE_ANG`.
+                // Near home the cone `RTL_CONE_ANG` limits the climb.
                 height = height.min(away / tuning.return_cone_tan.max(0.01));
             }
             *up = (sensors.home.z + height).max(sensors.position.z);
@@ -246,7 +246,7 @@ impl Commander {
     }
 }
 
-/// A demand with the vertical part of another.
+/// The demand `across` with the vertical part of `up`.
 fn with_vertical(across: Demand, up: &Demand) -> Demand {
     let both = |a: Point, z: f32| Point::new(a.x, a.y, z);
     Demand {

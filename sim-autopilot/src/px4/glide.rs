@@ -1,5 +1,5 @@
-//! How PX4's automatic modes stop and go to a point across (`PositionSmoothing`,
-//! `Navigator::preproject_stop_point`).
+//! Horizontal motion of PX4's automatic modes: stopping and approaching a point
+//! (`PositionSmoothing`, `Navigator::preproject_stop_point`).
 
 use planner_core::Point;
 
@@ -7,44 +7,46 @@ use crate::shaping::JerkLimitedRate;
 
 /// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
 const AUTO_ACCEL_MPS2: f32 = 3.0;
-/// Time flown at full speed before the braking counts, seconds (0.6 of `MPC_JERK_AUTO`, over
-/// `MPC_JERK_AUTO`).
+/// Time of full speed that is added to the braking distance, seconds (0.6 of `MPC_JERK_AUTO`,
+/// divided by `MPC_JERK_AUTO`).
 const BRAKING_DELAY_S: f32 = 0.6;
-/// Longest time since the last step of the mode that counts, seconds.
+/// Longest time step that is simulated, seconds, if the mode was not updated for longer.
 const MAX_STEP_S: f32 = 0.1;
 
-/// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is.
-/// With 1.85 m/s recorded vehicles went 0.9 m in the first second and 1.1 to 1.7 m in all.
+/// Horizontal offset from the vehicle to the point at which PX4 stops it, metres, from its velocity
+/// (m/s). With 1.85 m/s recorded vehicles moved 0.9 m in the first second and 1.1 to 1.7 m in all.
 pub fn stopping_point(velocity: &Point) -> Point {
     let speed = libm::hypotf(velocity.x, velocity.y);
     Point::new(velocity.x, velocity.y, 0.0) * (speed / (2.0 * AUTO_ACCEL_MPS2) + BRAKING_DELAY_S)
 }
 
-/// A point that is flown to a target across: it starts as the vehicle is and obeys the limits of
-/// the automatic modes.
+/// A setpoint that moves horizontally to a target: it starts with the vehicle's position and
+/// velocity and keeps the automatic modes' limits.
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothedApproach {
     at_us: u64,
-    /// ENU metres; the height is nobody's.
+    /// Position, ENU metres; its height is not used.
     pub position: Point,
-    /// East and north.
+    /// Velocity and acceleration east and north.
     pub ramps: [JerkLimitedRate; 2],
 }
 
 impl SmoothedApproach {
-    /// A glide that begins at this position with this velocity.
+    /// A setpoint that starts at `position` with `velocity`.
     pub fn new(now_us: u64, position: &Point, velocity: &Point) -> Self {
         let ramp = |rate| JerkLimitedRate { rate, change: 0.0 };
         Self { at_us: now_us, position: *position, ramps: [ramp(velocity.x), ramp(velocity.y)] }
     }
 
-    /// Continues towards `target` until `now_us`, at `speed_max` m/s and `jerk` m/s³ at most.
+    /// Moves the setpoint towards `target` until `now_us`, with at most `speed_max` m/s and `jerk`
+    /// m/s³.
     pub fn advance(&mut self, now_us: u64, target: &Point, speed_max: f32, jerk: f32) {
         let since_us = now_us.saturating_sub(core::mem::replace(&mut self.at_us, now_us));
         let dt = (since_us as f32 * 1e-6).min(MAX_STEP_S);
         let off = [target.x - self.position.x, target.y - self.position.y];
         let away = libm::hypotf(off[0], off[1]);
-        // `computeMaxSpeedFromDistance`: what can be braked from, after a while in which it is not.
+        // `computeMaxSpeedFromDistance`: the speed from which it can brake over `away`, with a
+        // delay that the jerk limit causes.
         let delay = 4.0 * AUTO_ACCEL_MPS2 * AUTO_ACCEL_MPS2 / jerk;
         let from_stop = libm::sqrtf(delay * delay + 8.0 * AUTO_ACCEL_MPS2 * away);
         let speed = (0.5 * (from_stop - delay)).min(speed_max);

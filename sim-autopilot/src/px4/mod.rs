@@ -1,16 +1,15 @@
-//! PX4's commander: arming, modes, failsafe, take-off and landing, as PX4 1.17 was seen to behave.
+//! PX4's commander: arming, modes, failsafe, take-off and landing, as observed in PX4 1.17.
 //!
 //! | state | leaves it |
 //! |---|---|
 //! | disarmed | arm command, unless the mode cannot run (Offboard without a stream, Land, Return) |
 //! | armed, on the ground | a demand to climb, `COM_SPOOLUP_TIME` after arming; `COM_DISARM_PRFLT` disarms |
-//! | ramp | thrust rises over `MPC_TKO_RAMP_T`, whatever is asked for meanwhile; it counts as in the air before it lifts |
-//! | flying | `LNDMC_TRIG_TIME` on the ground with a demand to sink lands it |
+//! | ramp | thrust rises over `MPC_TKO_RAMP_T`, whatever is demanded; in-air is reported early |
+//! | flying | on the ground for `LNDMC_TRIG_TIME` with a demand to descend: landed |
 //! | landed | a demand to climb; `COM_DISARM_LAND` disarms |
 //!
-//! In Offboard, setpoints missing for `COM_OF_LOSS_T` start the failsafe `COM_OBL_RC_ACT`; the
-//! first setpoint after that ends it. Times are microseconds since boot and arguments; nothing here
-//! reads a clock.
+//! In Offboard the failsafe `COM_OBL_RC_ACT` starts when no setpoint came for `COM_OF_LOSS_T`; the
+//! next setpoint ends it. Times are arguments, in microseconds since boot; no clock is read.
 
 mod flight;
 mod glide;
@@ -32,23 +31,24 @@ use super::itinerary::MissionLeg;
 use super::platform::{ControlDemand, IntegralAction, SensorReadings};
 use super::shaping::JerkLimitedRate;
 
-/// Delay of the failsafe after `COM_OF_LOSS_T`, seconds: 1.23 s seen at most, and gaps of 1.25 s
-/// trip it.
+/// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings it started at most 1.23 s
+/// after the last setpoint, and gaps of 1.25 s started it.
 const LOSS_REACTION_S: f32 = 0.15;
-/// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3
-/// s seen, before it lifts.
+/// Fraction of the thrust ramp after which the land detector reports a take-off: in recordings
+/// after 0.9 to 1.0 s of 3 s, before the vehicle lifts.
 const IN_AIR_SHARE: f32 = 0.31;
-/// Least commanded sink with which the land detector reports a landing, m/s: 1.1 times the default
-/// of `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). It reads the velocity of the setpoint only, so
-/// at a demand to stay PX4 reports itself in the air, on the ground too, however far below the
-/// demand lies.
+/// Least commanded descent rate at which the land detector can report a landing, m/s: 1.1 times the
+/// default of `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). PX4 checks only the velocity setpoint:
+/// with a position setpoint alone it reports itself in the air even on the ground, however far
+/// below the setpoint lies.
 const MIN_LAND_RATE_MPS: f32 = 0.275;
-/// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
+/// Factor on `MPC_LAND_CRWL` that gives the descent rate seen in recordings: 0.22 m/s at a
+/// parameter of 0.3 m/s.
 const CRAWL_SHARE: f32 = 0.75;
-/// Delay of the land detector's own filters beyond `LNDMC_TRIG_TIME`, seconds.
+/// Delay of the land detector beyond `LNDMC_TRIG_TIME`, by its filters, seconds.
 const LAND_FILTER_S: f32 = 0.5;
-/// Delay of the automatic disarming beyond `COM_DISARM_LAND`, seconds: 2.2 to 2.4 s after ON_GROUND
-/// with `COM_DISARM_LAND` 2.0.
+/// Delay of automatic disarming beyond `COM_DISARM_LAND`, seconds: 2.2 to 2.4 s after ON_GROUND in
+/// recordings, with `COM_DISARM_LAND` 2.0.
 const DISARM_REACTION_S: f32 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,15 +69,15 @@ enum ReturnLeg {
 /// State of AUTO.MISSION.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mission {
-    /// A mission is stored.
+    /// Whether a mission is stored.
     ready: bool,
-    /// Leg that the mission commands, while it is flown.
+    /// Leg of the mission that is flown; `None` outside AUTO.MISSION.
     leg: Option<MissionLeg>,
-    /// Start of that leg.
+    /// Start of that leg, ENU metres.
     from: Point,
 }
 
-/// The state of the state machine.
+/// PX4's state machine.
 #[derive(Clone, Debug)]
 pub struct Commander {
     armed: bool,
@@ -93,13 +93,13 @@ pub struct Commander {
     setpoint: Option<Setpoint>,
     setpoint_us: u64,
     hold: Point,
-    /// On the way to `hold`.
+    /// Smoothed path to `hold`.
     glide: SmoothedApproach,
     hold_heading: f32,
     takeoff_up: f32,
     cruise: Option<f32>,
     leg: ReturnLeg,
-    /// Rate of sinking in Land, as of when.
+    /// Descent rate in Land, and the time of its last update, microseconds.
     descent: Option<(u64, JerkLimitedRate)>,
     position_ok: bool,
     mission: Mission,
@@ -112,7 +112,7 @@ impl Default for Commander {
 }
 
 impl Commander {
-    /// Disarmed on the ground in Hold, as PX4 boots without a remote.
+    /// Disarmed on the ground in Hold, as PX4 boots without a remote control.
     pub fn new() -> Self {
         Self {
             armed: false,
@@ -139,32 +139,32 @@ impl Commander {
         }
     }
 
-    /// Motors on.
+    /// Whether the motors are armed.
     pub fn armed(&self) -> bool {
         self.armed
     }
 
-    /// The land detector's verdict.
+    /// Whether the land detector reports the vehicle on the ground.
     pub fn landed(&self) -> bool {
         self.landed
     }
 
-    /// The mode that flies, the failsafe's while there is one.
+    /// The mode that is flown: a failsafe's, else the requested one.
     pub fn mode(&self) -> Mode {
         self.failsafe.unwrap_or(self.intended_mode)
     }
 
-    /// The mode that was asked for, whatever a failsafe flies.
+    /// The mode that was last requested, even while a failsafe flies another.
     pub fn intended_mode(&self) -> Mode {
         self.intended_mode
     }
 
-    /// A failsafe flies.
+    /// Whether a failsafe is active.
     pub fn in_failsafe(&self) -> bool {
         self.failsafe.is_some()
     }
 
-    /// MAV_LANDED_STATE.
+    /// Value of MAV_LANDED_STATE for EXTENDED_SYS_STATE.
     pub fn landed_state(&self) -> u8 {
         match self.mode() {
             _ if self.landed => 1,
@@ -177,13 +177,13 @@ impl Commander {
         }
     }
 
-    /// MAV_STATE and MAV_MODE_FLAG of HEARTBEAT.
+    /// Values of MAV_STATE and MAV_MODE_FLAG for HEARTBEAT.
     pub fn heartbeat(&self, now_us: u64, tuning: &Tuning) -> (u8, u8) {
         let mode = self.mode();
         let status = match (self.armed, self.failsafe) {
             (true, Some(_)) => 5,
             (true, None) => 4,
-            // A disarmed vehicle whose mode could not run says 0, not STANDBY.
+            // Disarmed in a mode that cannot run, PX4 reports 0 (UNINIT), not STANDBY.
             (false, _)
                 if mode == Mode::Offboard && !self.is_setpoint_stream_fresh(now_us, tuning) =>
             {
@@ -203,29 +203,30 @@ impl Commander {
         (status, 1 | flags | if self.armed { 128 } else { 0 })
     }
 
-    /// The estimator lost or found its position.
+    /// Sets whether the estimator has a position.
     pub fn set_position_ok(&mut self, ok: bool) {
         self.position_ok = ok;
     }
 
-    /// Whether a mission is stored that AUTO.MISSION can fly.
+    /// Sets whether a mission is stored that AUTO.MISSION can fly.
     pub fn set_mission_ready(&mut self, ready: bool) {
         self.mission.ready = ready;
     }
 
-    /// Takes a setpoint that counts.
+    /// Stores a valid setpoint and its time.
     pub fn handle_setpoint(&mut self, setpoint: Setpoint, now_us: u64) {
         self.setpoint = Some(setpoint);
         self.setpoint_us = now_us;
     }
 
-    /// Whether setpoints keep coming.
+    /// Whether the last setpoint is recent enough for Offboard.
     pub fn is_setpoint_stream_fresh(&self, now_us: u64, tuning: &Tuning) -> bool {
         let limit = micros_from_s(tuning.offboard_loss_s + LOSS_REACTION_S);
         self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
     }
 
-    /// Arms, if the mode can run; false is TEMPORARILY_REJECTED.
+    /// Arms if the mode can run and the checks pass, or if `force`. False means
+    /// TEMPORARILY_REJECTED.
     pub fn arm(&mut self, sensors: &SensorReadings, tuning: &Tuning, force: bool) -> bool {
         if self.armed {
             return true;
@@ -240,7 +241,8 @@ impl Commander {
         true
     }
 
-    /// Whether the arming checks pass.
+    /// Whether the vehicle may be armed: the requested mode can run, there is a position, and the
+    /// battery is not low.
     pub fn is_armable(&self, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match self.intended_mode {
             Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
@@ -252,7 +254,7 @@ impl Commander {
         runs && self.position_ok && sensors.battery >= tuning.battery_low
     }
 
-    /// Disarms; in the air only by force.
+    /// Disarms. Refused (false) in the air, unless `force`.
     pub fn disarm(&mut self, force: bool) -> bool {
         if self.armed && !self.landed && !force {
             return false;
@@ -267,8 +269,8 @@ impl Commander {
         true
     }
 
-    /// Enters the mode and returns true; an armed vehicle enters only a mode that can run. The
-    /// second COMMAND_ACK of DO_SET_MODE carries the result.
+    /// Enters the mode and returns true. While armed, a mode that cannot run is refused (false).
+    /// The second COMMAND_ACK of DO_SET_MODE carries the result.
     pub fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
@@ -282,7 +284,7 @@ impl Commander {
         true
     }
 
-    /// Changes the mode as a pilot's switch does: without a check whether the mode can run.
+    /// Enters the mode as a pilot's switch does, even if it cannot run.
     pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         self.intended_mode = mode;
         if !mode.ends_with_flight() {
@@ -295,7 +297,8 @@ impl Commander {
         self.enter_mode(mode, sensors);
     }
 
-    /// Take-off to a height in the mission frame; NaN is `MIS_TAKEOFF_ALT` above home.
+    /// Enters Takeoff to height `up` in the mission frame, metres; NaN: `MIS_TAKEOFF_ALT` above
+    /// home. False if the mode is refused.
     pub fn takeoff(&mut self, up: f32, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let accepted = self.set_mode(Mode::Takeoff, sensors, tuning);
         if accepted {
@@ -304,7 +307,8 @@ impl Commander {
         accepted
     }
 
-    /// Holds at a point instead of where it is (DO_REPOSITION); NaN keeps an axis.
+    /// Enters Hold at point `to` (DO_REPOSITION), ENU metres; a NaN axis keeps the stopping
+    /// point's. False if disarmed or refused.
     pub fn reposition(
         &mut self,
         to: &Point,
@@ -326,12 +330,13 @@ impl Commander {
         true
     }
 
-    /// Cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s.
+    /// Sets the cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s; 0 or less: the
+    /// parameter's.
     pub fn set_cruise(&mut self, speed: f32) {
         self.cruise = (speed > 0.0).then_some(speed);
     }
 
-    /// One step: timers, failsafe, phases, and the demand of the mode.
+    /// Advances one step: failsafe, timers, flight phase, and the demand of the mode.
     pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> ControlDemand {
         let now = sensors.now_us;
         if self.armed {
@@ -339,7 +344,8 @@ impl Commander {
             self.update_timers(sensors, tuning);
         }
         if !self.armed {
-            // A vehicle disarmed in the air falls, and has landed when it lies still.
+            // A vehicle that is disarmed in the air falls; it has landed when it touches the
+            // ground.
             if !self.landed && sensors.touching {
                 self.landed = true;
                 self.landed_us = now;
@@ -361,7 +367,7 @@ impl Commander {
             FlightPhase::Ramp { since_us } => {
                 let progress =
                     now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
-                // The climb limit starts where it cancels hover thrust
+                // During the ramp the climb limit starts at the value that cancels hover thrust
                 // (`TakeoffHandling::updateRamp`).
                 let floor = -crate::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
                 let limit = floor + progress * (demand.climb_max - floor);
@@ -378,7 +384,8 @@ impl Commander {
                 }
             }
             FlightPhase::Flying => {
-                // PX4's own crawl is flown slower here than it commands (`CRAWL_SHARE`).
+                // Outside Offboard the crawl is simulated slower than PX4 commands it
+                // (`CRAWL_SHARE`).
                 let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_SHARE };
                 self.detect_landing(
                     sensors,
@@ -405,7 +412,8 @@ impl Commander {
                     self.disarm(true);
                     return;
                 }
-                // Position, Altitude and Manual (0 to 2) need sticks nobody holds: Return, as for 3.
+                // Position, Altitude and Manual (0 to 2) need a remote control, which is absent:
+                // Return, as for 3.
                 _ => Some(Mode::Return),
             }
         } else if battery_out && tuning.low_battery_action == 2 {
@@ -455,7 +463,7 @@ impl Commander {
     }
 }
 
-/// Microseconds of a time in seconds; what is negative or not a number is none.
+/// Seconds to microseconds; negative numbers and NaN give 0.
 fn micros_from_s(s: f32) -> u64 {
     (f64::from(s) * 1e6) as u64
 }

@@ -1,13 +1,13 @@
-//! PX4's flight modes, and what each needs.
+//! PX4's flight modes, their numbers, and what each needs.
 
-/// PX4's flight modes, as far as the simulation flies them.
+/// PX4's flight modes that the simulation supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Stick to motors; with nobody at the sticks it only holds.
+    /// Manual: without stick input the simulated vehicle holds its position.
     Manual,
-    /// The sticks control the altitude; with nobody at the sticks the vehicle only holds.
+    /// Altitude: without stick input the simulated vehicle holds its position.
     Altitude,
-    /// The sticks control the position; with nobody at the sticks the vehicle only holds.
+    /// Position: without stick input the vehicle holds its position.
     Position,
     /// AUTO.MISSION.
     Mission,
@@ -44,12 +44,13 @@ impl Mode {
             .map_or(0, |&(_, main, sub)| u32::from(main) << 16 | u32::from(sub) << 24)
     }
 
-    /// The mode of a `custom_mode`.
+    /// The mode of a `custom_mode`; `None` if it is not supported.
     pub fn from_custom_mode(custom_mode: u32) -> Option<Self> {
         Self::from_main_sub((custom_mode >> 16) as u8, (custom_mode >> 24) as u8)
     }
 
-    /// The mode of a main and a sub mode.
+    /// The mode of a main and sub mode number; `None` if it is not supported. Only main mode 4
+    /// (AUTO) has sub modes.
     pub fn from_main_sub(main: u8, sub: u8) -> Option<Self> {
         MODES
             .iter()
@@ -57,7 +58,7 @@ impl Mode {
             .map(|&(mode, ..)| mode)
     }
 
-    /// Whether a disarmed vehicle leaves the mode for the one before.
+    /// Whether a disarmed vehicle leaves this mode for the one requested before.
     pub(super) fn ends_with_flight(self) -> bool {
         matches!(self, Self::Return | Self::Takeoff | Self::Land)
     }

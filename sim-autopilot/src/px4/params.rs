@@ -1,5 +1,5 @@
-//! The parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few
-//! that act.
+//! Parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few that
+//! have an effect.
 
 use planner_core::Point;
 
@@ -102,11 +102,11 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
     ("SYS_HAS_BARO", Int(1)),
     ("SYS_HAS_GPS", Int(1)),
     ("SYS_HAS_MAG", Int(1)),
-    // An installer's, with a camera: 4 is distance, on command.
+    // Set by the user of a camera: 4 triggers by distance, on command.
     ("TRIG_MODE", Int(4)),
 ];
 
-/// The defaults, with the airframe's limits in the parameters that carry them.
+/// The defaults, with `system_id` and the airframe's limits in the parameters that hold them.
 pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
     let own = [
         ("MAV_SYS_ID", Int(i32::from(system_id))),
@@ -120,7 +120,7 @@ pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
 
 const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
-/// The parameters that act, by what they do. Metres, seconds, m/s.
+/// Values of the parameters that have an effect, named by it. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
 pub struct Tuning {
@@ -156,7 +156,8 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// A demand for nothing, within the bounds of manual and Offboard flight.
+    /// A demand without position, velocity or heading, with the speed limits of manual and Offboard
+    /// flight.
     pub(super) fn empty_demand(&self) -> Demand {
         Demand {
             position: NONE,
@@ -168,13 +169,13 @@ impl Tuning {
             climb_max: self.climb_max,
             descend_max: self.descend_max,
             lift_off: f32::NAN,
-            // MPC_THR_MIN 0.12 of a hover thrust of 0.49.
+            // MPC_THR_MIN 0.12 divided by a hover thrust of 0.49.
             thrust_min: 0.245,
             height_rate_share: 0.0,
         }
     }
 
-    /// The parameters that act, looked up once after each change.
+    /// Reads the values from the parameter table; to be called after each change of a parameter.
     pub fn new(params: &Params) -> Self {
         Self {
             gains: Gains {

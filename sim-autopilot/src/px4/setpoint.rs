@@ -1,8 +1,9 @@
-//! What Offboard flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as PX4 reads them
+//! Offboard setpoints: reads SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86) as PX4 does
 //! (`MavlinkReceiver::handle_message_set_position_target_*`).
 //!
-//! Each axis left out by the mask is NaN. A message that asks for nothing, or in a frame PX4 does
-//! not know, is not an error: it just does not count, and the stream of those that count runs dry.
+//! An axis that the type mask leaves out becomes NaN. A message without any demand, or in a frame
+//! that PX4 does not support, is ignored without an error; so after `COM_OF_LOSS_T` the setpoint
+//! stream counts as lost.
 
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
@@ -22,32 +23,32 @@ const MASK_YAW: u16 = 0x400;
 const MASK_YAW_RATE: u16 = 0x800;
 const MASK_NOTHING: u16 = 0x1ff;
 
-/// The last setpoint, in the mission frame; NaN asks nothing.
+/// A setpoint in the mission frame; NaN: no demand on that axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setpoint {
-    /// ENU metres.
+    /// Position, ENU metres.
     pub position: Point,
-    /// ENU m/s.
+    /// Velocity, ENU m/s.
     pub velocity: Point,
-    /// ENU m/s².
+    /// Acceleration, ENU m/s².
     pub acceleration: Point,
-    /// Radians clockwise from north.
+    /// Heading, radians clockwise from north.
     pub heading: f32,
-    /// rad/s clockwise.
+    /// Rate of turn, rad/s clockwise.
     pub heading_rate: f32,
 }
 
-/// State that the frame of a setpoint refers to.
+/// What is needed to convert a setpoint to the mission frame.
 pub struct FrameContext<'a> {
-    /// The autopilot's local frame.
+    /// Conversion between the autopilot's local NED frame and the mission frame.
     pub frame: &'a LocalFrame,
-    /// Heading of the vehicle, radians.
+    /// Heading of the vehicle, radians clockwise from north.
     pub heading: f32,
-    /// Altitude of home, metres AMSL.
+    /// Altitude of home above sea level, metres.
     pub home_alt_m: f64,
 }
 
-/// Reads message 84; `None` where it does not count.
+/// Reads the payload of SET_POSITION_TARGET_LOCAL_NED; `None` if PX4 would ignore it.
 pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) -> Option<Setpoint> {
     let frame = fields.u8(52);
     if frame != FRAME_LOCAL_NED && frame != FRAME_BODY_NED {
@@ -58,8 +59,8 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) ->
     let mut velocity = read_masked_vector(fields, 16, mask >> 3);
     let mut acceleration = read_masked_vector(fields, 28, mask >> 6);
     if frame == FRAME_BODY_NED {
-        // PX4 turns velocity and acceleration by the heading and takes no position in the body's
-        // frame.
+        // In the body frame PX4 rotates velocity and acceleration by the heading and ignores the
+        // position.
         position = Vector3::repeat(f64::NAN);
         velocity = rotated_by_heading(velocity, context.heading);
         acceleration = rotated_by_heading(acceleration, context.heading);
@@ -68,7 +69,7 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) ->
     setpoint_from_fields(fields, mask, position, velocity, acceleration, context)
 }
 
-/// Reads message 86; `None` where it does not count.
+/// Reads the payload of SET_POSITION_TARGET_GLOBAL_INT; `None` if PX4 would ignore it.
 pub fn read_global_int(fields: &PayloadReader<'_>, context: &FrameContext<'_>) -> Option<Setpoint> {
     let base = match fields.u8(52) {
         FRAME_GLOBAL | FRAME_GLOBAL_INT => 0.0,
@@ -116,8 +117,8 @@ fn rotated_by_heading(v: Vector3<f64>, heading: f32) -> Vector3<f64> {
     Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 }
 
-/// Maps a NED vector to ENU by `map`, axis by axis as far as it is given: north and east only
-/// together, down alone.
+/// Converts a NED vector to ENU by `map`. NaN stays NaN: east and north need both horizontal axes,
+/// up needs only down.
 fn map_keeping_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
     let across = ned.x.is_finite() && ned.y.is_finite();
     let mapped = map(&ned.map(|x| if x.is_finite() { x } else { 0.0 }));
@@ -160,7 +161,7 @@ fn setpoint_from_fields(
     })
 }
 
-/// Any finite angle into ±π; NaN stays.
+/// Wraps any finite angle to ±π; NaN stays NaN.
 fn wrap_angle(angle: f32) -> f32 {
     angle - core::f32::consts::TAU * libm::roundf(angle / core::f32::consts::TAU)
 }

@@ -1,8 +1,8 @@
-//! The page of all distances and speeds that the code on board decides by: docs/margins.md.
+//! Makes and checks docs/margins.md, the page of all distances, speeds and accelerations that the
+//! code on board decides by.
 //!
-//! Every `const` of planner-core and companion whose name ends in a unit: its value, what it is for
-//! (its doc comment), and the files that use it. A name has one value: two of one name are an
-//! error.
+//! It lists every `const` of planner-core and companion whose name ends in such a unit: value, doc
+//! comment, and the files that use it. Two constants of one name are an error.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use super::sources::{Source, Tree};
 
 const PAGE: &str = "docs/margins.md";
 const CRATES: [&str; 2] = ["planner-core", "companion"];
-/// Ends of names, and the unit.
+/// Ends of constants' names, and the unit that each means.
 const UNITS: [(&str, &str); 3] = [("_M", "m"), ("_MPS", "m/s"), ("_MPS2", "m/s²")];
 const HEAD: &str = "# Distances, speeds and accelerations\n\nEvery one that the code on board decides by, with its \
 reason: margins, reserves, leads, windows, limits.\nMade from the sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins \
@@ -30,7 +30,8 @@ struct Distance {
     users: Vec<String>,
 }
 
-/// Checks the page, or writes it where `FLOCKMATE_WRITE` is set. Returns what is wrong.
+/// Compares docs/margins.md with the sources, or writes it where `FLOCKMATE_WRITE` is set. Returns
+/// a line for each fault.
 pub fn wrong() -> Result<Vec<String>> {
     let mut sources = Vec::new();
     for name in CRATES {
@@ -85,7 +86,7 @@ pub fn wrong() -> Result<Vec<String>> {
     Ok(wrong)
 }
 
-/// Identifiers in expressions.
+/// Collects the identifiers that expressions use.
 struct Used(BTreeMap<String, ()>);
 
 impl<'a> Visit<'a> for Used {
@@ -97,7 +98,7 @@ impl<'a> Visit<'a> for Used {
     }
 }
 
-/// The value as it is written in the source.
+/// The value of constant `name` as the source's text has it.
 fn written(text: &str, name: &str) -> Option<String> {
     let (_, rest) = text.split_once(&format!("const {name}: "))?;
     let (_, rest) = rest.split_once('=')?;
@@ -105,7 +106,7 @@ fn written(text: &str, name: &str) -> Option<String> {
     Some(value.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
-/// The doc comment as one line.
+/// The doc comment of an item, joined to one line of a Markdown table.
 fn reason(attributes: &[syn::Attribute]) -> String {
     let line = |attribute: &syn::Attribute| {
         let Meta::NameValue(meta) = &attribute.meta else { return None };

@@ -1,4 +1,4 @@
-//! Which file imports which.
+//! Import cycles between the files of a crate.
 
 use std::collections::BTreeSet;
 
@@ -7,10 +7,11 @@ use syn::{Item, ItemMod, ItemUse, UseTree, Visibility};
 
 use super::sources::{Source, Tree};
 
-/// `pub use` of a `pub use` at most so many times.
+/// Most `pub use` items in a row that are followed to find the file that defines an item.
 const PASSED_ON: usize = 6;
 
-/// Every set of files that import each other: the imports within it.
+/// Every cycle: a set of files that import each other, directly or not. Each is a list of its
+/// imports, `file → file`.
 pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
     let imports: Vec<BTreeSet<usize>> =
         (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
@@ -61,14 +62,14 @@ fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
     files.filter(|file| *file != at).collect()
 }
 
-/// Paths of a file, each with the module it stands in.
+/// Collects the paths in a file, each with the module in which it stands.
 struct Paths {
     module: Vec<String>,
     found: Vec<(Vec<String>, Vec<String>)>,
 }
 
 impl Visit<'_> for Paths {
-    /// `pub(in path)` imports nothing.
+    /// Visits nothing: a path in `pub(in path)` is no import.
     fn visit_visibility(&mut self, _: &Visibility) {}
 
     fn visit_item_mod(&mut self, item: &ItemMod) {
@@ -99,7 +100,7 @@ impl Visit<'_> for Paths {
     }
 }
 
-/// Every path of a `use`, with the name it gets.
+/// Calls `give` for every path of a `use`, with the name that it brings into scope.
 fn flatten(tree: &UseTree, before: &mut Vec<String>, give: &mut impl FnMut(Vec<String>, String)) {
     match tree {
         UseTree::Path(part) => {
@@ -126,7 +127,8 @@ fn flatten(tree: &UseTree, before: &mut Vec<String>, give: &mut impl FnMut(Vec<S
     }
 }
 
-/// The file that defines what a path names, if it is one of this crate.
+/// Index of the file that defines what `path`, used in `module`, names; `None` if that is in
+/// another crate. `passed_on` is the number of `pub use` items that may still be followed.
 fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) -> Option<usize> {
     let (first, rest) = path.split_first()?;
     let whole = match first.as_str() {
@@ -152,7 +154,7 @@ fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) ->
     }
 }
 
-/// The file behind a `pub use` of this name.
+/// The file that defines `name`, which `source` re-exports by `pub use`; `None` if it does not.
 fn passed(
     tree: &Tree,
     source: &Source,

@@ -1,17 +1,17 @@
-//! Structs and functions beyond the limits.
+//! Finds structs and functions beyond the limits of size.
 
 use syn::visit::{self, Visit};
 use syn::{FnArg, ImplItemFn, ItemFn, ItemStruct, Signature};
 
 use super::sources::Tree;
 
-/// Fields of a struct, but for settings and telemetry records.
+/// Most fields of a struct; the exceptions are settings and telemetry records.
 const FIELDS: usize = 20;
-/// Fields of `Companion`.
+/// Most fields of `Companion`.
 const COMPANION_FIELDS: usize = 12;
-/// Lines of a function.
+/// Most lines of a function's body.
 const LINES: usize = 60;
-/// Arguments of a function, `self` not counted.
+/// Most arguments of a function, without `self`.
 const ARGUMENTS: usize = 6;
 
 const SETTINGS: &str = "settings: a field for each parameter that acts";
@@ -24,7 +24,7 @@ const MESSAGE: &str = "one match on the message id: an arm for each message";
 
 const AT_LIMITS: &str = "one call after the other, each at its limits";
 
-/// Exceptions: file, name and reason.
+/// Exceptions from the limits: file, name of the struct or function, and reason.
 const EXCEPTIONS: &[(&str, &str, &str)] = &[
     (
         "companion/src/autopilot/telemetry.rs",
@@ -139,7 +139,8 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("tests/src/swarms.rs", "drawn", DRAWS),
 ];
 
-/// What is beyond the limits, and why it may be.
+/// Every struct and function beyond the limits, as a line to print; with the reason if it is listed
+/// as an exception.
 pub fn beyond(tree: &Tree) -> Vec<(String, Option<&'static str>)> {
     let mut shape = Shape { file: String::new(), found: Vec::new() };
     for source in &tree.sources {
@@ -201,7 +202,7 @@ impl Visit<'_> for Shape {
     }
 }
 
-/// Lines between the braces.
+/// Number of lines between a function's braces.
 fn lines(block: &syn::Block) -> usize {
     let braces = block.brace_token.span;
     (braces.close().start().line - braces.open().start().line).saturating_sub(1)

@@ -1,4 +1,4 @@
-//! The module tree of a crate: every file with the modules it defines.
+//! The module tree of a crate: every file, and the modules that it defines.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,26 +7,26 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use syn::{Attribute, Item};
 
-/// One file of a crate, parsed, without its tests.
+/// One parsed source file, without its test items.
 pub struct Source {
-    /// Path from the top of the repository.
+    /// Path from the root of the repository.
     pub path: PathBuf,
-    /// Its module, from the crate's root.
+    /// Module path of the file, from the crate's root.
     pub module: Vec<String>,
-    /// Its items.
+    /// Top-level items of the file.
     pub items: Vec<Item>,
 }
 
-/// The files of one crate root.
+/// The files of one crate root (library or program).
 pub struct Tree {
-    /// Every file.
+    /// Every file that the root reaches by `mod`.
     pub sources: Vec<Source>,
-    /// File of each module, inline modules included.
+    /// Index in `sources` of the file that holds each module; inline modules included.
     pub modules: BTreeMap<Vec<String>, usize>,
 }
 
 impl Tree {
-    /// Library, program and further programs of the crate in a folder.
+    /// The trees of a crate: its library, its program, and the programs in `src/bin`.
     pub fn of_crate(folder: &Path) -> Result<Vec<Self>> {
         let source = folder.join("src");
         let mut roots = vec![source.join("lib.rs"), source.join("main.rs")];
@@ -47,7 +47,7 @@ impl Tree {
         Ok(tree)
     }
 
-    /// Reads a file and those of its modules; `folder` is where they lie.
+    /// Parses the file `path` and, recursively, the files of its modules, which lie in `folder`.
     fn read(&mut self, path: &Path, folder: &Path, module: &[String]) -> Result<()> {
         let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
@@ -102,7 +102,7 @@ fn attributes(item: &Item) -> &[Attribute] {
     }
 }
 
-/// Whether it is compiled for tests only.
+/// Whether an item with these attributes is compiled for tests only (`#[cfg(test)]`).
 fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("cfg")

@@ -1,4 +1,5 @@
-//! The calls of companion on the ground: files, parameters, commands, hostile bytes.
+//! Counts the public calls of companion on the ground: files, parameters, commands, malformed
+//! frames.
 
 use companion::config::USUAL_GROUND_STATIONS;
 use companion::link::commands;
@@ -26,13 +27,13 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 const COMPANION: usize = size_of::<BoardCompanion>();
-/// Bytes that a shell hands over at once.
+/// Bytes that the shell passes to the companion at once.
 const CHUNK: usize = 256;
 const FILE_TRANSFER: u32 = 110;
 const PARAM_REQUEST_LIST: u32 = 21;
 const PARAM_SET: u32 = 23;
 const COMMAND_LONG: u32 = 76;
-/// Opcodes of MAVLink FTP.
+/// Opcodes of MAVLink FTP requests, and its ACK.
 const TERMINATE: u8 = 1;
 const OPEN_READ: u8 = 4;
 const CREATE: u8 = 6;
@@ -40,12 +41,13 @@ const WRITE: u8 = 7;
 const CRC32: u8 = 14;
 const BURST_READ: u8 = 15;
 const ACK: u8 = 128;
-/// Data of an FTP packet.
+/// Data bytes of an FTP packet.
 const FTP_DATA: usize = 239;
 const GROUND: (u8, u8) = (255, 190);
 
-/// All of them, each part in a stack frame of its own: a companion takes 36 kB of the stack, and
-/// three of them in one frame ran over the statics below it.
+/// Counts all calls of companion on the ground, each part in a function that is not inlined: a
+/// companion takes 36 kB of the stack, and three in one stack frame overran the statics below the
+/// stack.
 #[inline(never)]
 pub fn measure_companion_calls(meter: &mut impl Meter) {
     measure_framing(meter);
@@ -65,8 +67,8 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
     .run();
 }
 
-/// Bytes that look like the start of a frame again and again, each with a wrong checksum; and
-/// noise.
+/// Counts the framer on chunks of 256 bytes: three of four look like starts of frames again and
+/// again, each with a wrong CRC; the others are random bytes.
 #[inline(never)]
 fn measure_framing(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
@@ -114,7 +116,7 @@ fn measure_framing(meter: &mut impl Meter) {
     });
 }
 
-/// A mission file for as many vehicles as there may be.
+/// Counts the calls on a mission file with the most vehicles and goals.
 #[inline(never)]
 fn measure_mission_parsing(meter: &mut impl Meter) {
     let header = MissionHeader {
@@ -163,8 +165,8 @@ fn measure_mission_parsing(meter: &mut impl Meter) {
     });
 }
 
-/// The agreement on what lost vehicles leave, among as many as there may be, each of which reports
-/// something new.
+/// Counts the agreement of a fleet of the most vehicles on lost vehicles' work, while each
+/// neighbour reports new progress in every round.
 #[inline(never)]
 fn measure_fleet_agreement(meter: &mut impl Meter) {
     let mut fleet =
@@ -174,7 +176,8 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
     fleet.begin_flight(now);
     for round in 0..120_u16 {
         now = now + Duration::from_secs(1);
-        // The last ones fall silent one by one, those before them promise and hold.
+        // Ten rounds each, one more vehicle of the last ranks is silent; the others commit to a
+        // stop and hold.
         let hearing = |rank: usize| {
             let speaks = rank < VEHICLES - usize::from(round / 10);
             MemberReception {
@@ -236,7 +239,7 @@ fn values(meter: &mut impl Meter) {
     });
 }
 
-/// A flash in memory that takes no time.
+/// A flash in memory whose operations take no time.
 struct RamFlash(&'static mut [u8]);
 
 impl ReadFlash for RamFlash {
@@ -247,7 +250,7 @@ impl ReadFlash for RamFlash {
     }
 }
 
-/// A companion on the ground, its flash, and a ground station.
+/// A companion on the ground, its flash, and a scripted ground station.
 struct GroundedCompanion<'a, M> {
     companion: BoardCompanion,
     flash: RamFlash,
@@ -258,7 +261,8 @@ struct GroundedCompanion<'a, M> {
 }
 
 impl<M: Meter> GroundedCompanion<'_, M> {
-    /// Uploads a roadmap, reads it back, sets all parameters, restarts.
+    /// Uploads a roadmap, reads it back, sets all parameters, sends commands, and mounts the flash
+    /// again.
     fn run(mut self) {
         self.mount();
         let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
@@ -291,7 +295,7 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         assert!(store, "what was uploaded is there");
     }
 
-    /// Mounts the flash, as a start does; whether a roadmap lies in it.
+    /// Mounts the flash as a start does. Returns whether it holds a roadmap.
     fn mount(&mut self) -> bool {
         let flash = &mut self.flash;
         let store = self
@@ -304,7 +308,7 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         found
     }
 
-    /// An FTP request, until it is answered.
+    /// Sends an FTP request, and repeats it until it is acknowledged.
     fn request_ftp(&mut self, opcode: u8, offset: u32, data: &[u8]) {
         self.packet = self.packet.wrapping_add(1);
         let mut payload = [0; 254];
@@ -321,7 +325,7 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         panic!("FTP request {opcode} is not answered");
     }
 
-    /// Gives it a frame; whether an FTP request was granted.
+    /// Passes a frame to the companion. Returns whether the companion acknowledged an FTP request.
     fn feed_frame(&mut self, id: u32, payload: &[u8]) -> bool {
         self.now = self.now + Duration::from_millis(20);
         self.sequence = self.sequence.wrapping_add(1);
@@ -336,8 +340,8 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         self.drain_outputs()
     }
 
-    /// Drains the companion's frames and events, and executes its flash operations; whether an FTP
-    /// request was acknowledged.
+    /// Sends the companion's frames, takes its events and executes its flash requests until none
+    /// are left. Returns whether an FTP request was acknowledged.
     fn drain_outputs(&mut self) -> bool {
         let Self { companion, flash, meter, now, .. } = self;
         let now = *now;

@@ -1,6 +1,7 @@
-//! What every public call of planner-core and companion costs a board, in instructions: run in QEMU
-//! with `-icount shift=0`, read by the bench. A roadmap lies in bank 2, a map beyond it. Every line
-//! is a name, bytes and instructions.
+//! Bench program: counts the instructions of every public call of planner-core and companion on a
+//! board. It runs in QEMU with `-icount shift=0`; `cargo xtask bench --only worst-case` reads its
+//! output. A roadmap lies in bank 2, a map in memory behind it. Each call's line has its
+//! instructions, the bytes it is lent and its name.
 #![no_std]
 #![no_main]
 
@@ -25,12 +26,13 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     semihosting::process::exit(1)
 }
 
-/// Flights in which the safety filter is counted.
+/// Flights in which calls of the safety filter are counted.
 const FILTER_FLIGHTS: u64 = 100;
-/// Most rows of the table.
+/// Most different names of calls.
 const MAX_ROWS: usize = 160;
 
-/// Counts instructions, those of asking the clock left out.
+/// Counts instructions of calls, without those of reading the clock: for each name its bytes and
+/// its largest count.
 struct Instructions {
     rows: Vec<(&'static str, usize, u64), MAX_ROWS>,
 }
@@ -66,7 +68,8 @@ fn main() -> ! {
     semihosting::process::exit(0)
 }
 
-/// Control steps in flight, so many of each kind.
+/// Counts control steps in flight: at least [`cases::STEP_CASES`] among neighbours on the plan, and
+/// as many where most left it or fell silent.
 #[inline(never)]
 fn measure_flights(meter: &mut Instructions) {
     let mut steps = [0; 2];
@@ -85,7 +88,7 @@ fn measure_flights(meter: &mut Instructions) {
     }
 }
 
-/// Control steps of coverage missions in flight.
+/// Counts control steps of coverage missions in flight.
 #[inline(never)]
 fn measure_area_flights(meter: &mut Instructions) {
     let mut steps = 0;
@@ -100,7 +103,7 @@ fn measure_area_flights(meter: &mut Instructions) {
     }
 }
 
-/// The safety filter alone.
+/// Counts calls of the safety filter alone.
 #[inline(never)]
 fn measure_filter(meter: &mut Instructions) {
     for seed in 0..FILTER_FLIGHTS {

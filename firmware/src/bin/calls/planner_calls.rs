@@ -1,4 +1,4 @@
-//! The calls of planner-core.
+//! Counts the public calls of planner-core.
 
 use firmware::boards::chosen::memory;
 use firmware::calls::{Meter, coverage, coverage_flights, flight};
@@ -30,16 +30,16 @@ use static_cell::ConstStaticCell;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 type Search = SearchWorkspace<ROADMAP_NODES>;
 
-/// Random cases of a call that takes microseconds.
+/// Random inputs of a call that takes microseconds.
 const MANY_CASES: usize = 1000;
-/// Random cases of a call that takes milliseconds.
+/// Random inputs of a call that takes milliseconds.
 const SOME_CASES: usize = 50;
-/// Longest edge, metres.
+/// Longest edge of the roadmap, metres.
 const MAX_EDGE_M: f32 = 8.0;
-/// Nodes of a small roadmap, for calls that only a desk makes.
+/// Nodes of a small roadmap, for calls that are only made on the host in use.
 const SMALL_ROADMAP_NODES: usize = 300;
 
-/// Memory beside the scratch.
+/// Memory of the bench beside the workspace overlay.
 struct BenchMemory {
     plan: Plan,
     small: prm::Workspace<SMALL_ROADMAP_NODES, 1024>,
@@ -61,7 +61,8 @@ static BESIDE: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
     lengths: [0.0; 2048],
 });
 
-/// All of them; the sums of the answers of a coverage mission: of its calls, of its flights.
+/// Counts all public calls of planner-core. Returns two checksums of coverage: its calls, its
+/// flights.
 #[inline(never)]
 pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     let scratch = SCRATCH.take();
@@ -81,7 +82,7 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);
     let shape = *grid.shape();
-    // The shape is sound: it was checked before.
+    // Cannot fail: `voxel_map` has checked the same shape and words.
     let _ = meter.call("voxel::VoxelGrid::new", size_of::<VoxelGrid<'_>>(), || {
         VoxelGrid::new(shape, Outside::Blocked, words)
     });
@@ -131,7 +132,7 @@ fn measure_searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Pla
         let (from, to) =
             (random_below(&mut rng, nodes) as u16, random_below(&mut rng, nodes) as u16);
         let mut way: Vec<u16, WAYPOINTS> = Vec::new();
-        // No path, or one too long, is an answer too.
+        // No path, or more nodes than fit, is a valid result too.
         let _ = meter.call("search::astar", bytes, || {
             search::astar(view, from, to, passable, search, &mut way)
         });
@@ -159,8 +160,8 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
     let mut rng = Pcg32::seed_from_u64(3);
     let bytes = size_of::<AssignmentWorkspace<VEHICLES>>();
     for case in 0..60 {
-        // Metres at random; few different ones; every third pair impossible; one worse than the
-        // other.
+        // Four kinds of cost matrix in turn: random metres; few different costs; every third pair
+        // infinite; cost growing with row times column.
         let mut cost = |i: usize| match case % 4 {
             0 => random_between(&mut rng, 0.0, 100.0),
             1 => random_below(&mut rng, 4) as f32,
@@ -180,7 +181,7 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
     }
 }
 
-/// The demo's ten vehicles.
+/// Counts the plan of the demo's ten vehicles and its steps.
 fn measure_plans(
     meter: &mut impl Meter,
     view: &RoadmapView<'_>,
@@ -223,14 +224,14 @@ fn measure_plans(
         let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
         let others = plan.flights.iter().filter(|other| other.id != flight.id);
         let mut own = flight.clone();
-        // That no path exists is an answer too.
+        // That no route exists is a valid result too.
         let _ = meter.call("schedule::sipp::find_route, past 9", bytes, || {
             sipp::find_route(view, &route, passable, others, &mut ws.sipp, &mut own)
         });
     }
 }
 
-/// The largest swarm, on shortest paths between random nodes.
+/// Counts the scheduling of the largest swarm, on shortest paths between random nodes.
 fn measure_largest_swarm(
     meter: &mut impl Meter,
     view: &RoadmapView<'_>,
@@ -314,7 +315,7 @@ fn measure_detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut 
             required_clearance_m: cases::CLEARANCE_M,
             fence: None,
         };
-        // That no detour exists is an answer too.
+        // That no detour exists is a valid result too.
         let _ = meter.call("detour::plan_detour, 128 things", bytes, || {
             detour::plan_detour(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
         });
@@ -406,7 +407,7 @@ fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
     }
 }
 
-/// P3D's building on board.
+/// Counts the steps of building the roadmap of P3D's building on board, without and with clearance.
 fn measure_roadmap_builds(
     meter: &mut impl Meter,
     grid: &VoxelGrid<'_>,
@@ -440,7 +441,7 @@ fn measure_roadmap_builds(
         .expect(good);
 }
 
-/// Calls that a desk makes, on a small roadmap.
+/// Counts calls that are only made on the host in use, on a small roadmap.
 fn measure_desk_calls(
     meter: &mut impl Meter,
     grid: &VoxelGrid<'_>,
@@ -482,7 +483,7 @@ fn measure_desk_calls(
         })
         .expect(good);
     let view = RoadmapView::parse(&file[..len]).expect(good);
-    // Cannot fail: as many numbers as half-edges.
+    // Cannot fail: `lengths` has room for all half-edges.
     let _ = meter.call("search::RoadmapWithLengths::new, 300", 4 * view.half_edge_count(), || {
         RoadmapWithLengths::new(view, lengths)
     });

@@ -1,25 +1,26 @@
-//! Bank 2 of the STM32H743's flash: 8 sectors of 128 kB, words of 32 bytes with an error-correcting
-//! code each.
+//! Driver of bank 2 of the STM32H743's flash: 8 sectors of 128 kB, words of 32 bytes, each with an
+//! error-correcting code.
 //!
-//! A word whose programming was cut by a reset has a code that fits nothing. Reading one is
-//! answered by a bus error (RM0433, "Error code correction": double error detection), which would
-//! end in a hard fault. So all is read as memory is probed (ARMv7-M manual, `CCR.BFHFNMIGN`): with
-//! FAULTMASK set this code runs at priority −1, where that bit has a load's bus error ignored and
-//! noted in CFSR alone. For the time of one word, about a microsecond, no interrupt is taken but
-//! NMI. A load's error belongs to the load that made it, so what is found in CFSR between the
-//! barriers is this word's. The flag that the flash itself keeps is not asked: a load that the
-//! processor made ahead of time, and dropped, may have set it.
+//! A torn word, whose programming a reset interrupted, has a code that does not match. A load from
+//! it raises a bus error (RM0433, "Error code correction": double error detection), which would end
+//! in a hard fault. So all reads use the method by which ARM probes memory (ARMv7-M manual,
+//! `CCR.BFHFNMIGN`): with FAULTMASK set this code runs at priority −1, where that bit makes the
+//! processor ignore a load's bus error and only record it in CFSR. During one word, about a
+//! microsecond, no interrupt but NMI is taken. A load's bus error is precise, so an error in CFSR
+//! between the barriers belongs to this word. The flash's own error flag is not used: a speculative
+//! load may have set it.
 //!
-//! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands embassy-stm32 0.6
-//! takes every erasure and program for failed: it clears them by FLASH_SR2, which on this chip is
-//! read-only for them. So they are cleared before. It leaves PSIZE at 8 bits when it has
-//! programmed, as which a sector is erased at the slowest (DS12110, "Flash memory programming"): so
-//! that is widened before.
+//! embassy-stm32 0.6 takes an erasure or programming for failed while an old error flag of the
+//! flash is set: it clears the flags by FLASH_SR2, which is read-only on this chip; they are
+//! cleared by FLASH_CCR2. So this driver clears them before each operation. embassy-stm32 also
+//! leaves PSIZE at 8 bits after programming, with which a sector erases slowest (DS12110, "Flash
+//! memory programming"): so this driver sets it to 64 bits before an erasure.
 //!
-//! The bank is not cached, so a load that fails is this code's own, and what was programmed is what
-//! is read. Only the sectors of the roadmap in use are: the MPU holds them read only for as long.
+//! The bank is not cached: a bus error belongs to a load of this code, and a read returns what was
+//! programmed. Only the sectors of the roadmap in use are cached; the MPU makes them read only
+//! meanwhile.
 //!
-//! None of this has run on a chip.
+//! No chip has run this yet.
 #![expect(unsafe_code, reason = "flash is memory, and its errors are faults")]
 
 use core::arch::asm;
@@ -34,23 +35,23 @@ use super::super::mpu;
 use crate::chips::h743;
 use crate::lent::{FlashLender, LentFlash};
 
-/// Offset of bank 2 from the start of the flash.
+/// Offset of bank 2 from the start of the flash, as embassy-stm32 counts.
 const BANK2_OFFSET: u32 = 1 << 20;
-/// Address of bank 2.
+/// Address of bank 2 in the memory map.
 const BANK2_ADDRESS: usize = 0x0810_0000;
-/// Values that FLASH_KEYR2 takes, one after the other, to unlock FLASH_CR2.
+/// Values that are written to FLASH_KEYR2, one after the other, to unlock FLASH_CR2.
 const UNLOCK_KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// `CR.PSIZE` of 64 bits.
+/// Value of `FLASH_CR2.PSIZE` for a parallelism of 64 bits.
 const PSIZE_64: u8 = 3;
-/// `CCR.BFHFNMIGN`: at priority −1 and above, bus errors of loads are ignored.
+/// Bit `CCR.BFHFNMIGN`: code that runs at priority −1 or −2 ignores bus errors of its loads.
 const BFHFNMIGN: u32 = 1 << 8;
-/// `CFSR`'s byte of bus faults; ones clear it.
+/// The bus fault byte of `CFSR`; writing ones clears it.
 const BUS_FAULTS: u32 = 0xFF00;
 
-/// Bank 2.
+/// Layout of the file store, which is all of bank 2.
 pub const LAYOUT: FlashLayout = FlashLayout::H743;
 
-/// Bank 2; there is one.
+/// Driver of bank 2; there is one instance.
 pub struct Flash {
     device: Device<'static, Async>,
     lender: FlashLender,
@@ -61,24 +62,25 @@ impl Flash {
         Self { device, lender: FlashLender::new() }
     }
 
-    /// A roadmap as it lies in the bank, cached, and not to be changed until it is given back;
-    /// `None` where it would reach beyond, or another one is lent. The store gives only what it has
-    /// read whole, by [`ReadFlash::read`]: no word of it is torn.
+    /// Lends `len` bytes at offset `at` of the bank, in place and cached; they are not erased or
+    /// programmed until given back. `None` where they reach beyond the bank, or other bytes are
+    /// lent. The store asks only for bytes that it has read whole by [`ReadFlash::read`], so no
+    /// word of them is torn.
     pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
         let address = bank_address(at, len)?;
-        // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
+        // SAFETY: inside the bank, and this driver does not erase or program bytes that are lent.
         let lent = self
             .lender
             .lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
-        // SAFETY: nobody writes there.
+        // SAFETY: the region makes the sectors read only, and nothing writes to them.
         unsafe { mpu::set(super::ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32))) };
         Some(lent)
     }
 
-    /// The lent range is not used any more, and nothing of it stays in the cache.
+    /// Ends the loan: the bytes may be erased and programmed again, and are not cached any more.
     pub fn take_back(&mut self, lent: LentFlash) {
-        // SAFETY: a region less; and the cache's maintenance, which nobody else does after the
-        // start.
+        // SAFETY: disables a region that only this driver uses; after the start no other code
+        // maintains the cache.
         unsafe {
             mpu::set(super::ROADMAP_REGION, None);
             let mut core = cortex_m::Peripherals::steal();
@@ -88,7 +90,7 @@ impl Flash {
     }
 }
 
-/// The address of bytes of the bank; `None` where they would reach beyond.
+/// Address of `len` bytes at offset `at` of the bank; `None` where they reach beyond it.
 fn bank_address(at: u32, len: usize) -> Option<usize> {
     let end = (at as usize).checked_add(len)?;
     (end <= LAYOUT.len() as usize).then_some(BANK2_ADDRESS + at as usize)
@@ -100,7 +102,7 @@ impl ReadFlash for Flash {
         let mut rest = out;
         while !rest.is_empty() {
             let (piece, after) = rest.split_at_mut(rest.len().min(WORD - address % WORD));
-            // SAFETY: inside the bank, by `bank_address`; and inside one word.
+            // SAFETY: inside the bank, as `bank_address` checked, and inside one word.
             unsafe { read_tolerating_bus_errors(address as *const u8, piece) }?;
             address += piece.len();
             rest = after;
@@ -109,16 +111,18 @@ impl ReadFlash for Flash {
     }
 }
 
-/// Reads bytes that may raise a bus error; then their values mean nothing.
+/// Reads bytes of one flash word. Returns [`FlashFault`] if a load raised a bus error, as a torn
+/// word does; then `out` holds no data.
 ///
 /// # Safety
-/// They have to be memory, whole or torn.
+/// `from` points to flash bytes of `out`'s length; their word may be torn.
 unsafe fn read_tolerating_bus_errors(from: *const u8, out: &mut [u8]) -> Result<(), FlashFault> {
-    // SAFETY: no other code of the firmware uses CCR and CFSR but the fault handler, which does not
-    // come back.
+    // SAFETY: only this function and the fault handler use CCR and CFSR, and that handler never
+    // returns.
     let scb = unsafe { &*SCB::PTR };
-    // SAFETY: FAULTMASK and BFHFNMIGN are set for the loads alone, and put back: they were not set
-    // before. Nothing in between may panic; `out` is not in the flash, so only the loads can fail.
+    // SAFETY: FAULTMASK and BFHFNMIGN are set for the loads alone and cleared after; they were
+    // clear before. Nothing in between panics; `out` is not in the flash, so only the loads can
+    // fail.
     unsafe {
         asm!("cpsid f", options(nostack, preserves_flags));
         scb.ccr.modify(|ccr| ccr | BFHFNMIGN);
@@ -140,7 +144,7 @@ unsafe fn read_tolerating_bus_errors(from: *const u8, out: &mut [u8]) -> Result<
     }
 }
 
-/// Clears what earlier loads and operations have left.
+/// Clears the flash's error flags that earlier loads and operations have left.
 fn clear_errors() {
     pac::FLASH.bank(1).ccr().write(|w| {
         w.set_clr_wrperr(true);
@@ -155,7 +159,7 @@ fn clear_errors() {
     });
 }
 
-/// Has bank 2 erased 64 bits at a time, as after a reset.
+/// Sets PSIZE of bank 2 to 64 bits, the value after a reset, so that erasing is fast.
 fn restore_erase_width() {
     let bank = pac::FLASH.bank(1);
     if bank.cr().read().lock() {

@@ -1,5 +1,5 @@
-//! ST's NUCLEO-H743ZI: STM32H743 at 480 MHz (400 where the silicon is of revision Y), 1 MB of RAM,
-//! 2 MB of flash.
+//! Board support for ST's NUCLEO-H743ZI: STM32H743 at 480 MHz (revision Y of the silicon: 400), 1
+//! MB of RAM, 2 MB of flash.
 //!
 //! | pin | is |
 //! |---|---|
@@ -44,8 +44,8 @@ pub use transmitter::Transmitter;
 
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
-/// Bytes of the ring in which the DMA turns: 22 ms of the autopilot's bytes. `memory.x` puts
-/// statics of these names where the DMA reaches them and nothing is cached.
+/// Bytes of the ring buffer that DMA fills: 22 ms at the autopilot's baud rate. `memory.x` places
+/// the statics named `DMA_…` in SRAM3, which DMA reaches and which is not cached.
 const UART_RING: usize = 2048;
 static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
 static DMA_RADIO_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
@@ -54,37 +54,41 @@ static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> =
 static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> =
     ConstStaticCell::new(transmitter::EMPTY);
 
-/// Region of the MPU for the roadmap in use: above that of the bank, below the guard's.
+/// Number of the MPU region of the roadmap in use: above that of the whole bank, so that it takes
+/// precedence, and below the stack guard's.
 const ROADMAP_REGION: u32 = 3;
-/// Warning about option bytes as a chip has them from the factory.
+/// Warning: option bytes are as a new chip has them.
 const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
-/// Warning where the ST-LINK gives no clock.
+/// Warning: the ST-LINK outputs no clock.
 const NO_HSE: &str = "No 8 MHz from the ST-LINK: own oscillator";
 
-/// Receives by DMA into a ring.
+/// Receives by DMA into a ring buffer.
 pub type Receiver = RingBufferedUartRx<'static>;
-/// Priority of the executor of links and setpoints: below all devices.
+/// Interrupt priority of the executor of links and setpoints: below all devices.
 pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
 const LINKS_AT: Priority = Priority::P8;
 
-/// No device of ours has it: it runs the executor of links and setpoints.
+/// Interrupt handler that runs the executor of links and setpoints; no device of this board uses
+/// this interrupt.
 #[interrupt]
 unsafe fn UART7() {
-    // SAFETY: this is the handler.
+    // SAFETY: this is the interrupt's handler.
     unsafe { executors::poll_links_executor() }
 }
 
-/// Interrupt of the executor of plans and flash.
+/// Interrupt handler that runs the executor of plans and flash; no device of this board uses this
+/// interrupt.
 #[interrupt]
 unsafe fn UART8() {
-    // SAFETY: as above.
+    // SAFETY: this is the interrupt's handler.
     unsafe { executors::poll_plans_executor() }
 }
 
-/// The parts of this board, ready.
+/// What [`start`] returns on this board.
 pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
-/// Starts the board. To be called once, after [`reset_cause`].
+/// Starts watchdog, clocks, MPU, caches, executors, UARTs and flash. To be called once, after
+/// [`reset_cause`].
 pub fn start() -> Parts {
     start::start_watchdog();
     let revision = Revision::from_idcode(pac::DBGMCU.idc().read().0);
@@ -96,14 +100,14 @@ pub fn start() -> Parts {
     let mut warnings = Vec::new();
     let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
     let wrong = [(level < 3, BROWN_OUT_OFF), (!has_hse, NO_HSE)].into_iter().filter(|(is, _)| *is);
-    // Cannot overflow: there is room for both.
+    // Cannot overflow: it has room for both warnings.
     wrong.for_each(|(_, text)| _ = warnings.push(text));
     interrupt::UART7.set_priority(LINKS_AT);
     interrupt::UART8.set_priority(Priority::P12);
     let serial = |baudrate| {
         let mut config = usart::Config::default();
         config.baudrate = baudrate;
-        // A cable that is not there is silence, not noise.
+        // Pull-up on the RX pin: a UART without a cable reads idle, not noise.
         config.rx_pull = Pull::Up;
         config
     };
@@ -131,7 +135,7 @@ pub fn start() -> Parts {
     }
 }
 
-/// The independent watchdog, and the light that shows that it is fed.
+/// The independent watchdog, and the LED that toggles each time it is fed.
 pub struct Watchdog {
     device: IndependentWatchdog<'static, peripherals::IWDG1>,
     light: Output<'static>,
@@ -146,7 +150,7 @@ impl Watchdog {
         self.device.unleash();
     }
 
-    /// Feeds the watchdog.
+    /// Feeds the watchdog and toggles the LED.
     pub fn feed(&mut self) {
         self.device.pet();
         self.light.toggle();

@@ -1,5 +1,5 @@
-//! Before the peripherals: why the chip started, its clocks, what the memories may be used for. The
-//! values are in [`chips::h743`](crate::chips::h743), which is tested on the desk.
+//! Steps of the start before the peripherals: reset cause, watchdog, clocks, MPU and caches. The
+//! register values are in [`chips::h743`](crate::chips::h743), which is tested on the host.
 #![expect(unsafe_code, reason = "registers and caches")]
 
 use embassy_stm32::pac;
@@ -11,19 +11,19 @@ use super::super::mpu;
 use crate::chips::ResetCause;
 use crate::chips::h743::{self, Revision};
 
-/// Most polls of the oscillator's ready flag, a few clocks of 64 MHz each: more than 10 ms, of
-/// which the oscillator takes 2 (DS12110).
+/// Most polls of the external clock's ready flag, a few cycles of 64 MHz each: more than 10 ms in
+/// all; the clock is ready within 2 ms (DS12110).
 const MAX_HSE_POLLS: u32 = 200_000;
 
-/// Reason why the chip started, once: the flags are cleared. Switches the memories of domain D2 on
-/// too, and mends reading from AXI SRAM where the silicon is old.
+/// Reads why the chip was reset and clears the flags; to be called once. Also switches on the
+/// clocks of domain D2's memories, and applies the AXI SRAM's workaround on old silicon.
 pub fn reset_cause() -> ResetCause {
     pac::RCC.ahb2enr().modify(|w| w.0 |= h743::D2_SRAM);
-    // By the errata of all peripheral clocks: read the register, then the memory is there.
+    // By the errata on peripheral clocks: after a read of the register the memory may be used.
     pac::RCC.ahb2enr().read();
     cortex_m::asm::dsb();
     if Revision::from_idcode(pac::DBGMCU.idc().read().0) == Revision::Old {
-        // SAFETY: a register of the bus matrix, as ST's own start code sets it.
+        // SAFETY: a register of the bus matrix, which ST's own start code sets in the same way.
         unsafe { (h743::AXI_TARG7_FN_MOD as *mut u32).write_volatile(h743::READ_ISS_OVERRIDE) };
     }
     let cause = h743::reset_cause(pac::RCC.rsr().read().0);
@@ -32,26 +32,28 @@ pub fn reset_cause() -> ResetCause {
     cause
 }
 
-/// Restarts.
+/// Restarts the board.
 pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// Starts the watchdog with its registers' first values, 512 ms: should a clock not come, it bites.
-/// It stands still while a debugger has the processor halted.
+/// Starts the watchdog with its registers' reset values, 512 ms: if a clock never becomes ready, it
+/// resets the chip. It stops counting while a debugger has the processor halted.
 pub(super) fn start_watchdog() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
     pac::IWDG1.kr().write(|w| w.set_key(Key::START));
 }
 
-/// Whether the board's oscillator runs: that of its ST-LINK, which may be without power.
+/// Switches on the external clock (HSE), which the board's ST-LINK outputs. Returns whether it
+/// became ready; it does not if the ST-LINK has no power.
 pub(super) fn try_hse() -> bool {
     pac::RCC.cr().modify(|w| w.set_hsebyp(true));
     pac::RCC.cr().modify(|w| w.set_hseon(true));
     (0..MAX_HSE_POLLS).any(|_| pac::RCC.cr().read().hserdy())
 }
 
-/// Clocks as fast as the silicon may run, from the board's oscillator or the chip's own.
+/// Clock settings: the fastest that the silicon allows, from the external clock if `has_hse`, else
+/// from the chip's internal oscillator.
 pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
@@ -61,7 +63,7 @@ pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::
     config.rcc.pll1 = Some(rcc::Pll {
         source: if has_hse { rcc::PllSource::HSE } else { rcc::PllSource::HSI },
         prediv: PllPreDiv::from_bits(divider as u8),
-        // The field holds one less.
+        // The register field holds the factor minus one.
         mul: PllMul::from_bits(factor as u16 - 1),
         fracn: None,
         divp: Some(rcc::PllDiv::DIV2),
@@ -81,9 +83,9 @@ pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::
     config
 }
 
-/// Sets which memory may be cached and touched, then starts the caches.
+/// Sets the MPU's regions, then enables both caches.
 pub(super) fn configure_mpu_and_caches() {
-    // The place of the roadmap, `super::ROADMAP_REGION`, is free until there is one.
+    // Region `super::ROADMAP_REGION` stays disabled until a roadmap is lent.
     let regions = [
         Some(h743::EXTERNAL),
         Some(h743::DMA),
@@ -93,8 +95,8 @@ pub(super) fn configure_mpu_and_caches() {
         Some(mpu::stack_guard_region()),
     ];
     mpu::enable_regions(&regions);
-    // SAFETY: the caches are this function's alone, which is called once. Code is never written,
-    // and what the DMA reaches is not cached.
+    // SAFETY: only this function enables the caches, and it is called once. Code is never written,
+    // and memory that DMA uses is not cached.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);

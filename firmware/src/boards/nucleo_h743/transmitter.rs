@@ -1,17 +1,17 @@
-//! Transmits by DMA from memory that is not cached: what a task has to send lies where the DMA may
-//! see an older state.
+//! UART transmitter by DMA. It copies each frame into a buffer that is not cached: DMA would read
+//! stale bytes from a task's cached memory.
 
 use companion::link::frame::MAX_FRAME_LEN;
 use embassy_stm32::mode::Async as ByDma;
 use embassy_stm32::usart::{self, UartTx};
 use embedded_io_async::{ErrorType, Write};
 
-/// A whole frame.
+/// A DMA buffer for one MAVLink frame.
 pub type Buffer = [u8; MAX_FRAME_LEN];
-/// A buffer with nothing to send.
+/// Initial value of the DMA buffers.
 pub const EMPTY: Buffer = [0; MAX_FRAME_LEN];
 
-/// Transmits by DMA.
+/// Transmits through a DMA buffer.
 pub struct Transmitter {
     device: UartTx<'static, ByDma>,
     buffer: &'static mut Buffer,

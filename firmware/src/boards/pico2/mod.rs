@@ -1,4 +1,5 @@
-//! Raspberry Pi Pico 2: RP2350, Cortex-M33 at 150 MHz, 520 kB of RAM, 4 MB of flash outside.
+//! Board support for the Raspberry Pi Pico 2: RP2350, Cortex-M33 at 150 MHz, 520 kB of RAM, 4 MB of
+//! external flash.
 //!
 //! | pin | is |
 //! |---|---|
@@ -6,12 +7,13 @@
 //! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 460 800 baud |
 //! | GP25 | the light |
 //!
-//! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a
-//! UART may be lost. So both are done only on the ground, disarmed (`FlashLayout::stalls`): uploads
-//! are refused in flight, and parameters are kept when it is over.
+//! Code runs from the same flash, so it stops while the flash erases or programs: no setpoint is
+//! sent, and received bytes may be lost. So the flash is changed only while disarmed
+//! (`FlashLayout::stalls`): uploads are refused in flight, and changed parameters are stored after
+//! landing.
 //!
-//! `SYSRESETREQ` resets the processor and leaves watchdog, UARTs and all else as they are: so this
-//! board restarts by its watchdog, which resets all of it but the oscillators.
+//! `SYSRESETREQ` resets the processor but not watchdog, UARTs and other peripherals. So this board
+//! restarts by its watchdog, which resets everything but the oscillators.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
 use companion::storage::store::{FlashFault, FlashLayout, ReadFlash};
@@ -39,7 +41,7 @@ bind_interrupts!(struct Irqs {
 
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
-/// Bytes of a UART's ring: 22 ms of the autopilot's bytes.
+/// Bytes of a UART's ring buffer: 22 ms at the autopilot's baud rate.
 const UART_RING: usize = 2048;
 type Rings = [[u8; UART_RING]; 2];
 static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING]; 2]);
@@ -47,43 +49,43 @@ static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING
 
 /// Bytes of the whole flash.
 const FLASH_LEN: usize = 4 << 20;
-/// Offset of our store from the start of the flash.
+/// Offset of the file store from the start of the flash; the program lies below it.
 const STORE_OFFSET: u32 = 1 << 20;
-/// Address of our store.
+/// Address of the file store in the memory map.
 const STORE_ADDRESS: usize = 0x1010_0000;
-/// Layout of the store, which lies after the program.
+/// Layout of the file store.
 pub const LAYOUT: FlashLayout = FlashLayout::PICO2;
 
-/// Receives by interrupt into a ring.
+/// Receives by interrupt into a ring buffer.
 pub type Receiver = BufferedUartRx;
-/// Transmits by interrupt from a ring.
+/// Transmits by interrupt from a ring buffer.
 pub type Transmitter = BufferedUartTx;
 
-/// Priority of the executor of links and setpoints: below all devices.
+/// Interrupt priority of the executor of links and setpoints: below all devices.
 pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
 const LINKS_AT: Priority = Priority::P1;
 
-/// Runs the executor of links and setpoints.
+/// Interrupt handler that runs the executor of links and setpoints; no device uses this interrupt.
 #[interrupt]
 unsafe fn SWI_IRQ_0() {
-    // SAFETY: this is the handler.
+    // SAFETY: this is the interrupt's handler.
     unsafe { executors::poll_links_executor() }
 }
 
-/// Runs the executor of plans and flash.
+/// Interrupt handler that runs the executor of plans and flash; no device uses this interrupt.
 #[interrupt]
 unsafe fn SWI_IRQ_1() {
-    // SAFETY: as above.
+    // SAFETY: this is the interrupt's handler.
     unsafe { executors::poll_plans_executor() }
 }
 
-/// Reason why the chip started.
+/// Why the chip was reset.
 pub fn reset_cause() -> ResetCause {
     let chip = pac::POWMAN.chip_reset().read().0;
     rp2350::reset_cause(chip, pac::WATCHDOG.reason().read().0)
 }
 
-/// Restarts: by the watchdog, at once.
+/// Restarts the board at once, by triggering the watchdog.
 pub fn reset() -> ! {
     set_watchdog_resets();
     pac::WATCHDOG.ctrl().modify(|w| w.set_trigger(true));
@@ -92,22 +94,24 @@ pub fn reset() -> ! {
     }
 }
 
-/// Sets the parts that the watchdog resets; embassy-rp's `start` sets those of the RP2040.
+/// Sets the parts that the watchdog resets. To be called after embassy-rp's `start`, which sets
+/// those of the RP2040.
 fn set_watchdog_resets() {
     pac::PSM.wdsel().write_value(pac::psm::regs::Wdsel(rp2350::WATCHDOG_RESETS));
 }
 
-/// Below the stack nothing may be written, but by the handler of that fault.
+/// Sets MSPLIM to the end of the stack, so that an overflow faults; only the hard fault handler may
+/// use the stack below it.
 fn guard_stack() {
     install_core0_stack_guard().expect("MSPLIM is always there");
-    // SAFETY: a bit of the processor's that means the handlers of hard faults alone.
+    // SAFETY: this bit of the processor affects hard fault handlers alone.
     unsafe { (*cortex_m::peripheral::SCB::PTR).ccr.modify(|ccr| ccr | rp2350::STKOFHFNMIGN) };
 }
 
-/// The parts of this board, ready.
+/// What [`start`] returns on this board.
 pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
-/// Starts the board. To be called once, after [`reset_cause`].
+/// Starts watchdog, executors, UARTs and flash. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
     guard_stack();
     let p = embassy_rp::init(embassy_rp::config::Config::default());
@@ -126,11 +130,12 @@ pub fn start() -> Parts {
     let [sends, receives] = RADIO_RINGS.take();
     let swarm =
         BufferedUart::new(p.UART1, p.PIN_4, p.PIN_5, Irqs, sends, receives, serial(RADIO_BAUD));
-    // The first bytes of a burst are taken early, so that the last ones find room.
+    // A receive interrupt comes when 8 bytes of the FIFO's 32 are filled, so that further bytes
+    // have room.
     for uart in [pac::UART0, pac::UART1] {
         uart.uartifls().modify(|w| w.set_rxiflsel(rp2350::RX_QUARTER));
     }
-    // A cable that is not there is silence, not noise.
+    // Pull-ups on the RX pins: a UART without a cable reads idle, not noise.
     for receives in [1, 5] {
         pac::PADS_BANK0.gpio(receives).modify(|w| w.set_pue(true));
     }
@@ -148,23 +153,24 @@ pub fn start() -> Parts {
     }
 }
 
-/// The part of the flash after the program.
+/// Driver of the file store, the flash after the program.
 pub struct Flash {
     device: Device<'static, peripherals::FLASH, Blocking, FLASH_LEN>,
     lender: FlashLender,
 }
 
 impl Flash {
-    /// A roadmap as it lies there, not to be changed until it is given back; `None` where it would
-    /// reach beyond, or another one is lent.
+    /// Lends `len` bytes at offset `at` of the file store, in place; they are not erased or
+    /// programmed until given back. `None` where they reach beyond the store, or other bytes are
+    /// lent.
     pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
         (at as usize).checked_add(len).filter(|end| *end <= LAYOUT.len() as usize)?;
         let from = (STORE_ADDRESS + at as usize) as *const u8;
-        // SAFETY: inside the flash, which nobody erases or programs there as long as it is lent.
+        // SAFETY: inside the flash, and this driver does not erase or program bytes that are lent.
         self.lender.lend(at, unsafe { core::slice::from_raw_parts(from, len) })
     }
 
-    /// The lent range is not used any more.
+    /// Ends the loan: the bytes may be erased and programmed again.
     pub fn take_back(&mut self, lent: LentFlash) {
         self.lender.take_back(lent);
     }
@@ -194,7 +200,7 @@ impl crate::flash::Flash for Flash {
     }
 }
 
-/// The watchdog, and the light that shows that it is fed.
+/// The watchdog, and the LED that toggles each time it is fed.
 pub struct Watchdog {
     device: watchdog::Watchdog,
     light: Output<'static>,
@@ -205,14 +211,14 @@ impl Watchdog {
         Self { device: watchdog::Watchdog::new(device), light }
     }
 
-    /// Wakes it; it stands still while a debugger has a processor halted.
+    /// Starts the watchdog. It stops counting while a debugger has a processor halted.
     fn start(&mut self) {
         self.device.pause_on_debug(true);
         self.device.start(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         set_watchdog_resets();
     }
 
-    /// Feeds the watchdog.
+    /// Feeds the watchdog and toggles the LED.
     pub fn feed(&mut self) {
         self.device.feed(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         self.light.toggle();

@@ -1,7 +1,8 @@
-//! Time: CMSDK timer 0 counts, timer 1 wakes.
+//! The clock and embassy-time's driver: CMSDK timer 0 counts time, timer 1 raises an interrupt when
+//! the next task is due.
 //!
-//! Both run at 25 MHz. With `-icount shift=0` one instruction is one nanosecond, so timer 0 counts
-//! instructions in forties. In lock step it is two nanoseconds.
+//! Both run at 25 MHz, 40 ns a count. With QEMU's `-icount shift=0` an instruction takes 1 ns, so a
+//! count is 40 instructions. In lock step (`shift=1`) an instruction takes 2 ns.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -13,9 +14,9 @@ use embassy_time_queue_utils::Queue;
 use super::interrupts::{self, Irq};
 use super::registers::Register;
 
-/// Counts in a microsecond.
+/// Timer counts in a microsecond.
 pub(super) const COUNTS_PER_US: u64 = 25;
-/// Instructions of `-icount shift=0` in a count.
+/// Instructions in a timer count, with `-icount shift=0`.
 const INSTRUCTIONS_PER_COUNT: u64 = 40;
 const TIMER0: usize = 0x4000_0000;
 const TIMER1: usize = 0x4000_1000;
@@ -27,10 +28,10 @@ const ENABLE: u32 = 1;
 const INTERRUPT: u32 = 8;
 
 struct Clock {
-    /// Number of times that timer 0 has gone round.
+    /// Number of times that timer 0 has wrapped round.
     rounds: Mutex<Cell<u32>>,
     queue: Mutex<RefCell<Queue>>,
-    /// Counts that passed in lock step while the processor slept.
+    /// Counts that lock step has skipped while the processor slept; timer 0 did not count them.
     skipped: Mutex<Cell<u64>>,
 }
 
@@ -44,19 +45,19 @@ embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock {
 pub fn start() {
     Register::new(TIMER0, RELOAD).write(u32::MAX);
     Register::new(TIMER0, CTRL).write(ENABLE | INTERRUPT);
-    // Without a reload value it runs down once.
+    // Timer 1 runs down from its value once: it has no reload value.
     Register::new(TIMER1, VALUE).write(u32::MAX);
     Register::new(TIMER1, CTRL).write(ENABLE | INTERRUPT);
     interrupts::enable(Irq::Timer0, interrupts::DEVICES);
     interrupts::enable(Irq::Timer1, interrupts::DEVICES);
 }
 
-/// Timer 0 has gone round.
+/// Interrupt handler of timer 0, which has wrapped round: counts the round.
 pub fn on_timer0() {
     critical_section::with(CLOCK_NOW);
 }
 
-/// An alarm is due.
+/// Interrupt handler of timer 1: wakes the tasks that are due and sets the timer for the next one.
 pub fn on_timer1() {
     critical_section::with(|cs| {
         Register::new(TIMER1, INTSTATUS).write(1);
@@ -64,7 +65,8 @@ pub fn on_timer1() {
     });
 }
 
-/// Counts since the start. Notes a round that has not been noted yet.
+/// Reads the clock: counts since the start. Also counts a wrap of timer 0 whose interrupt has not
+/// run yet.
 pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
     let rounds = CLOCK.rounds.borrow(cs);
     let before = Register::new(TIMER0, VALUE).read();
@@ -73,13 +75,14 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
     if ended {
         Register::new(TIMER0, INTSTATUS).write(1);
         rounds.set(rounds.get() + 1);
-        // Read again: the first may be from before the round's end.
+        // Read again: the first value may be from before the wrap.
         value = Register::new(TIMER0, VALUE).read();
     }
     (u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value)) + CLOCK.skipped.borrow(cs).get()
 };
 
-/// When a task is due, counts. Wakes those that are due by now.
+/// Time at which the next sleeping task is due, counts since the start; `u64::MAX` or more in
+/// microseconds if none sleeps. Wakes the tasks that are due at `now`.
 pub(super) fn next_alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
     CLOCK
         .queue
@@ -89,13 +92,13 @@ pub(super) fn next_alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
         .saturating_mul(COUNTS_PER_US)
 }
 
-/// Makes `counts` pass at once, in lock step.
+/// Advances the clock by `counts` without running, in lock step.
 pub(super) fn skip_time(cs: CriticalSection<'_>, counts: u64) {
     let skipped = CLOCK.skipped.borrow(cs);
     skipped.set(skipped.get() + counts);
 }
 
-/// Instructions since the start, under `-icount shift=0`, to the next forty.
+/// Instructions executed since the start, with `-icount shift=0`, in steps of 40.
 pub fn instructions() -> u64 {
     critical_section::with(CLOCK_NOW) * INSTRUCTIONS_PER_COUNT
 }
@@ -112,7 +115,8 @@ impl Clock {
             }
             let due = next_us.saturating_mul(COUNTS_PER_US);
             if due > now {
-                // Far alarms are checked again when the timer has run down.
+                // If the next task is due later than the timer can count, its interrupt calls this
+                // function again.
                 let wait = (due - now).min(u64::from(u32::MAX)) as u32;
                 Register::new(TIMER1, VALUE).write(wait);
                 return;

@@ -1,5 +1,5 @@
-//! Bank 2 of the STM32H743's flash, emulated in memory that a warm reset leaves alone: 8 sectors of
-//! 128 kB, words of 32 bytes that are programmed once between two erasures, and torn ones that
+//! Emulates bank 2 of the STM32H743's flash in memory that a warm reset leaves unchanged: 8 sectors
+//! of 128 kB; words of 32 bytes that can be programmed once after an erasure; torn words that
 //! cannot be read.
 #![expect(unsafe_code, reason = "the emulated flash is memory that the linker knows nothing of")]
 
@@ -9,35 +9,36 @@ use embassy_time::{Duration, Timer};
 use super::memory::Bank2;
 use crate::lent::{FlashLender, LentFlash};
 
-/// Address of the bank.
+/// Address of the memory that holds the bank's bytes.
 const BANK_ADDRESS: usize = 0x6000_0000;
-/// Address of the marks, a byte for each word: the state of that word. Real flash keeps a checksum
-/// there.
+/// Address of the word marks, one byte for each word: `ERASED`, `WHOLE` or `TORN`. Real flash finds
+/// a torn word by its error-correcting code.
 const WORD_MARKS: usize = 0x6020_0000;
-/// Address of the mark that bank and marks were made; memory is zero when the power comes.
+/// Address of the word that holds `MAGIC` once bank and marks are initialized; QEMU's memory is
+/// zero at power-on.
 const BANK_MADE: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
 const LEN: usize = LAYOUT.len() as usize;
 const ERASED: u8 = 0;
 const WHOLE: u8 = 1;
 const TORN: u8 = 2;
-/// Time to erase a sector of 128 kB, by the data sheet between 1.1 and 4 s at 8 and 64 bit
-/// parallelism.
+/// Time to erase a sector of 128 kB; the data sheet gives 1.1 s (64-bit parallelism) to 4 s
+/// (8-bit).
 const ERASE_TIME: Duration = Duration::from_millis(1100);
-/// Time to program a word, by the data sheet.
+/// Time to program a word of 32 bytes, by the data sheet.
 const PROGRAM_TIME: Duration = Duration::from_micros(100);
 
-/// The emulated bank is the real one's size.
+/// Layout of the file store: as on the STM32H743.
 pub const LAYOUT: FlashLayout = FlashLayout::H743;
 
-/// The bank; there is one.
+/// Driver of the emulated bank; there is one instance.
 pub struct Flash(FlashLender);
 
 impl Flash {
-    /// To be called once, at the start: the bank is empty if the power was off.
+    /// Creates the driver, once, at the start. After power-on it makes the bank erased.
     pub(super) fn new() -> Self {
         assert!(Bank2::Programmed.claim(), "bank 2 is read as it lies, for measurements");
-        // SAFETY: memory of this board; nobody else uses it yet.
+        // SAFETY: memory of this board that no other code uses yet.
         unsafe {
             if (BANK_MADE as *const u32).read_volatile() != MAGIC {
                 (BANK_ADDRESS as *mut u8).write_bytes(0xFF, LEN);
@@ -48,22 +49,23 @@ impl Flash {
         Self(FlashLender::new())
     }
 
-    /// A roadmap as it lies in the bank, not to be changed until it is given back; `None` where it
-    /// cannot be read, or another one is lent.
+    /// Lends `len` bytes at offset `at` of the bank, in place; they are not erased or programmed
+    /// until given back. `None` where they reach beyond the bank, a word of them is torn, or other
+    /// bytes are lent.
     pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
         let place = readable_address(at, len)?;
-        // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
+        // SAFETY: inside the bank, and this driver does not erase or program bytes that are lent.
         self.0.lend(at, unsafe { core::slice::from_raw_parts(place, len) })
     }
 
-    /// The lent range is not used any more.
+    /// Ends the loan: the bytes may be erased and programmed again.
     pub fn take_back(&mut self, lent: LentFlash) {
         self.0.take_back(lent);
     }
 }
 
-/// Address of these bytes; `None` where they would reach beyond the bank, or a word of them is
-/// torn.
+/// Address of `len` bytes at offset `at` of the bank; `None` where they reach beyond it, or a word
+/// of them is torn.
 fn readable_address(at: u32, len: usize) -> Option<*const u8> {
     let at = at as usize;
     let end = at.checked_add(len).filter(|end| *end <= LEN)?;
@@ -78,12 +80,12 @@ impl crate::flash::Flash for Flash {
         if !at.is_multiple_of(len) || at + len > LEN || !allowed {
             return Err(FlashFault);
         }
-        // A cut while it lasts leaves words that are neither.
+        // A reset during the erasure leaves all words of the sector torn.
         for word in at / WORD..(at + len) / WORD {
             set_mark(word, TORN);
         }
         Timer::after(ERASE_TIME).await;
-        // SAFETY: inside the bank, and nothing of this sector is lent.
+        // SAFETY: inside the bank, and no byte of this sector is lent.
         unsafe { ((BANK_ADDRESS + at) as *mut u8).write_bytes(0xFF, len) };
         for word in at / WORD..(at + len) / WORD {
             set_mark(word, ERASED);
@@ -121,18 +123,18 @@ impl crate::flash::Flash for Flash {
 impl ReadFlash for Flash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
         let from = readable_address(at, out.len()).ok_or(FlashFault)?;
-        // SAFETY: inside the bank, and `out` is not.
+        // SAFETY: inside the bank, and `out` lies outside it.
         unsafe { out.as_mut_ptr().copy_from_nonoverlapping(from, out.len()) };
         Ok(())
     }
 }
 
 fn word_mark(word: usize) -> u8 {
-    // SAFETY: the callers keep `word` below the number of words, and each has a mark.
+    // SAFETY: callers pass the number of a word of the bank, and each word has a mark.
     unsafe { ((WORD_MARKS + word) as *const u8).read_volatile() }
 }
 
 fn set_mark(word: usize, mark: u8) {
-    // SAFETY: as above.
+    // SAFETY: as in `word_mark`.
     unsafe { ((WORD_MARKS + word) as *mut u8).write_volatile(mark) }
 }

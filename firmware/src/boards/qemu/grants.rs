@@ -1,14 +1,15 @@
-//! Lock step: this board's time passes only as the desk grants it ([`lock_step`]).
+//! Lock step: this board's time advances only as far as the host's simulation grants it
+//! ([`lock_step`]).
 //!
-//! A message of the desk says until when the board may run, and which bytes its ports receive when.
-//! The dual timer, above every other interrupt, comes when the next of it is due. Where the grant
-//! ends the board gives what it sent to the desk and reads the next message by semihosting. QEMU
-//! runs no instruction meanwhile, and with `-icount` its timers count instructions: so waiting
-//! takes no time of the board, its timers and its watchdog need not be stopped, and computing takes
-//! what it takes.
+//! A message from the host holds the time until which the board may run (the grant), and bytes for
+//! the board's UARTs with the times at which they arrive. The dual timer's interrupt, above all
+//! others, comes at each of these times. At the end of the grant the board writes the bytes that it
+//! sent to the host and reads the next message by semihosting. QEMU executes no instruction during
+//! that read, and with `-icount` its timers count instructions: so waiting takes no board time,
+//! timers and watchdog need not be stopped, and computing takes its own time.
 //!
-//! Bytes enter where the UART's driver keeps what it received, and leave where it would take what
-//! is to be sent: the desk's serial line knows baud rates.
+//! Bytes enter the UART driver's receive buffer directly, and leave instead of its send buffer: the
+//! host's serial line simulates the baud rate.
 #![expect(
     unsafe_code,
     reason = "memory that the linker knows nothing of, and the desk's debug probe"
@@ -28,7 +29,8 @@ use super::clock::{CLOCK_NOW, COUNTS_PER_US};
 use super::interrupts::{self, Irq};
 use super::registers::Register;
 
-/// Addresses of a received message and of sent bytes: beyond all that the program uses.
+/// Addresses of the buffers for a received message and for records to send; the program uses no
+/// memory there.
 const MESSAGE_ADDRESS: usize = 0x6060_0000;
 const SENT_ADDRESS: usize = 0x6068_0000;
 
@@ -36,33 +38,34 @@ const TIMER: usize = 0x4000_2000;
 const LOAD: usize = 0;
 const CONTROL: usize = 8;
 const INTCLR: usize = 12;
-/// Timer control: enabled, periodic, interrupt, 32 bits, one shot.
+/// Timer control: enabled, periodic mode, interrupt, 32 bits, one shot.
 const ONE_SHOT: u32 = 0b1110_0011;
 
-/// Connection of the board to the desk.
+/// Connection to the host's simulation, by semihosting files.
 struct SimulationLink {
     input: File,
     output: File,
-    /// Bytes of the message, and how many of them were done.
+    /// Length of the current message, and how many of its bytes are executed.
     length: usize,
     done: usize,
-    /// Bytes that wait for the grant's end.
+    /// Bytes of queued records, which are written at the grant's end.
     sent: usize,
-    /// When the next of it is due, counts.
+    /// Time of the message's next record, counts since the start.
     due: u64,
-    /// Takes the bytes that come to a port.
+    /// Gives bytes that arrive to the UART with this number.
     take: fn(u8, &[u8]),
 }
 
 static DESK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
 
-/// Waits for the first message, if the board was switched on in lock step. Bytes that come to a
-/// port are given to `take`.
+/// Enters lock step if QEMU was started with its command line: announces the board to the host and
+/// waits for the first message. `take` is called with a UART's number and the bytes that arrive
+/// there.
 pub fn start(take: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];
     if sys_get_cmdline_uninit(&mut line).is_ok_and(|line| line == COMMAND_LINE.as_bytes()) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
-        // The log goes to the standard output.
+        // The log already uses the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
         let mut desk = SimulationLink { input, output, length: 0, done: 0, sent: 0, due: 0, take };
         desk.queue_record(FromBoard::Started, &[]);
@@ -74,17 +77,18 @@ pub fn start(take: fn(u8, &[u8])) {
     }
 }
 
-/// Whether the board is in lock step.
+/// Whether the board runs in lock step.
 pub fn is_lock_step() -> bool {
     critical_section::with(|cs| DESK.borrow_ref(cs).is_some())
 }
 
-/// When something is due, counts of the clock.
+/// Time at which the message's next record is due, counts since the start; `u64::MAX` outside lock
+/// step.
 pub fn next_due(cs: CriticalSection<'_>) -> u64 {
     DESK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
 }
 
-/// An alarm is due.
+/// Interrupt handler of the dual timer: executes the records that are due.
 pub fn on_alarm() {
     Register::new(TIMER, INTCLR).write(1);
     critical_section::with(|cs| {
@@ -94,7 +98,7 @@ pub fn on_alarm() {
     });
 }
 
-/// A port sends bytes by the desk; false where the board is in no lock step.
+/// Queues bytes that UART `port` sends, for the host. Returns false outside lock step.
 pub fn send(port: u8, bytes: &[u8]) -> bool {
     critical_section::with(|cs| {
         let mut desk = DESK.borrow_ref_mut(cs);
@@ -106,7 +110,8 @@ pub fn send(port: u8, bytes: &[u8]) -> bool {
 }
 
 impl SimulationLink {
-    /// Runs all work that is due, and sets the timer for the next.
+    /// Executes all records that are due, reads further messages as needed, and sets the timer for
+    /// the next record.
     fn run_due_work(&mut self, cs: CriticalSection<'_>) {
         loop {
             let Some(record) = self.next_record() else {
@@ -121,7 +126,8 @@ impl SimulationLink {
             let (due, now) = (due_us * COUNTS_PER_US, CLOCK_NOW(cs));
             if due > now {
                 self.due = due;
-                // An alarm that is farther away is set again later.
+                // If the record is due later than the timer can count, its interrupt comes early
+                // and this function runs again.
                 Register::new(TIMER, LOAD).write((due - now).min(u64::from(u32::MAX)) as u32);
                 return;
             }
@@ -129,19 +135,19 @@ impl SimulationLink {
         }
     }
 
-    /// The next record of the message.
+    /// The next record of the message; `None` after the last.
     fn next_record(&self) -> Option<ToBoard> {
         let head = self.message_bytes()[self.done..].first_chunk::<HEAD>()?;
         Some(ToBoard::from_bytes(head).expect("the desk sends records"))
     }
 
     fn message_bytes(&self) -> &'static [u8] {
-        // SAFETY: memory of this board that nothing else uses; it changes in `read_message` alone,
-        // which has no slice of it.
+        // SAFETY: memory of this board that no other code uses; only `read_message` changes it, and
+        // no slice of it is alive there.
         unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.length) }
     }
 
-    /// Executes a record.
+    /// Executes a record and moves to the next.
     fn execute_record(&mut self, record: ToBoard) {
         let from = self.done + HEAD;
         self.done = from + record.payload_len();
@@ -150,17 +156,18 @@ impl SimulationLink {
             ToBoard::Bytes { port, .. } => (self.take)(port, bytes),
             ToBoard::Run { .. } => {}
             ToBoard::Peek { address, len } => {
-                // SAFETY: the desk asks for memory that there is.
+                // SAFETY: the host asks for existing memory.
                 let memory =
                     unsafe { slice::from_raw_parts(address as usize as *const u8, len.into()) };
                 self.queue_record(FromBoard::Memory { len }, memory);
             }
             ToBoard::Poke { address, .. } => {
-                // SAFETY: as a debug probe, the desk knows what it does.
+                // SAFETY: the host acts as a debug probe and chooses where it writes.
                 unsafe { (address as usize as *mut u8).copy_from(bytes.as_ptr(), bytes.len()) };
             }
             ToBoard::Call { address, argument } => {
-                // SAFETY: as above; it may never come back.
+                // SAFETY: the host passes a function's address, as a debug probe may; the function
+                // may never return.
                 let call = unsafe {
                     core::mem::transmute::<usize, extern "C" fn(u32)>(address as usize | 1)
                 };
@@ -169,42 +176,43 @@ impl SimulationLink {
         }
     }
 
-    /// Ends a message: the next one takes its place.
+    /// Reports to the host that the message is executed, and waits for the next message.
     fn finish_message(&mut self, cs: CriticalSection<'_>) {
         self.queue_record(FromBoard::Waits { now_us: CLOCK_NOW(cs) / COUNTS_PER_US }, &[]);
         self.flush();
         self.read_message();
     }
 
-    /// Keeps a record for the grant's end, or sends it now if there is no more room.
+    /// Queues a record with its bytes until the grant's end; if the buffer is full, writes the
+    /// queued records first.
     fn queue_record(&mut self, record: FromBoard, bytes: &[u8]) {
         if self.sent + HEAD + bytes.len() > LONGEST {
             self.flush();
         }
         for part in [&record.to_bytes(), bytes] {
-            // SAFETY: memory of this board that nothing else uses, and long enough.
+            // SAFETY: memory of this board that no other code uses, and long enough.
             unsafe { ((SENT_ADDRESS + self.sent) as *mut u8).copy_from(part.as_ptr(), part.len()) };
             self.sent += part.len();
         }
     }
 
     fn flush(&mut self) {
-        // SAFETY: as above; `queue_record` wrote it.
+        // SAFETY: as in `queue_record`, which wrote it.
         let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.sent) };
         self.output.write_all(sent).expect("the desk listens");
         self.sent = 0;
     }
 
-    /// Waits for the next message.
+    /// Waits for the next message of the host and reads it.
     fn read_message(&mut self) {
         let mut length = [0; 4];
-        // The desk is gone: there is nobody to run for.
+        // The host has closed the connection: the board stops.
         if self.input.read_exact(&mut length).is_err() {
             semihosting::process::exit(0);
         }
         (self.length, self.done) = (u32::from_le_bytes(length) as usize, 0);
         assert!(self.length <= LONGEST, "the desk sends no longer messages");
-        // SAFETY: memory of this board that nothing else uses, and long enough.
+        // SAFETY: memory of this board that no other code uses, and long enough.
         let message = unsafe { slice::from_raw_parts_mut(MESSAGE_ADDRESS as *mut u8, self.length) };
         self.input.read_exact(message).expect("a whole message");
     }

@@ -1,64 +1,63 @@
-//! The interrupts that are used, and their priorities.
+//! Numbers of the interrupts in use, and their priorities (a smaller number is more urgent).
 #![expect(unsafe_code, reason = "the interrupt controller is shared")]
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
 
-/// Priority of the desk's grants, above all.
+/// Priority of the lock step's timer, the highest.
 pub const GRANTS: u8 = 0x20;
-/// Priority of devices.
+/// Priority of UARTs and clock timers.
 pub const DEVICES: u8 = 0x40;
-/// Priority of links and setpoints, below devices.
+/// Priority of the executor of links and setpoints, below devices.
 pub const LINKS: u8 = 0x80;
-/// Priority of plans and flash, below all.
+/// Priority of the executor of plans and flash, the lowest.
 pub const PLANS: u8 = 0xC0;
 
-/// The interrupts that are used.
+/// Interrupt numbers of AN500 that this board uses.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Irq {
-    /// UART 0 has a byte.
+    /// UART 0 has received a byte.
     Uart0Rx = 0,
-    /// UART 0 has room.
+    /// UART 0 can take a byte to send.
     Uart0Tx = 1,
-    /// UART 1 has a byte.
+    /// UART 1 has received a byte.
     Uart1Rx = 2,
-    /// UART 1 has room.
+    /// UART 1 can take a byte to send.
     Uart1Tx = 3,
-    /// Timer 0 has gone round.
+    /// Timer 0, the clock, has wrapped round.
     Timer0 = 8,
-    /// An alarm is due.
+    /// Timer 1: a sleeping task is due.
     Timer1 = 9,
-    /// Alarms in lock step.
+    /// Dual timer: a record of lock step is due.
     DualTimer = 10,
-    /// No device has it: it runs the executor of plans and flash.
+    /// Used by no device; runs the executor of plans and flash.
     Plans = 30,
-    /// No device has it: it runs the executor of links and setpoints.
+    /// Used by no device; runs the executor of links and setpoints.
     Links = 31,
 }
 
-// SAFETY: the numbers are places in the vector table, and AN500 has 32.
+// SAFETY: each number is an index of the vector table, which has 32 entries on AN500.
 unsafe impl InterruptNumber for Irq {
     fn number(self) -> u16 {
         self as u16
     }
 }
 
-/// Sets the priority of one that is not enabled yet.
+/// Sets the priority of an interrupt that is not enabled yet.
 pub fn set_priority(irq: Irq, priority: u8) {
-    // SAFETY: only priorities are set, before the interrupt is enabled, at the start when nothing
-    // else runs.
+    // SAFETY: changes only this interrupt's priority, at the start, when nothing else runs.
     unsafe { cortex_m::Peripherals::steal().NVIC.set_priority(irq, priority) }
 }
 
-/// Lets a device interrupt.
+/// Sets an interrupt's priority and enables it.
 pub fn enable(irq: Irq, priority: u8) {
     set_priority(irq, priority);
-    // SAFETY: the handler takes its state by critical sections or atomics alone.
+    // SAFETY: the handlers access shared state only by critical sections or atomics.
     unsafe { NVIC::unmask(irq) }
 }
 
-/// Has the handler run as if the device had asked.
+/// Makes the interrupt pending, so that its handler runs although no device raised it.
 pub fn pend(irq: Irq) {
     NVIC::pend(irq);
 }

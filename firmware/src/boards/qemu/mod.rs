@@ -1,4 +1,5 @@
-//! QEMU's `mps2-an500`: a Cortex-M7 with FPU, linked against the memory of the STM32H743.
+//! Board support for QEMU's `mps2-an500`: a Cortex-M7 with FPU, linked against the STM32H743's
+//! memory sizes.
 
 use defmt_semihosting as _;
 
@@ -24,20 +25,21 @@ use heapless::Vec;
 use super::{mpu, parts};
 use crate::chips::ResetCause;
 
-/// This board does not report a cause.
+/// Why the board was reset: QEMU does not report it.
 pub fn reset_cause() -> ResetCause {
     ResetCause::Unknown
 }
 
-/// Restarts.
+/// Restarts the board.
 pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// The parts of this board, ready.
+/// What [`start`] returns on this board.
 pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
-/// Starts the board. To be called once.
+/// Starts MPU, clock, watchdog, executors, UARTs and flash, then lock step if QEMU was started for
+/// it. To be called once.
 pub fn start() -> Parts {
     mpu::enable_regions(&[Some(mpu::stack_guard_region())]);
     clock::start();

@@ -1,4 +1,4 @@
-//! Device registers.
+//! Memory-mapped device registers.
 #![expect(unsafe_code, reason = "registers are memory")]
 
 /// A 32-bit register of this board.
@@ -13,12 +13,12 @@ impl Register {
     }
 
     pub fn read(self) -> u32 {
-        // SAFETY: `new` is only given addresses of registers, aligned and always there.
+        // SAFETY: `new` is only given addresses of registers, which are aligned and always present.
         unsafe { (self.0 as *const u32).read_volatile() }
     }
 
     pub fn write(self, value: u32) {
-        // SAFETY: as above; no register of ours lets a device write to memory.
+        // SAFETY: as above; no register used here makes a device write to memory.
         unsafe { (self.0 as *mut u32).write_volatile(value) }
     }
 }

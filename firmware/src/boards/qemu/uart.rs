@@ -1,4 +1,4 @@
-//! CMSDK UARTs, one byte at a time by interrupt.
+//! Driver of the CMSDK UARTs, one byte per interrupt.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -17,33 +17,32 @@ const BAUDDIV: usize = 16;
 const TX_FULL: u32 = 1;
 const RX_FULL: u32 = 2;
 const RX_OVERRUN: u32 = 8;
-/// Both directions, both with interrupts.
+/// Value of CTRL: transmitter and receiver enabled, with interrupts.
 const BOTH_ENABLED: u32 = 0b1111;
-/// The emulated line has no baud rate; the device wants one of at least 16.
+/// Value of BAUDDIV: the device wants at least 16; QEMU simulates no baud rate.
 const DIVISOR: u32 = 27;
-/// Bytes of the receive buffer: a quarter of a second at 18 kB/s, which is as fast as this device
-/// takes bytes.
+/// Bytes of the receive buffer: a quarter of a second at 18 kB/s, the fastest that QEMU delivers.
 const RECEIVE_BUFFER: usize = 4096;
 const SEND_BUFFER: usize = 1024;
 
-/// Counters of a UART.
+/// Counters of a UART's losses.
 #[derive(Debug, Default)]
 pub struct Counters {
-    /// Bytes lost in the device: it had no room.
+    /// Times that a byte was lost in the device because the last one had not been read.
     pub overruns: AtomicU32,
-    /// Bytes lost behind it: nobody took them.
+    /// Bytes lost because the receive buffer was full.
     pub dropped: AtomicU32,
 }
 
-/// One UART.
+/// One UART and its buffers.
 pub struct Uart {
     base: usize,
-    /// Number of the port, as the desk counts.
+    /// Number of the UART in lock step's records.
     port: u8,
     transmits: Irq,
     received: Pipe<CriticalSectionRawMutex, RECEIVE_BUFFER>,
     sent: Pipe<CriticalSectionRawMutex, SEND_BUFFER>,
-    /// Errors so far.
+    /// Losses since the start.
     pub counters: Counters,
 }
 
@@ -52,7 +51,7 @@ pub static AUTOPILOT: Uart = Uart::new(0x4000_4000, 0, Irq::Uart0Tx);
 /// UART 1, to the swarm's radio.
 pub static SWARM: Uart = Uart::new(0x4000_5000, 1, Irq::Uart1Tx);
 
-/// The UART that the desk counts as this.
+/// The UART with this number in lock step's records.
 pub(super) fn of_port(port: u8) -> &'static Uart {
     if port == AUTOPILOT.port { &AUTOPILOT } else { &SWARM }
 }
@@ -67,7 +66,7 @@ impl Uart {
         Register::new(self.base, offset)
     }
 
-    /// Lets bytes flow.
+    /// Enables the UART and its interrupts, and returns both ends.
     pub fn start(&'static self, receives: Irq) -> (Receiver, Transmitter) {
         self.register(BAUDDIV).write(DIVISOR);
         self.register(CTRL).write(BOTH_ENABLED);
@@ -76,7 +75,8 @@ impl Uart {
         (Receiver { uart: self, reported: 0 }, Transmitter(self))
     }
 
-    /// Takes bytes that a line in lock step brings: all that there is room for.
+    /// Puts bytes that arrive in lock step into the receive buffer; bytes without room are dropped
+    /// and counted.
     pub(super) fn receive_in_lock_step(&self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let Ok(taken) = self.received.try_write(bytes) else {
@@ -87,9 +87,11 @@ impl Uart {
         }
     }
 
-    /// Takes the byte that has come and gives the next one to send.
+    /// Interrupt handler: moves a received byte into the receive buffer, and the next byte of the
+    /// send buffer into the device.
     pub fn on_interrupt(&self) {
-        // Cleared before the byte is taken: the next may come at once, and its interrupt must stay.
+        // Cleared before the byte is read: the next byte may arrive at once, and its interrupt must
+        // stay pending.
         self.register(INTCLEAR).write(0b1111);
         let state = self.register(STATE).read();
         if state & RX_OVERRUN != 0 {
@@ -109,7 +111,7 @@ impl Uart {
     }
 }
 
-/// Error: bytes were lost in the device or in the receive buffer.
+/// Error: bytes were lost in the device or because the receive buffer was full.
 #[derive(Clone, Copy, Debug)]
 pub struct BytesLost;
 
@@ -127,14 +129,14 @@ impl embedded_io_async::Error for BytesLost {
     }
 }
 
-/// The end that bytes come out of.
+/// Receiving end of a UART.
 pub struct Receiver {
     uart: &'static Uart,
-    /// Losses that were reported.
+    /// Number of losses that `read` has returned as errors.
     reported: u32,
 }
 
-/// The end that bytes go into.
+/// Sending end of a UART.
 pub struct Transmitter(&'static Uart);
 
 impl embedded_io_async::ErrorType for Receiver {

@@ -1,4 +1,4 @@
-//! The vector table: what each interrupt calls, the two executors among them.
+//! The interrupt vector table: the handler of each interrupt, those of the two executors included.
 #![expect(unsafe_code, reason = "the vector table is the linker's")]
 
 use embassy_executor::SendSpawner;
@@ -9,7 +9,7 @@ use crate::boards::executors;
 
 type Handler = Option<unsafe extern "C" fn()>;
 
-/// One place for each of AN500's interrupts; cortex-m-rt puts it after the exceptions.
+/// One entry for each of AN500's interrupts; cortex-m-rt places the table after the exceptions.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [Handler; 32] = {
@@ -47,12 +47,12 @@ unsafe extern "C" fn dual_timer() {
 }
 
 unsafe extern "C" fn links() {
-    // SAFETY: this is the handler.
+    // SAFETY: this is the interrupt's handler.
     unsafe { executors::poll_links_executor() }
 }
 
 unsafe extern "C" fn plans() {
-    // SAFETY: as above.
+    // SAFETY: this is the interrupt's handler.
     unsafe { executors::poll_plans_executor() }
 }
 

@@ -1,4 +1,4 @@
-//! CMSDK watchdog: resets the board unless it is fed.
+//! Driver of the CMSDK watchdog, which resets the board unless it is fed.
 #![expect(unsafe_code, reason = "the handler of the interrupt that nothing masks")]
 
 use core::cell::Cell;
@@ -17,21 +17,22 @@ const CTRL: usize = 8;
 const INTCLR: usize = 12;
 const LOCK: usize = 0xC00;
 const UNLOCK: u32 = 0x1ACC_E551;
-/// Counts of the timer, which counts down twice at 25 MHz before the reset.
+/// Reload value of the watchdog's timer, which runs down twice at 25 MHz before the reset: half the
+/// timeout.
 const RELOAD_COUNTS: u32 = WATCHDOG_TIMEOUT_US / 2 * 25;
-/// Interrupt at the first end, reset at the second.
+/// Value of CTRL: NMI when the timer has run down once, reset when twice.
 const ENABLED: u32 = 0b11;
 
-/// Half of the time is over, which this device says by the interrupt that nothing masks: the other
-/// half is left.
+/// NMI handler: half of the timeout is over. Does nothing; the reset comes after the other half.
 #[exception]
 unsafe fn NonMaskableInt() {}
 
-/// Time at which the watchdog was last fed, counts of the clock.
+/// Time at which the watchdog was last fed, counts since the start.
 static LAST_FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
-/// Counts by which time may be skipped: the device counts none of them, so the rest is counted
-/// here.
+/// Time up to which lock step may skip the clock, counts since the start: `due`, or the watchdog's
+/// reset time if that is earlier. Resets the board if that is past. The device's timer does not
+/// count skipped time, so this function does.
 pub fn counts_until_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     let bites = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
     if now >= bites {
@@ -44,7 +45,7 @@ fn note_fed() {
     critical_section::with(|cs| LAST_FED.borrow(cs).set(CLOCK_NOW(cs)));
 }
 
-/// The watchdog.
+/// The watchdog; there is one instance.
 pub struct Watchdog(pub(super) ());
 
 impl Watchdog {

@@ -1,4 +1,4 @@
-//! What the flights are drawn from: settings and plans.
+//! Random settings and plans of the measured flights.
 
 use companion::{Config, RosterEntry};
 use heapless::Vec;
@@ -12,16 +12,16 @@ use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{random_below, random_between, random_point};
 
-/// Time after which a lost vehicle is on the ground, seconds.
+/// Time after its last message until a lost vehicle is assumed on the ground, seconds.
 const LOST_VEHICLE_DOWN_S: f32 = 60.0;
-/// Distance from one picture to the next, metres.
+/// Distance between pictures along a lane, metres.
 const PICTURE_SPACING_M: f32 = 1.0;
-/// Pictures on a lane.
+/// Pictures on one lane.
 const PICTURES_PER_LANE: u32 = 4;
 /// Pictures of the whole area.
 const TOTAL_PICTURES: u32 = 200;
 
-/// The settings of vehicle 1 of a swarm as large as this board's.
+/// Settings of vehicle 1 in the largest swarm that the board holds.
 pub fn config() -> Config<VEHICLES> {
     let start = Point::new(0.0, 0.0, 10.0);
     let mut config = Config::new(SYSTEM, start, ORIGIN);
@@ -33,8 +33,8 @@ pub fn config() -> Config<VEHICLES> {
     config
 }
 
-/// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight
-/// on or to and fro.
+/// A random path of 4, 8 or the most waypoints: legs of 0.2, 1 or 5 m, either nearly straight on or
+/// in random directions.
 pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     let leg_m = [0.2, 1.0, 5.0][random_below(rng, 3)];
     let onward = random_point(rng, leg_m);
@@ -52,7 +52,7 @@ pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     path
 }
 
-/// A random plan with as many gates as a board's may have.
+/// A random plan with the most gates.
 pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let path = random_path(rng);
     let length_m = path.length_m();
@@ -75,12 +75,12 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     }
 }
 
-/// Settings for an area that is divided again where a vehicle is lost.
+/// Settings of a coverage mission whose work is divided again when a vehicle is lost.
 pub fn area_config() -> Config<VEHICLES> {
     Config { division: Some(LOST_VEHICLE_DOWN_S), ..config() }
 }
 
-/// A random plan of a coverage mission: every second leg is a lane.
+/// A random plan of a coverage mission: every second leg is a lane with pictures.
 pub fn random_area_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let mut plan = random_plan(rng);
     let mut photographs =
