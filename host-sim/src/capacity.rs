@@ -1,4 +1,5 @@
-//! Capacities of the desk's swarm, and what each costs; what each board can hold.
+//! Capacities of companions and planner on the desk, with the memory each entry costs; capacities
+//! of each board.
 
 use companion::storage::mission_file::MissionView;
 use companion::storage::store::FlashLayout;
@@ -6,64 +7,64 @@ use companion::storage::store::area::DATA_OFFSET;
 use companion::{Companion, Config};
 use planner_core::roadmap::RoadmapView;
 
-/// Nodes of a roadmap, terminals among them: 30 bytes each in scratch.
+/// Most nodes of a roadmap, starts and goals among them: 30 bytes each in the search workspace.
 pub const ROADMAP_NODES: usize = 16_384;
-/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 250 × 250 ×
-/// 100 m at Dmax 8 m.
+/// Most cubes of the grid into which nodes are sorted while a roadmap is built: 2 bytes each.
+/// Enough for 250 × 250 × 100 m with edges of at most 8 m.
 pub const ROADMAP_CUBES: usize = 1 << 17;
-/// Vehicles of a swarm, and goals: 4 bytes for each pair, 1.6 kB for each path.
+/// Most vehicles, and most goals: 4 bytes for each pair of them, 1.6 kB for each path.
 pub const VEHICLES: usize = 256;
-/// Waypoints of a path: 24 bytes each.
+/// Most waypoints of a path: 24 bytes each.
 pub const WAYPOINTS: usize = 64;
-/// Gates of one vehicle: 12 bytes each.
+/// Most gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 2048;
-/// Timed segments of flights among which a vehicle steps aside: 44 bytes each.
+/// Most timed segments of all flights, among which the search for a side-step plans: 44 bytes each.
 pub const TIMED_SEGMENTS: usize = 32_768;
 
 /// A companion with the desk's capacities.
 pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 
-/// A companion on the heap: it is too large for a stack.
+/// A companion on the heap: it is too large for a thread's stack.
 ///
 /// # Errors
-/// The configuration names what is wrong.
+/// The companion refuses the configuration; the error names what is wrong.
 pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
     let companion = DeskCompanion::new(config)
         .map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
     Ok(Box::new(companion))
 }
 
-/// Capacities of a board's firmware.
+/// Capacities of the firmware of one board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardCapacity {
     /// Name of the board, as `cargo xtask build --board` takes it.
     pub name: &'static str,
-    /// Nodes of a roadmap.
+    /// Most nodes of a roadmap.
     pub nodes: usize,
-    /// Half-edges of a roadmap: two for each edge.
+    /// Most half-edges of a roadmap: two for each edge.
     pub half_edges: usize,
-    /// Vehicles of a mission, and goals.
+    /// Most vehicles of a mission, and most goals.
     pub vehicles: usize,
-    /// Gates of one vehicle.
+    /// Most gates of one vehicle.
     pub gates: usize,
-    /// Timed segments among which a vehicle steps aside.
+    /// Most timed segments of all flights in a schedule.
     pub pieces: usize,
-    /// Bytes of a roadmap file.
+    /// Most bytes of a roadmap file.
     pub roadmap_bytes: usize,
-    /// Vertices of an area.
+    /// Most vertices of an area, over all its rings.
     pub vertices: usize,
-    /// Lanes over it.
+    /// Most lanes over an area.
     pub lanes: usize,
 }
 
-/// Outward corners of an area's no-fly zones that a board holds.
+/// Most outward corners of an area's no-fly zones; the same on every board.
 pub const BOARD_CORNERS: usize = 32;
 
 const fn roadmap_bytes(layout: &FlashLayout) -> usize {
     (layout.slot_len - DATA_OFFSET) as usize
 }
 
-/// The default board.
+/// Capacities of the STM32H743 board, the default.
 pub const NUCLEO_H743: BoardCapacity = BoardCapacity {
     name: "nucleo-h743",
     nodes: 4096,
@@ -76,7 +77,7 @@ pub const NUCLEO_H743: BoardCapacity = BoardCapacity {
     lanes: 512,
 };
 
-/// The smaller board, with half the memory.
+/// Capacities of the Pico 2 (RP2350), which has half the memory of the STM32H743.
 pub const HALF: BoardCapacity = BoardCapacity {
     name: "pico2",
     nodes: 2048,
@@ -88,7 +89,7 @@ pub const HALF: BoardCapacity = BoardCapacity {
     ..NUCLEO_H743
 };
 
-/// All boards; the first holds the most.
+/// All boards; the first has the greatest capacities.
 pub const BOARDS: [BoardCapacity; 3] =
     [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, HALF];
 
@@ -96,7 +97,7 @@ impl BoardCapacity {
     /// The board of this name.
     ///
     /// # Errors
-    /// There is none; the error names those there are.
+    /// No board has this name; the error lists the names.
     pub fn by_name(name: &str) -> Result<&'static Self, String> {
         let names = || BOARDS.map(|board| board.name).join(", ");
         BOARDS
@@ -105,7 +106,7 @@ impl BoardCapacity {
             .ok_or_else(|| format!("boards are {}", names()))
     }
 
-    /// The first of the board's limits that a roadmap file exceeds.
+    /// Text about the first capacity of the board that a roadmap exceeds; `None` if it fits.
     pub fn roadmap_excess(&self, roadmap: &RoadmapView<'_>) -> Option<String> {
         self.first_excess(&[
             ("nodes", roadmap.node_count(), self.nodes),
@@ -114,12 +115,12 @@ impl BoardCapacity {
         ])
     }
 
-    /// The first of the board's limits that an area exceeds.
+    /// Text about the first capacity of the board that an area exceeds; `None` if it fits.
     pub fn area_excess(&self, vertices: usize, lanes: usize) -> Option<String> {
         self.first_excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
     }
 
-    /// The first of the board's limits that a mission file exceeds.
+    /// Text about the first capacity of the board that a mission file exceeds; `None` if it fits.
     pub fn mission_excess(&self, mission: &MissionView<'_>) -> Option<String> {
         self.first_excess(&[
             ("vehicles", mission.vehicles().len(), self.vehicles),
@@ -127,7 +128,7 @@ impl BoardCapacity {
         ])
     }
 
-    /// Whether a vehicle's plan has more gates than it holds.
+    /// Text saying that one vehicle's plan has more gates than the board holds; `None` if it fits.
     pub fn gates_excess(&self, gates: usize) -> Option<String> {
         self.first_excess(&[("gates of one vehicle", gates, self.gates)])
     }
@@ -138,8 +139,8 @@ impl BoardCapacity {
     }
 }
 
-/// A large value on the heap. Debug builds make it on a stack first, so a thread with room for that
-/// makes it.
+/// Makes a large value on the heap. Debug builds first place it on the stack, so it is made on a
+/// thread whose stack is large enough.
 pub fn on_heap<T: Send + 'static>(make: fn() -> T) -> Box<T> {
     std::thread::Builder::new()
         .stack_size(4 * size_of::<T>() + (1 << 20))

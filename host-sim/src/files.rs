@@ -1,8 +1,9 @@
-//! Files read with a limit, and files written whole or not at all.
+//! Reads files up to a size limit, and writes a command's result files all or none.
 //!
 //! Only regular files are read: a FIFO without a writer, a terminal or `/dev/zero` would never end.
-//! What a command writes is tried before its work, written beside its target, and takes its name in
-//! the end, when all of it is there.
+//! Before a command computes anything it checks that its results can be written. Each result is
+//! written to a temporary file beside its target; all are renamed to their targets at the end, once
+//! every one is complete.
 
 use std::fs;
 use std::io::{self, Read as _, Write as _};
@@ -13,29 +14,30 @@ use tempfile::{NamedTempFile, TempPath};
 
 use crate::quote::quoted_path;
 
-/// Longest text file read: a scenario or its goals.
+/// Longest text file that is read, bytes: a scenario, a list of goals or an area.
 pub const TEXT_BYTES: u64 = 1 << 20;
-/// Longest roadmap or mission file read; the largest of this build have some 20 MB.
+/// Longest roadmap, mission or plan file that is read, bytes (64 MiB); the largest that this
+/// program writes have some 20 MB.
 pub const BINARY_BYTES: u64 = 1 << 26;
 
-/// All bytes of a regular file of at most `most` bytes.
+/// Reads all bytes of a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// It cannot be read, is not a regular file, or is longer.
+/// The file cannot be read, is not a regular file, or is longer than `most`.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    // Asked before it is opened: opening a FIFO waits for its other end.
+    // Checked before opening: opening a FIFO blocks until its other end is opened.
     let length = regular_file_len(path)?;
     let too_long = || io::Error::other(format!("it is longer than {most} bytes"));
     if length > most {
         return Err(too_long());
     }
     let mut bytes = Vec::with_capacity(length as usize);
-    // Files of /proc and files that grow are longer than they say.
+    // Files of /proc and files that grow are longer than their metadata says.
     fs::File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most { Err(too_long()) } else { Ok(bytes) }
 }
 
-/// The text of a regular file of at most [`TEXT_BYTES`] bytes.
+/// Reads the text of a regular file of at most [`TEXT_BYTES`] bytes.
 ///
 /// # Errors
 /// As [`read`], or it is not UTF-8.
@@ -43,30 +45,32 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path, TEXT_BYTES)?).map_err(|_| io::Error::other("it is not UTF-8 text"))
 }
 
-/// Length of a regular file.
+/// Length of a regular file, bytes.
 ///
 /// # Errors
-/// There is none, or it is something else.
+/// The file does not exist, or is no regular file.
 pub fn regular_file_len(path: &Path) -> io::Result<u64> {
     let metadata = fs::metadata(path)?;
     let kind = if metadata.is_dir() { "it is a directory" } else { "it is not a regular file" };
     if metadata.is_file() { Ok(metadata.len()) } else { Err(io::Error::other(kind)) }
 }
 
-/// Files that a command writes into one directory: all of them, or none.
+/// Result files that a command writes into one directory: all of them, or none.
 pub struct ResultFiles {
     dir: PathBuf,
-    /// Directories made for them, the innermost first.
+    /// Directories that were created for the results, the innermost first; removed unless
+    /// committed.
     made: Vec<PathBuf>,
     files: Vec<(NamedTempFile, PathBuf)>,
 }
 
 impl ResultFiles {
-    /// Makes the directory and tries whether it takes files of these names. It is gone again if
-    /// nothing is kept in it.
+    /// Creates the directory where it is missing, and checks that files of these names can be
+    /// written in it. Dropped without [`Self::commit`], it removes the directories that it created.
     ///
     /// # Errors
-    /// It cannot be made or written to, or something else than a file has one of the names.
+    /// The directory cannot be created or written to, or one of the names is taken by something
+    /// that is no writable regular file.
     pub fn open(dir: &Path, names: &[&str]) -> anyhow::Result<Self> {
         let dir = if dir.as_os_str().is_empty() { Path::new(".") } else { dir };
         let missing = dir.ancestors().take_while(|d| !d.as_os_str().is_empty() && !d.exists());
@@ -81,12 +85,12 @@ impl ResultFiles {
         Ok(results)
     }
 
-    /// Results of one file.
+    /// Results that consist of one file at `path`.
     ///
     /// # Errors
-    /// As [`Self::open`], or the path names no file.
+    /// As [`Self::open`]; also where the path names no file.
     pub fn single_file(path: &Path) -> anyhow::Result<Self> {
-        // `a/` means a directory, though its last part is `a`.
+        // A path `a/` means a directory, although its `file_name` is `a`.
         let slash = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         let name = path.file_name().and_then(|name| name.to_str()).filter(|_| !slash);
         let name =
@@ -94,7 +98,8 @@ impl ResultFiles {
         Self::open(path.parent().unwrap_or(Path::new(".")), &[name])
     }
 
-    /// Place of a file of this name: the target of a link.
+    /// Path that a result of this name is written to: the target of a symbolic link, else the name
+    /// inside the directory. Fails if an existing file there cannot be written.
     fn target_path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
         let cannot = || format!("cannot write: {}", quoted_path(&path));
@@ -114,17 +119,18 @@ impl ResultFiles {
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
-            // Permissions as of any new file, less those that the user's mask forbids.
+            // Permissions of a newly created file, 0o666 less the process's umask; temporary files
+            // would be 0o600.
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
         let made = builder.tempfile_in(&self.dir);
         made.with_context(|| format!("cannot write to: {}", quoted_path(&self.dir)))
     }
 
-    /// Takes one more file.
+    /// Writes one more result to a temporary file; [`Self::commit`] renames it to `name`.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
         let target = self.target_path(name)?;
         let mut file = self.temporary_file()?;
@@ -134,18 +140,19 @@ impl ResultFiles {
         Ok(())
     }
 
-    /// Takes one file with the whole name it was opened with.
+    /// As [`Self::add`], by the path that was given to [`Self::single_file`].
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn add_file(&mut self, path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
         self.add(&path.file_name().unwrap_or_default().to_string_lossy(), bytes)
     }
 
-    /// Gives every file its name. Where one cannot have it, what was there before comes back.
+    /// Renames all temporary files to their targets. If one cannot be renamed, the files that were
+    /// there before are restored.
     ///
     /// # Errors
-    /// One of them cannot be renamed.
+    /// A file cannot be renamed.
     pub fn commit(mut self) -> anyhow::Result<()> {
         let files = std::mem::take(&mut self.files);
         let mut replaced = Vec::new();
@@ -165,8 +172,8 @@ impl ResultFiles {
         Ok(())
     }
 
-    /// Keeps an existing file under another name until all results are written; dropping the result
-    /// removes it.
+    /// Moves an existing target to a temporary name, from which it can be restored; `None` if there
+    /// is no target. Dropping the returned path deletes the old file.
     fn set_aside(&self, target: &Path) -> io::Result<Option<TempPath>> {
         if !target.try_exists()? {
             return Ok(None);
@@ -178,9 +185,9 @@ impl ResultFiles {
     }
 }
 
-/// Undoes the keeping of one file.
+/// Undoes one rename: restores the old file, or deletes the new one where there was no old file.
 fn put_back(target: &Path, before: Option<TempPath>) {
-    // A step that cannot be undone stays as it is: the error says that the results are not whole.
+    // A failure here is ignored: the caller reports that the results could not be written.
     let _ = match before {
         Some(before) => before.persist(target).map_err(|error| error.error),
         None => fs::remove_file(target),
@@ -191,7 +198,7 @@ impl Drop for ResultFiles {
     fn drop(&mut self) {
         self.files.clear();
         for dir in &self.made {
-            // A folder that another program filled stays.
+            // Fails, and leaves the directory, if another program has put files into it.
             let _ = fs::remove_dir(dir);
         }
     }

@@ -1,4 +1,5 @@
-//! A board's storage bank on the desk: bytes in memory, kept in a file if one is named.
+//! The flash bank of a board, simulated on the desk: bytes in memory, also written to a file if one
+//! is given.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -10,21 +11,21 @@ use companion::storage::store::{FlashFault, FlashLayout, FlashRequest, MAX_READ,
 use crate::files;
 use crate::quote::quoted_path;
 
-/// Flash layout of a companion on the desk: the default board's bank.
+/// Flash layout of a companion on the desk: that of the STM32H743 board.
 pub const LAYOUT: FlashLayout = FlashLayout::H743;
 
-/// The bank.
+/// A simulated flash bank.
 pub struct DeskFlash {
     bytes: Vec<u8>,
     file: Option<File>,
 }
 
 impl DeskFlash {
-    /// An erased bank, or what a file holds of an earlier one; what changes is written to the file
-    /// at once.
+    /// Opens the bank that `path` holds from an earlier run. A new or empty file, or no path, gives
+    /// an erased bank (all 0xFF). Every change is written to the file at once.
     ///
     /// # Errors
-    /// The file cannot be read or made, or is no such bank.
+    /// The file cannot be read or created, or its length is not that of the bank.
     pub fn open(path: Option<&Path>) -> anyhow::Result<Self> {
         let mut bytes = vec![0xFF; LAYOUT.len() as usize];
         let Some(path) = path else { return Ok(Self { bytes, file: None }) };
@@ -50,7 +51,8 @@ impl DeskFlash {
         Ok(Self { bytes, file: Some(file) })
     }
 
-    /// Does what a companion asks; the bytes read, none for an erasure or a program.
+    /// Executes a companion's flash request: a read returns its bytes; an erasure or programming
+    /// returns an empty slice.
     pub fn execute_request<'a>(
         &mut self,
         request: FlashRequest<'_>,
@@ -66,14 +68,14 @@ impl DeskFlash {
                 self.modify_range(at, LAYOUT.sector_len as usize, |part| part.fill(0xFF))?;
             }
             FlashRequest::Program { at, bytes } => self.modify_range(at, bytes.len(), |part| {
-                // Programmed as flash does it: bits only fall.
+                // As in NOR flash, programming can only clear bits.
                 part.iter_mut().zip(bytes).for_each(|(held, byte)| *held &= byte);
             })?,
         }
         Ok(&[])
     }
 
-    /// Content of the flash.
+    /// Returns the bytes of the whole bank.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }

@@ -1,4 +1,4 @@
-//! The desk side of Flockmate: maps, planning, simulated autopilots and swarm simulation.
+//! The desktop side of Flockmate: maps, planning, simulated autopilots and swarm simulation.
 #![forbid(unsafe_code)]
 
 pub mod area;

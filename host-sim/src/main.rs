@@ -18,31 +18,31 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Ten UAVs fly to their tasks in a nine-floor building: nothing to install first
+    /// Fly a built-in mission: ten UAVs go to their goals in a nine-floor building
     Demo(commands::fly::DemoArgs),
-    /// Look at maps and convert them
+    /// Show and convert maps
     Map(map::command::MapArgs),
-    /// Build roadmap files and look at them
+    /// Build and show roadmap files
     Roadmap(commands::roadmap::Args),
     /// Plan a scenario: roadmap, assignment, paths; no flight
     Plan(commands::plan::Args),
     /// Plan and fly a scenario with simulated autopilots
     Fly(commands::fly::FlyArgs),
-    /// Plan how a fleet photographs an area; no flight
+    /// Plan how a fleet photographs an area, and export the flights; no flight
     Cover(commands::cover::Args),
-    /// Print a paper's tables, ours beside theirs
+    /// Print the tables of a paper beside the results of this program
     Paper(commands::paper::Args),
     /// Simulate one autopilot for any MAVLink client
     Autopilot(commands::autopilot::AutopilotArgs),
     /// Run one vehicle's companion beside any autopilot, simulated, SITL or real
     Companion(commands::companion::Args),
-    /// Upload a roadmap or mission file to a companion
+    /// Upload a roadmap, field or mission file to a companion
     Upload(commands::upload::Args),
-    /// Join the swarm links of boards and processes, with a radio's loss and delay
+    /// Connect the swarm links of boards and processes like a radio, with loss and delay
     Radio(commands::radio::Args),
 }
 
-/// Exit code for bad input; 1 is a mission that failed.
+/// Exit code for bad input; a mission that was run and failed exits with 1.
 const BAD_INPUT: u8 = 2;
 
 fn main() -> ExitCode {
@@ -50,10 +50,10 @@ fn main() -> ExitCode {
         Ok(cli) => run(cli.command),
         Err(error) => print_argument_error(&error),
     };
-    // Results that nobody could read are none.
+    // A command whose output could not be printed (stdout closed or full) has failed.
     let done = done.and_then(|code| progress::check_printed().map(|()| code));
     done.unwrap_or_else(|error| {
-        // Where the error cannot be printed either, the exit code reports it.
+        // If stderr cannot be written either, the exit code alone reports the error.
         let _ =
             writeln!(std::io::stderr(), "error: {}", quote::quote_message(&format!("{error:#}")));
         ExitCode::from(BAD_INPUT)
@@ -76,8 +76,8 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// A command line that is no command: help that was asked for, or one line that says what is wrong,
-/// and a hint.
+/// Handles arguments that clap did not parse into a command: prints help or version if they were
+/// requested; otherwise returns an error of one line with hints.
 fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
     if asked {
@@ -99,7 +99,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let text = quote::about_arguments(&error.to_string(), arguments.into_iter().skip(1));
     let mut lines = text.lines().map(str::trim);
     let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
-    // How to pass `-x` as a value is never what was meant.
+    // clap's tip how to pass `-x` as a value is dropped: that is never what was meant.
     let tips = lines
         .filter_map(|line| line.strip_prefix("tip: "))
         .filter(|tip| !tip.starts_with("to pass"));
@@ -108,7 +108,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     bail!("{}{tips}\nhint: `{help}` says more", what.strip_prefix("error: ").unwrap_or(&what))
 }
 
-/// The command line that explains the command that was meant.
+/// The `--help` command line of the subcommand that the arguments name, as deep as they are known.
 fn help_of(arguments: &[String]) -> String {
     let mut command = &Cli::command();
     let mut line = command.get_name().to_owned();

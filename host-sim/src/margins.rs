@@ -1,19 +1,29 @@
-//! The margins that the desk plans with, added up in one place; the companion's are in
+//! The margins that the desk plans with, and their sums. The companion's own margins are in
 //! [`companion::margins`].
 //!
-//! | what | value | reason |
-//! |---|---|---|
-//! | margin to walls | tracking + estimate + gust | beyond the hull: what a path's edge is tested at |
-//! | separation of paths | safety distance + 2 (tracking + estimate) | both vehicles err towards each other |
-//! | separation from one that stands | safety distance + tracking + estimate + gust | it stands where the referee sees it, but its path ended where it believed to be |
-//! | tracking | [`companion::margins::TRACKING_M`] | beside the path by the own estimate |
-//! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`PAIR_STRAY_M`] are measured with it |
-//! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, rarely and not beside an error of tracking |
-//! | estimate, `recorded`, ArduPilot | 0.12 m | the greatest recorded error |
-//! | touchdown, PX4 | 0.5 m, and [`STRAY_PER_GUST_S`] × `gust_mps` | pads: up to 0.7 m beside them without wind, 1.1 m in gusts of 3 m/s, rarely two towards each other |
-//! | part of a picture that counts | what it shows less twice the margin, and what [`TRIGGER_DELAY_S`] at cruise is along the lanes | the camera is not where the waypoint is |
-//! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m | a lower camera shows less |
-//! | gust | [`STRAY_PER_GUST_S`] × `gust_mps` | what a vehicle gives way to gusts that blow it |
+//! | what | value |
+//! |---|---|
+//! | margin to walls, beyond the hull | tracking + estimate + gust |
+//! | separation of two paths | safety distance + 2 (tracking + estimate) |
+//! | separation from a parked vehicle | safety distance + [`STRAY_BESIDE_PARKED_M`] + estimate + gust |
+//! | tracking | [`companion::margins::TRACKING_M`] |
+//! | estimate, `rtk` | part of the tracking: at most 0.1 m |
+//! | estimate, `recorded`, PX4 | 0.65 m |
+//! | estimate, `recorded`, ArduPilot | 0.12 m: the greatest recorded error |
+//! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m: a camera that is too low shows less |
+//! | gust | [`STRAY_PER_GUST_S`] × `gust_mps`: how far gusts push a vehicle off its path |
+//! | touchdown, PX4 | 0.5 m + [`STRAY_PER_GUST_S`] × `gust_mps` |
+//! | usable part of a picture | footprint less twice the margin, and less the delay along the lanes |
+//!
+//! - Tracking is the deviation from the path by the vehicle's own estimate; estimate is the error
+//!   of that. Two vehicles in the air may deviate towards each other. A parked vehicle does not
+//!   move any more, but it stands where its estimate was wrong.
+//! - The default margin and [`PAIR_STRAY_M`] were measured with the estimator `rtk`.
+//! - A PX4 reports 0.2 m with `recorded`: 0.65 m is three times that and a reserve. Its errors were
+//!   up to 0.75 m across and 1.1 m in height, rarely, and not together with a tracking error.
+//! - PX4 touched down up to 0.7 m off its pad without wind, and up to 1.1 m in gusts of 3 m/s,
+//!   rarely two vehicles towards each other.
+//! - Pictures are taken off their waypoints, and [`TRIGGER_DELAY_S`] after passing them.
 
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
@@ -21,18 +31,21 @@ use sim_autopilot::{AutopilotKind, Estimator};
 
 use crate::scenario::{Simulation, Vehicle};
 
-/// Stray of two vehicles from their paths, together, beyond the safety distance, metres.
+/// Sum of the deviations of two vehicles from their paths, which the default separation adds to the
+/// safety distance, metres.
 pub const PAIR_STRAY_M: f32 = 0.5;
-/// Stray of two vehicles together over fields, where there is room, and receivers without RTK,
-/// metres.
+/// The same over fields, metres: wider, since there is room, and for receivers without RTK.
 pub const PAIR_STRAY_OVER_FIELDS_M: f32 = 2.4;
-/// Stray of one vehicle beside another that stands on the ground, metres.
+/// Deviation of a flying vehicle from its path that is added to the separation from a parked
+/// vehicle, metres.
 pub const STRAY_BESIDE_PARKED_M: f32 = 0.25;
-/// Further stray of one vehicle in gusts, for each m/s of their peak, seconds. Two vehicles are not
-/// carried towards each other at once, so this is for one beside another that stands, or a wall.
+/// Further deviation of one vehicle per m/s of peak gust, seconds. Gusts do not push two vehicles
+/// towards each other at the same time, so it is added only for one vehicle beside a parked one or
+/// a wall.
 pub const STRAY_PER_GUST_S: f32 = 0.05;
 
-/// Greatest distance of an estimate from the truth, beyond the part that tracking covers, metres.
+/// Greatest horizontal distance of a position estimate from the truth, beyond the part that the
+/// tracking margin covers, metres.
 pub fn max_estimate_error_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.0,
@@ -41,16 +54,17 @@ pub fn max_estimate_error_m(estimator: Estimator, autopilot: AutopilotKind) -> f
     }
 }
 
-/// Distances that a scenario has to keep, metres.
+/// Distances that a scenario has to leave for errors, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequiredDistances {
-    /// Distance to walls, beyond the hull.
+    /// Distance between the hull of a vehicle and walls, metres.
     pub margin_m: f32,
-    /// Between the paths of two vehicles, centre to centre.
+    /// Distance between the paths of two vehicles, centre to centre, metres.
     pub separation_m: f32,
 }
 
-/// Distances that a swarm has to keep: those of its worst vehicles.
+/// The distances required by the vehicles with the greatest errors: the worst one beside a wall,
+/// the worst two beside each other.
 pub fn required_distances(
     simulation: &Simulation,
     safety_distance_m: f32,
@@ -68,12 +82,12 @@ pub fn required_distances(
     }
 }
 
-/// Delay from passing a waypoint to its picture, seconds: a step of the companion, a command, and a
-/// check of the autopilot's.
+/// Delay from passing a waypoint to its picture, seconds: one step of the companion, transmission
+/// of the command, and one check of the autopilot.
 pub const TRIGGER_DELAY_S: f32 = 0.15;
 
-/// Least distance between pads, metres: a vehicle comes down beside one that came down, and both
-/// err.
+/// Least distance between two pads, metres: one vehicle lands beside another that has landed, and
+/// both touch down off their pads.
 pub fn min_pad_distance_m(
     simulation: &Simulation,
     safety_distance_m: f32,
@@ -87,9 +101,9 @@ pub fn min_pad_distance_m(
         + vehicles.iter().map(own).fold(0.0, f32::max)
 }
 
-/// Distance by which a vehicle touches down further beside its pad than it flies beside its path,
-/// metres. A PX4 that comes over its pad fast, or is blown, has its integrator against it, which
-/// carries it on once the companion no longer holds it.
+/// Distance by which touchdowns are further off the pad than flight is off the path, metres. A PX4
+/// that arrives over its pad fast, or in wind, has wound up the integrator of its controller, which
+/// carries it on once the companion stops holding it.
 fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     match autopilot {
         AutopilotKind::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
@@ -97,7 +111,7 @@ fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     }
 }
 
-/// Greatest depth of a vehicle below where it believes to be, metres.
+/// Greatest height of a vehicle's estimate above its true height, metres.
 pub fn max_height_error_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.15,
@@ -106,9 +120,9 @@ pub fn max_height_error_m(estimator: Estimator, autopilot: AutopilotKind) -> f32
     }
 }
 
-/// Part of a picture taken at `height_m` that the plan counts on: the picture is taken beside its
-/// waypoint, lower and late. No less than the spacings: where these leave no overlap there is none
-/// to plan with.
+/// The spacing with its footprint reduced to the part that the plan counts on, for pictures from
+/// `height_m` above ground: they are taken off their waypoints, lower and late. The footprint stays
+/// at least as large as the spacings, since a plan without overlap has nothing to lose.
 pub fn usable_footprint(
     spacing: &Spacing,
     height_m: f32,
@@ -132,7 +146,7 @@ pub fn usable_footprint(
     Spacing { footprint, ..*spacing }
 }
 
-/// Distance that a path keeps from a vehicle that stands on the ground, metres.
+/// Distance between a flight path and a vehicle parked on the ground, metres.
 pub fn parked_separation_m(
     simulation: &Simulation,
     safety_distance_m: f32,

@@ -1,5 +1,5 @@
-//! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request
-//! every companion plans.
+//! From a scenario to what is flown: the map on the planning grid, the roadmap, the mission file,
+//! and the plan that the desk and every companion compute from them.
 
 mod coverage;
 mod on_board;
@@ -35,14 +35,15 @@ use crate::scenario::Scenario;
 
 type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
-/// Height of each goal over where a vehicle of the largest radius stands below it, metres.
+/// For each goal: its height above the hull centre of a vehicle of the largest radius that stands
+/// on the ground below it, metres; the length of the landing.
 fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<Vec<f32>> {
     let largest_m = scenario.largest_radius_m();
     goals
         .iter()
         .enumerate()
         .map(|(i, goal)| {
-            // The slots around a single goal stand where that stands.
+            // Slots around a single goal are reported under that goal's line of the scenario.
             let places = &scenario.mission.goal_places;
             let place = places.get(i).or(places.first());
             places::height_over_ground(scenario, map, &format!("goal {i}"), place, goal, largest_m)
@@ -51,18 +52,18 @@ fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::R
 }
 
 impl Mission {
-    /// Reads the map and builds the roadmap.
+    /// Reads the map, builds the roadmap and encodes the mission file.
     ///
     /// # Errors
-    /// A map that cannot be read; a start or goal in an obstacle or over no floor.
+    /// The map cannot be read, or a start or goal lies in an obstacle or has no ground below it.
     pub fn prepare(scenario: Scenario, progress: &Progress) -> anyhow::Result<Self> {
         Self::prepare_for(scenario, None, progress)
     }
 
-    /// As [`Self::prepare`], so that the files fit a board.
+    /// As [`Self::prepare`]; with a board, the roadmap is thinned so that the files fit that board.
     ///
     /// # Errors
-    /// The same, and more vehicles, goals or nodes than the board holds.
+    /// As [`Self::prepare`]; also more vehicles, goals or nodes than the board holds.
     pub fn prepare_for(
         scenario: Scenario,
         board: Option<&'static BoardCapacity>,
@@ -118,7 +119,7 @@ impl Mission {
         Ok(mission)
     }
 
-    /// The mission file of a mission with goals.
+    /// Encodes the mission file of a mission with goals.
     fn goals_file(&self) -> anyhow::Result<Vec<u8>> {
         let goals: Vec<_> = self
             .goals
@@ -129,11 +130,11 @@ impl Mission {
         self.encode(&MissionBlock::Goals(&goals))
     }
 
-    /// Another separation than the scenario's, in the air and from vehicles that stand, metres.
-    /// Plans follow from the mission file, which is written again.
+    /// Replaces the scenario's separation between paths and its separation from parked vehicles,
+    /// metres. Plans are computed from the mission file, so it is encoded again.
     ///
     /// # Errors
-    /// What a mission file does not hold.
+    /// The mission file cannot hold one of the values.
     pub fn set_separation(
         &mut self,
         separation_m: f32,
@@ -145,7 +146,7 @@ impl Mission {
         Ok(())
     }
 
-    /// Plans the whole swarm as every companion does.
+    /// Plans the whole swarm with the planner that companions use, and records the times it took.
     pub fn plan(&mut self) -> anyhow::Result<Box<SwarmPlan>> {
         let begun = Instant::now();
         if self.scenario.area.is_some() {
@@ -173,7 +174,7 @@ impl Mission {
         Ok(plan)
     }
 
-    /// Gates that one vehicle may have.
+    /// Most gates of one vehicle: the board's capacity, or the desk's where no board is given.
     fn max_gates(&self) -> usize {
         self.board.map_or(GATES, |board| board.gates)
     }
@@ -216,8 +217,8 @@ impl Mission {
         }
     }
 
-    /// Two goals that are too near to each other for two vehicles to land there, and the distance
-    /// needed.
+    /// If two goals are too near for vehicles to stand landed at both: a text with their distance
+    /// and the distance needed. `None` if there is no such pair.
     fn describe_near_goals(&self) -> Option<String> {
         let scenario = &self.scenario;
         let needed_m = self.schedule.parked_separation_m;
@@ -234,10 +235,12 @@ impl Mission {
         ))
     }
 
-    /// Goals that no vehicle flies to, and vehicles that no goal is left for.
+    /// Goals that no vehicle flies to, and vehicles that the plan leaves on their pads; both empty
+    /// for a coverage mission.
     pub fn unserved(&self, plan: &SwarmPlan) -> Left {
         if self.scenario.area.is_some() {
-            // Whoever stays on the ground would finish no sooner.
+            // In a coverage plan a vehicle that stays on its pad is no shortage: it would not
+            // shorten the mission.
             return Left::default();
         }
         let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));
@@ -248,8 +251,9 @@ impl Mission {
         }
     }
 
-    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or
-    /// a detour.
+    /// Answers the plan request of the companion of vehicle `index`: its part of the swarm's plan;
+    /// its part of a new plan of an area, without waypoints that are already photographed and, for
+    /// a division, after losses of vehicles; or a detour.
     pub fn answer_plan_request(
         &self,
         plan: &SwarmPlan,
@@ -283,7 +287,8 @@ impl Mission {
         }
     }
 
-    /// A way around `obstacles`.
+    /// Plans a detour over the roadmap from where the vehicle is, clear of the keep-out zones
+    /// `obstacles`.
     fn plan_detour(
         &self,
         request: &DetourRequest,

@@ -1,4 +1,4 @@
-//! GeoJSON: polygons of geometries, features and collections of features.
+//! GeoJSON: the polygons of a geometry, a feature or a feature collection.
 
 use geojson::{GeoJson, Geometry, GeometryValue};
 

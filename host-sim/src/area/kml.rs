@@ -1,15 +1,16 @@
-//! KML: polygons of placemarks, in documents and folders. Longitude and latitude.
+//! KML: the polygons of placemarks, also in documents and folders. Longitude first, then latitude.
 
 use kml::Kml;
 use kml::types::{Geometry, LinearRing, Polygon};
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
-/// Most folders within each other: a file that nests deeper is refused before it is read.
+/// Most folders, documents and multi-geometries in a file, which bounds how deep they nest: a file
+/// with more is refused before it is parsed.
 const MAX_FOLDER_DEPTH: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
-    // The reader calls itself for each folder and geometry within another one.
+    // The parser recurses for each folder and geometry within another one.
     let nested = ["<Folder", "<Document", "<MultiGeometry"];
     if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > MAX_FOLDER_DEPTH {
         return Err(AreaFileError::malformed(

@@ -1,8 +1,7 @@
-//! Polygons from files: what is to be photographed, holes in it, and zones that no vehicle may
-//! enter.
+//! Reads polygons from files: areas to photograph, holes in them, and no-fly zones.
 //!
-//! GeoJSON, WKT, KML and QGroundControl `.plan`. Points and lines in a file are passed over.
-//! Coordinates are as the file has them, x (east or longitude) first.
+//! Formats: GeoJSON, WKT, KML and QGroundControl `.plan`. Points and lines in a file are ignored.
+//! Coordinates are those of the file, with x (east or longitude) first.
 
 mod geojson;
 mod kml;
@@ -18,21 +17,21 @@ use std::path::Path;
 pub use self::polygons::{AreaFileError, MAX_VERTICES, Polygons, RingXy};
 use crate::files;
 
-/// Format of a file.
+/// File format of polygons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AreaFormat {
-    /// RFC 7946, or the same in metres.
+    /// RFC 7946 (longitude, latitude), or the same structure with coordinates in metres.
     GeoJson,
-    /// Well-known text.
+    /// Well-known text (OGC).
     Wkt,
-    /// Keyhole markup.
+    /// Keyhole Markup Language.
     Kml,
-    /// QGroundControl's plan: the polygon of its survey, else its inclusion fence.
+    /// QGroundControl's plan: the polygons of its surveys; without a survey, its inclusion fences.
     Plan,
 }
 
 impl AreaFormat {
-    /// The format of a file of this name.
+    /// The format by the ending of the file's name; `None` for any other ending.
     pub fn from_path(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
@@ -45,21 +44,22 @@ impl AreaFormat {
     }
 }
 
-/// Reads a file.
+/// Reads the polygons of a file; the ending of its name says the format.
 ///
 /// # Errors
-/// It cannot be read, is not what its name says, or holds no polygon.
+/// The file cannot be read, is not in the format of its ending, holds no polygon or too many
+/// vertices.
 pub fn read(path: &Path) -> Result<Polygons, AreaFileError> {
     let format = AreaFormat::from_path(path).ok_or(AreaFileError::Format)?;
     parse(&files::read_text(path)?, format)
 }
 
-/// Reads a text.
+/// Parses the polygons of a text in the given format.
 ///
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, format: AreaFormat) -> Result<Polygons, AreaFileError> {
-    // Some programs begin every text with a byte order mark.
+    // Some programs write a byte order mark at the beginning of a text: it is removed.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut polygons = match format {
         AreaFormat::GeoJson => geojson::parse(text)?,
@@ -84,7 +84,7 @@ pub fn parse(text: &str, format: AreaFormat) -> Result<Polygons, AreaFileError> 
     if count > MAX_VERTICES { Err(AreaFileError::TooManyVertices(count)) } else { Ok(polygons) }
 }
 
-/// Drops vertices that repeat the one before, around the end too.
+/// Removes each vertex that equals the one before it, and a last vertex that equals the first.
 pub fn open_ring(ring: &mut RingXy) {
     ring.dedup();
     while ring.len() > 1 && ring.first() == ring.last() {

@@ -1,9 +1,10 @@
-//! Rings that share ground although their edges do not cross: one inside another, the same one
-//! twice, or two whose edges lie on each other. What is inside an odd number of rings is
-//! photographed, so that two holes over each other are none.
+//! Finds rings that overlap although their edges do not cross: one inside another, the same ring
+//! twice, or two whose edges lie on each other. A point inside an odd number of rings is
+//! photographed (even-odd rule), so two holes over each other would be photographed.
 //!
-//! Each edge is cut where the other ring meets it; the middle of every piece lies inside the other
-//! ring, outside or on its border. f64, metres; cost n · m for rings whose boxes meet.
+//! Each edge is split where the other ring meets it. The midpoint of each part lies inside the
+//! other ring, outside it or on its border. Computed in f64, metres. Cost: n · m for two rings of n
+//! and m edges whose bounding boxes intersect.
 
 use planner_core::coverage::Flat;
 
@@ -11,20 +12,23 @@ use planner_core::coverage::Flat;
 /// borders, and coordinates are rounded.
 const ON_BORDER_M: f64 = 0.01;
 
-/// How rings lie to each other that share ground where they must not.
+/// Pair of rings, or one ring, that makes an area invalid; fields are indices among outer rings or
+/// among holes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overlap {
-    /// Two polygons.
+    /// Two outer rings that overlap.
     Outers(usize, usize),
-    /// Two holes.
+    /// Two holes that overlap.
     Holes(usize, usize),
-    /// A hole that reaches out of its polygon.
+    /// A hole that does not lie wholly inside one outer ring.
     HoleOut(usize),
-    /// A polygon of which holes leave nothing.
+    /// An outer ring whose holes leave nothing of it to photograph.
     NothingLeft(usize),
 }
 
-/// Rings that overlap although no edges cross, or holes outside every outer ring.
+/// The first overlap of an area's rings, or hole that is not inside an outer ring, or outer ring
+/// that its holes fill; `None` if the rings are a valid area. Edges must not cross: that is checked
+/// elsewhere.
 pub fn find_overlap(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
     let (outers, holes) = (rings_to_f64(outers), rings_to_f64(holes));
     if let Some((i, j)) = first_overlapping_pair(&outers) {
@@ -45,7 +49,7 @@ pub fn find_overlap(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
     outers.iter().zip(&left_m2).position(nothing).map(Overlap::NothingLeft)
 }
 
-/// The first two rings that share ground.
+/// Indices of the first two rings that overlap; rings that only share a border do not.
 fn first_overlapping_pair(rings: &[RingF64]) -> Option<(usize, usize)> {
     let pairs = (0..rings.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
     pairs.into_iter().find(|&(i, j)| {
@@ -59,14 +63,15 @@ fn first_overlapping_pair(rings: &[RingF64]) -> Option<(usize, usize)> {
     })
 }
 
-/// A ring in f64, and its box.
+/// A ring in f64, and the corners of its bounding box.
 struct RingF64 {
     ring: Vec<[f64; 2]>,
     low: [f64; 2],
     high: [f64; 2],
 }
 
-/// Places of the parts of a ring, as another ring sees them.
+/// Whether some edge of a ring lies strictly inside another ring, and whether some lies strictly
+/// outside it.
 #[derive(Default)]
 struct RingRelation {
     inside: bool,
@@ -108,7 +113,7 @@ impl RingF64 {
         self.edges().map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1])).sum()
     }
 
-    /// Places of the pieces of this ring's edges.
+    /// Where the edges of this ring lie relative to `other`; parts on its border count as neither.
     fn relation_to(&self, other: &Self) -> RingRelation {
         let mut sides = RingRelation::default();
         for (a, b) in self.edges() {
@@ -129,7 +134,8 @@ impl RingF64 {
         sides
     }
 
-    /// Places where this ring meets a segment, as shares of the segment, both ends among them.
+    /// Points at which this ring meets the segment from `a` to `b`, as sorted fractions 0 to 1 of
+    /// the segment, with 0 and 1 among them.
     fn intersection_shares(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
@@ -144,7 +150,8 @@ impl RingF64 {
             }
             let to = [c[0] - a[0], c[1] - a[1]];
             let edge = [d[0] - c[0], d[1] - c[1]];
-            // The vertex, seen from the segment: where it lies on it, that is a cut.
+            // The projection of the ring's vertex onto the segment: a split where the vertex lies
+            // on the segment.
             shares.push((to[0] * along[0] + to[1] * along[1]) / length2);
             shares.push(cross_product(to, edge) / cross_product(along, edge));
         }

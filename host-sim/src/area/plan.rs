@@ -1,16 +1,16 @@
-//! QGroundControl `.plan`: the polygons of its surveys, else its inclusion fences; exclusion fences
-//! are no-fly zones.
+//! QGroundControl `.plan`: the polygons of its surveys are the area; without a survey, its
+//! inclusion fences are. Exclusion fences are no-fly zones.
 //!
-//! Format: <https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html>.
-//! Latitude stands first in it.
+//! Format: <https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html>. In
+//! such a file latitude comes before longitude.
 
 use serde::Deserialize;
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
-/// Corners of the polygon around a circular fence.
+/// Number of corners of the polygon that replaces a circular fence.
 const CIRCLE_CORNERS: usize = 32;
-/// Metres of one degree of latitude, on a sphere as QGroundControl draws.
+/// Metres per degree of latitude, on the sphere on which QGroundControl draws circles.
 const M_PER_DEG: f64 = 111_319.49;
 
 #[derive(Deserialize)]
@@ -104,7 +104,8 @@ fn longitude_first(ring: &[[f64; 2]]) -> RingXy {
     ring.iter().map(|&[lat, lon]| [lon, lat]).collect()
 }
 
-/// A circle as a polygon: inside it where it is included, around it where it is excluded.
+/// The polygon of a circular fence: inscribed in an inclusion fence, circumscribed about an
+/// exclusion fence, so that the polygon is never less strict than the circle.
 fn circle_polygon(circle: &Circle, inclusion: bool) -> RingXy {
     let [lat, lon] = circle.center;
     let half = std::f64::consts::PI / CIRCLE_CORNERS as f64;

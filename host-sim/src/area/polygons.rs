@@ -1,47 +1,47 @@
-//! Polygons as a file has them, and why it holds none.
+//! Polygons with the coordinates of their file, and the errors of reading them.
 
 use thiserror::Error;
 
 use crate::quote::quoted;
 
-/// Most vertices of all polygons.
+/// Most vertices that a file may have, over all its polygons.
 pub const MAX_VERTICES: usize = 10_000;
 
-/// One closed line; whether its last vertex repeats the first does not matter.
+/// Vertices of one closed ring, x (east or longitude) first; the last vertex may repeat the first.
 pub type RingXy = Vec<[f64; 2]>;
 
-/// Content of a file.
+/// All polygons of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Polygons {
     /// Areas to photograph.
     pub outers: Vec<RingXy>,
-    /// Areas that are not photographed, and may be flown over.
+    /// Holes of all outer rings: not photographed, but vehicles may fly over them.
     pub holes: Vec<RingXy>,
-    /// Neither.
+    /// No-fly zones: neither photographed nor flown over.
     pub no_fly: Vec<RingXy>,
 }
 
-/// Reason why a file holds no area.
+/// Reason why a file cannot be used as an area.
 #[derive(Debug, Error)]
 pub enum AreaFileError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Read(#[from] std::io::Error),
-    /// The file's name says nothing about its format.
+    /// The ending of the file's name is none of the known formats.
     #[error("is in no known format: its name ends in none of .geojson, .json, .wkt, .kml, .plan")]
     Format,
-    /// The file is not what its name says.
+    /// The file is not in the format of its ending.
     #[error("is not {format}: {why}")]
     Malformed {
-        /// Format by the file's name.
+        /// Format that the text is not in, as a noun for the message.
         format: &'static str,
-        /// Fault of the file.
+        /// First line of the parser's message.
         why: String,
     },
-    /// The file holds no polygon.
+    /// The file holds no polygon; the text is a hint that the message ends with.
     #[error("holds no polygon{0}")]
     NoPolygon(&'static str),
-    /// The file holds too many vertices.
+    /// The file holds more than [`MAX_VERTICES`] vertices; their number.
     #[error("holds {0} vertices; at most {MAX_VERTICES} can be used")]
     TooManyVertices(usize),
 }
@@ -53,12 +53,13 @@ impl AreaFileError {
 }
 
 impl Polygons {
-    /// Vertices of all rings.
+    /// Number of vertices of all rings.
     pub fn vertex_count(&self) -> usize {
         self.outers.iter().chain(&self.holes).chain(&self.no_fly).map(Vec::len).sum()
     }
 
-    /// Takes one polygon: its outer ring and its holes.
+    /// Adds one polygon: the first ring that is not empty is its outer ring, the others are its
+    /// holes.
     pub(super) fn add(&mut self, rings: impl IntoIterator<Item = RingXy>) {
         let mut rings = rings.into_iter().filter(|ring| !ring.is_empty());
         self.outers.extend(rings.next());

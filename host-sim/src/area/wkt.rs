@@ -1,4 +1,4 @@
-//! Well-known text: POLYGON, MULTIPOLYGON and collections of them.
+//! Well-known text: POLYGON, MULTIPOLYGON and GEOMETRYCOLLECTION of them.
 
 use std::str::FromStr as _;
 
@@ -7,7 +7,7 @@ use wkt::types::{LineString, Polygon};
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
-/// Most collections in a file: the reader calls itself for each collection within another one.
+/// Most collections in a file: the parser recurses for each collection within another one.
 const MAX_COLLECTIONS: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
@@ -17,7 +17,8 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
             &"it has more than 64 collections",
         ));
     }
-    // PostGIS writes the reference system before it; [area] says what the coordinates are.
+    // PostGIS writes `SRID=…;` before the geometry. It is ignored: `[area]` of the scenario states
+    // the coordinate system.
     let text = text.trim();
     let text = match text.split_once(';') {
         Some((system, rest)) if system.to_ascii_uppercase().starts_with("SRID=") => rest,

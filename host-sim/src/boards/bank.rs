@@ -1,4 +1,4 @@
-//! What lies in an emulated board's flash.
+//! Makes the flash image of an emulated board.
 
 use anyhow::ensure;
 use companion::services::ftp::MAX_DATA;
@@ -9,22 +9,23 @@ use planner_core::field;
 
 use crate::flash::{DeskFlash, LAYOUT};
 
-/// Address of bank 2 of the emulated flash.
+/// Address of flash bank 2 on the emulated board.
 pub const BANK2: u32 = 0x6000_0000;
-/// Address of the marks, a byte for each flash word: the state of that word, erased, programmed, or
-/// torn while it was being programmed or erased.
+/// Address of the word marks, one byte for each flash word: [`ERASED`], [`WHOLE`] (programmed), or
+/// [`TORN`] while the word is being programmed or erased.
 pub const WORD_MARKS: u32 = 0x6020_0000;
 pub const ERASED: u8 = 0;
 pub const WHOLE: u8 = 1;
 pub const TORN: u8 = 2;
-/// Address and value of the mark that the bank holds something.
+/// Address and value of a word in memory by which the board's firmware knows that the bank holds an
+/// image.
 pub const BANK_MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
 
-/// Content of a bank of flash after these files were uploaded to an empty one, its other slot
-/// erased.
+/// Image of a flash bank after the store accepted an upload of these files into an empty bank. The
+/// other slot of each file is erased.
 ///
 /// # Errors
-/// A file is refused.
+/// The store refuses a file.
 pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
     let mut flash = DeskFlash::open(None)?;
     let mut store = Store::mount(LAYOUT, &mut flash);
@@ -38,7 +39,7 @@ pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8
     settle(&mut store);
     let map = if roadmap.starts_with(&field::MAGIC) { File::Field } else { File::Roadmap };
     let files = [(map, roadmap), (File::Mission, mission)];
-    // A coverage mission has no roadmap, over level ground no field.
+    // A file may be empty: a coverage mission has no roadmap, and no field over level ground.
     for (file, bytes) in files.into_iter().filter(|(_, bytes)| !bytes.is_empty()) {
         let opened = store.open_upload(file, ErasePermission::Allowed);
         ensure!(opened.is_ok(), "a board's store takes no {}: {opened:?}", file.name());

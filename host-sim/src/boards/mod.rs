@@ -1,9 +1,9 @@
-//! Boards in QEMU whose time is the simulation's: lock step.
+//! Boards in QEMU that run in lock step with the simulation's time.
 //!
-//! A board is the firmware as it is built for `qemu`, on a Cortex-M7 whose instructions take 2 ns
-//! each (`-icount shift=1,sleep=off`). It runs for as long as it is granted, and stands still until
-//! the next grant; so what it does depends on no clock and no load of this machine ([`lock_step`]
-//! has the protocol).
+//! A board runs the firmware built for `qemu`, on an emulated Cortex-M7 on which an instruction
+//! takes 2 ns (`-icount shift=1,sleep=off`). It runs for the time that the desk grants it, and then
+//! stands still until the next grant. So its behaviour depends on no clock and no load of the host
+//! ([`lock_step`] has the protocol).
 
 mod bank;
 mod probe;
@@ -23,38 +23,38 @@ pub use self::bank::flash_bank_image;
 pub use self::probe::STACK_LEN;
 use crate::quote::quoted_path;
 
-/// Wall time without an answer after which a board counts as hanging.
+/// Wall-clock time without an answer after which a board counts as hung.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Shell command that starts a board. Semihosting prints the board's log to standard output, so the
-/// board answers by another descriptor.
+/// board's answers use file descriptor 3.
 const START_COMMAND: &str = r#"exec qemu-system-arm "$@" 3>&1 >"$LOG""#;
 
-/// Bytes that a port of a board receives or sent.
+/// Bytes that a port of a board receives or has sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PortBytes {
-    /// The port.
+    /// The port: autopilot or swarm radio.
     pub port: Port,
-    /// When, microseconds of the board's time.
+    /// Time of receiving or sending, microseconds of the board's time.
     pub at_us: u64,
     /// The bytes.
     pub bytes: Vec<u8>,
 }
 
-/// Result of a grant to a board.
+/// Result of granting time to a board.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct GrantResult {
-    /// The board's time, microseconds since its start.
+    /// The board's time at the end of the grant, microseconds since its start.
     pub now_us: u64,
-    /// Whether it started again instead: its time begins at zero.
+    /// Whether the board reset instead of finishing the grant: its time then begins at zero.
     pub restarted: bool,
-    /// Bytes that the board sent, in order.
+    /// Bytes that the board sent during the grant, in order.
     pub sent: Vec<PortBytes>,
-    /// Bytes that were read of the board's memory.
+    /// Bytes of the board's memory that the answer to a read carries.
     memory: Vec<u8>,
 }
 
-/// A board that waits for the desk or runs on a grant; it ends with us.
+/// A board in a QEMU process; dropping it kills the process.
 #[derive(Debug)]
 pub struct EmulatedBoard {
     qemu: Child,
@@ -64,10 +64,10 @@ pub struct EmulatedBoard {
 }
 
 impl EmulatedBoard {
-    /// Switches a board on, its flash empty. It logs to `log`, in defmt's encoding.
+    /// Starts a board with empty flash. It writes its log, in defmt's encoding, to the file `log`.
     ///
     /// # Errors
-    /// QEMU or the program does not start.
+    /// QEMU or the firmware does not start, or the firmware is not built for lock step.
     pub fn start(program: &Path, log: &Path) -> anyhow::Result<Self> {
         ensure!(program.is_file(), "no firmware: {}", quoted_path(program));
         let mut qemu = Command::new("sh");
@@ -104,16 +104,17 @@ impl EmulatedBoard {
         Ok(board)
     }
 
-    /// The board's time, microseconds since its start.
+    /// Time of the board after its last grant, microseconds since its start.
     pub fn now_us(&self) -> u64 {
         self.now_us
     }
 
-    /// Grants it time until `until_us`, with what its ports receive meanwhile, in order of time.
-    /// [`finish_grant`](Self::finish_grant) has to follow.
+    /// Grants the board time until `until_us`, and hands over the bytes that its ports receive
+    /// until then, sorted by time. The caller has to call [`finish_grant`](Self::finish_grant)
+    /// next.
     ///
     /// # Errors
-    /// The board is gone.
+    /// The QEMU process has ended.
     pub fn begin_grant(&mut self, until_us: u64, pieces: &[PortBytes]) -> anyhow::Result<()> {
         let mut message = Vec::new();
         for PortBytes { port, at_us, bytes } in pieces {
@@ -128,16 +129,16 @@ impl EmulatedBoard {
         self.send(&message)
     }
 
-    /// Waits until the grant has ended.
+    /// Waits until the board has used up its grant, or has reset.
     ///
     /// # Errors
-    /// The board hangs, or is gone.
+    /// The board does not answer within 10 s, or its process has ended.
     pub fn finish_grant(&mut self) -> anyhow::Result<GrantResult> {
         self.finish_grant_within(ANSWER_TIMEOUT)
     }
 
-    /// The same with another patience: a board that goes nowhere until its watchdog resets it takes
-    /// this machine seconds.
+    /// As [`finish_grant`](Self::finish_grant), with another limit of wall-clock time: a board that
+    /// hangs until its watchdog resets it takes the host seconds.
     ///
     /// # Errors
     /// As [`finish_grant`](Self::finish_grant).
@@ -153,7 +154,7 @@ impl EmulatedBoard {
         Ok(answer)
     }
 
-    /// Begins a grant and waits for its end.
+    /// Grants the board time until `until_us`, and waits until it has used it up.
     ///
     /// # Errors
     /// As [`begin_grant`](Self::begin_grant) and [`finish_grant`](Self::finish_grant).
@@ -179,13 +180,13 @@ impl EmulatedBoard {
 
 impl Drop for EmulatedBoard {
     fn drop(&mut self) {
-        // The process may have ended by itself.
+        // An error means that the process has already ended.
         let _ = self.qemu.kill();
         let _ = self.qemu.wait();
     }
 }
 
-/// Reads up to the end of an answer, or the board's start.
+/// Reads records of the board up to the one that ends an answer, or that reports its start.
 fn read_answer(output: &mut BufReader<ChildStdout>) -> anyhow::Result<GrantResult> {
     let mut answer = GrantResult::default();
     loop {

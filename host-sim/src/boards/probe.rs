@@ -1,4 +1,5 @@
-//! The debug probe of a board in lock step: memory, and what is called in it while it stands still.
+//! A debug probe for a board in lock step: reads and writes its memory and calls its functions
+//! while the board stands still.
 
 use std::time::Duration;
 
@@ -10,20 +11,21 @@ use super::{EmulatedBoard, GrantResult};
 use crate::flash::LAYOUT;
 use companion::storage::store::WORD;
 
-/// Bytes of memory in a message.
+/// Most bytes of memory in one message.
 const MEMORY_CHUNK: usize = 32 << 10;
-/// Address of the stack, as in the board's memory map.
+/// Address of the stack in the memory map of the firmware for `qemu`.
 const STACK_ADDRESS: u32 = 0x2008_A000;
 /// Length of the stack, bytes.
 pub const STACK_LEN: usize = 88 << 10;
-/// Value of a byte that no stack has touched since the start.
+/// Value with which the firmware fills the stack at its start; a byte that still has it was never
+/// used.
 const STACK_PAINT: u8 = 0xcc;
 
 impl EmulatedBoard {
-    /// Reads the board's memory from an address on.
+    /// Reads `length` bytes of the board's memory from `address` on.
     ///
     /// # Errors
-    /// The board is gone.
+    /// The QEMU process has ended.
     pub fn read_memory(&mut self, address: u32, length: usize) -> anyhow::Result<Vec<u8>> {
         let mut memory = Vec::new();
         while memory.len() < length {
@@ -34,10 +36,10 @@ impl EmulatedBoard {
         Ok(memory)
     }
 
-    /// Changes its memory.
+    /// Overwrites the board's memory from `address` on.
     ///
     /// # Errors
-    /// The board is gone.
+    /// The QEMU process has ended.
     pub fn write_memory(&mut self, address: u32, bytes: &[u8]) -> anyhow::Result<()> {
         for (i, bytes) in bytes.chunks(MEMORY_CHUNK).enumerate() {
             let head = ToBoard::Poke {
@@ -50,11 +52,12 @@ impl EmulatedBoard {
         Ok(())
     }
 
-    /// Calls a function, above every task and at this moment of the board's time; what came of it
-    /// is that the board waits again, or that it starts again.
+    /// Calls a function in the board, at the highest priority and at the board's current time.
+    /// Returns when the board waits for the desk again, or has reset.
     ///
     /// # Errors
-    /// The board is gone, or hangs for longer than `patience`.
+    /// The QEMU process has ended, or the board does not answer within `patience` of wall-clock
+    /// time.
     pub fn call_function(
         &mut self,
         address: u32,
@@ -65,10 +68,10 @@ impl EmulatedBoard {
         self.finish_grant_within(patience)
     }
 
-    /// Writes `bank` into the board's flash.
+    /// Writes the image `bank` into the board's flash bank, with its word marks.
     ///
     /// # Errors
-    /// The board is gone, or its flash has no such bank.
+    /// The QEMU process has ended, or the image has not the length of a bank.
     pub fn load_flash(&mut self, bank: &[u8]) -> anyhow::Result<()> {
         ensure!(bank.len() == LAYOUT.len() as usize, "a bank has {} bytes", LAYOUT.len());
         let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
@@ -78,19 +81,19 @@ impl EmulatedBoard {
         self.write_memory(BANK_MADE.0, &BANK_MADE.1.to_le_bytes())
     }
 
-    /// Words of its flash that are being programmed or erased, in its order.
+    /// Indices of the flash words that are being programmed or erased now.
     ///
     /// # Errors
-    /// The board is gone.
+    /// The QEMU process has ended.
     pub fn torn_flash_words(&mut self) -> anyhow::Result<Vec<usize>> {
         let marks = self.read_memory(WORD_MARKS, LAYOUT.len() as usize / WORD)?;
         Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
     }
 
-    /// Bytes of the stack that were used since the start.
+    /// Greatest depth of the stack since the board's start, bytes.
     ///
     /// # Errors
-    /// The board is gone.
+    /// The QEMU process has ended.
     pub fn stack_used(&mut self) -> anyhow::Result<usize> {
         let stack = self.read_memory(STACK_ADDRESS, STACK_LEN)?;
         Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == STACK_PAINT).count())

@@ -1,9 +1,9 @@
-//! `host-sim autopilot`: one simulated autopilot in real time, on flat ground at the altitude of
-//! its home.
+//! `host-sim autopilot`: one simulated autopilot in real time, over flat ground at its home's
+//! altitude.
 //!
-//! Steps of 4 ms are made when the clock has passed them; between them the process sleeps. A
-//! machine too slow for that (more than a second behind) lets simulated time lag rather than run
-//! ever later.
+//! The simulation makes each step of 4 ms once the clock has passed it, and sleeps until then. If
+//! the machine falls more than a second behind, simulated time lags behind the clock: the missed
+//! steps are not made up.
 
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -22,7 +22,7 @@ use crate::say;
 
 const PHYSICS_STEP: Duration = Duration::from_millis(4);
 const MAX_CLOCK_LAG: Duration = Duration::from_secs(1);
-/// Longest datagram, bytes: small enough for any path.
+/// Longest datagram that is sent, bytes: fits the MTU of any network.
 const MAX_DATAGRAM: usize = 1400;
 
 /// Arguments of `host-sim autopilot`.
@@ -32,16 +32,16 @@ pub struct AutopilotArgs {
     /// serial:PATH:BAUD; may be repeated
     #[arg(long, value_name = "URL", required = true)]
     pub listen: Vec<LinkUrl>,
-    /// Which autopilot to be
+    /// Autopilot to simulate
     #[arg(long, value_name = "NAME", default_value = "px4", value_parser = autopilot_kind_parser())]
     pub personality: AutopilotKind,
     /// MAVLink system id
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub sysid: u8,
-    /// Seconds from its start until ArduCopter's estimator has a position; PX4 has one at once
+    /// Seconds from the start until ArduCopter's estimator has a position; PX4's has one at once
     #[arg(long, value_name = "S", default_value_t = 40.0, value_parser = parse_seconds)]
     pub ready_after: f32,
-    /// Where it stands: degrees, degrees, metres above the sea
+    /// Where the vehicle stands: latitude and longitude in degrees, metres above sea level
     #[arg(
         long,
         value_name = "LAT,LON,ALT",
@@ -49,7 +49,7 @@ pub struct AutopilotArgs {
         default_value = "47.397742,8.545594,488"
     )]
     pub home: Place,
-    /// Origin of its own local frame (EKF origin); home if not given
+    /// Origin of the autopilot's local frame (EKF origin); the vehicle's home if absent
     #[arg(long, value_name = "LAT,LON,ALT", allow_hyphen_values = true)]
     pub origin: Option<Place>,
 }
@@ -64,7 +64,7 @@ fn parse_seconds(text: &str) -> Result<f32, String> {
     sound.ok_or_else(|| "expected a number of seconds from 0 to 3600".to_owned())
 }
 
-/// A place as it is written on the command line.
+/// A WGS84 position in the notation of the command line, `LAT,LON,ALT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place(pub Geodetic);
 
@@ -87,10 +87,10 @@ impl FromStr for Place {
 }
 
 /// Serves one simulated autopilot until the process is ended. Prints `listening URL` for each link,
-/// with the port it got where 0 was asked for.
+/// with the port that the system chose for port 0.
 ///
 /// # Errors
-/// A link that cannot be opened or is lost for good, a personality not simulated.
+/// A link cannot be opened or is permanently lost, or the autopilot cannot be simulated.
 pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     let home = args.home.0;
     let config = Config {
@@ -115,7 +115,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         say!("listening {}", url.with_bound_port(&*link));
         links.push((url, link));
     }
-    // Whoever waits for these lines would wait for ever.
+    // Fails if the lines could not be printed: a program that waits for them would wait for ever.
     check_printed()?;
     let ground_up_m = -config.vehicle.radius_m;
     let mut next = Instant::now();
@@ -134,7 +134,8 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Everything that came in, then everything that is to go out.
+/// Hands the autopilot all bytes that have arrived on a link, then sends all bytes that it has for
+/// that link.
 fn exchange_bytes(
     autopilot: &mut Autopilot,
     port: usize,

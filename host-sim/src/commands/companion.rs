@@ -1,4 +1,5 @@
-//! `host-sim companion`: one vehicle's companion in a process of its own, beside any autopilot.
+//! `host-sim companion`: one vehicle's companion in its own process, beside a simulated, SITL or
+//! real autopilot.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,48 +26,49 @@ use crate::swarm::vehicles::companion_config;
 /// Arguments of `host-sim companion`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The mission of the whole swarm
+    /// The scenario of the whole swarm
     scenario: PathBuf,
     /// Link to the autopilot: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT,
     /// tcp-listen:HOST:PORT or serial:PATH:BAUD
     #[arg(long, value_name = "URL")]
     autopilot: LinkUrl,
-    /// Link to the other companions; without it this vehicle flies as the only one
+    /// Link to the other companions; without it this vehicle flies alone
     #[arg(long, value_name = "URL")]
     swarm: Option<LinkUrl>,
-    /// Which vehicle of the scenario this is, by its MAVLink system id
+    /// MAVLink system id of this companion's vehicle in the scenario
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     id: u8,
     /// Start the mission as soon as it is ready, without a ground station's command
     #[arg(long)]
     start: bool,
-    /// Keep what ground stations upload and set in this file, as a board keeps it in its flash;
-    /// without it that is gone at the end
+    /// File for what ground stations upload and set, as a board keeps it in its flash; without it
+    /// that is lost at the end
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
 }
 
 /// Sleep between two polls of the links.
 const POLL_SLEEP: Duration = Duration::from_millis(1);
-/// Time for which a companion whose mission has ended continues reporting that to the others and to
-/// ground stations, as a board does for good.
+/// Time for which a companion whose mission has ended continues to report that to other vehicles
+/// and ground stations; on a board it continues for ever.
 const REPORT_END_FOR: Duration = Duration::from_secs(2);
-/// Silence of its autopilot after which a vehicle cannot be helped.
+/// Silence of the autopilot after which the companion does not wait for the vehicle's landing any
+/// more.
 const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_secs(5);
 
-/// Runs until the mission ends. Exit code 0 if it was flown to its end.
+/// Runs the companion until its mission ends. Exit code 0 if the mission was flown to its end.
 ///
 /// # Errors
-/// Bad input or a link that fails, by name and place.
+/// Bad input, or a link that fails permanently; the error names it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = load(&args.scenario, None)?;
-    // Opens the flash first: a bad file must fail before the planning, which takes long.
+    // Opens the flash first, so that a bad file fails before the planning, which takes long.
     let mut flash = DeskFlash::open(args.flash.as_deref())?;
     let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
     let plan = mission.plan()?;
     let left = mission.unserved(&plan);
-    // A goal is left, and this vehicle has none.
+    // Whether this vehicle has no goal although one is left.
     let is_short = left.vehicles.contains(&args.id) && !left.goals.is_empty();
     if is_short {
         shortage::shortage_lines(&mission, &plan).iter().for_each(|line| say!("left       {line}"));
@@ -161,7 +163,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             companion = start(&config, &mut flash)?;
         }
         let state = companion.state();
-        // In the air work may be left: a pilot may hand the vehicle back.
+        // In the air the mission may continue: a pilot may hand the vehicle back.
         let t = companion.telemetry();
         let heard = t.heartbeat_age(now()) < MAX_AUTOPILOT_SILENCE;
         let flies = t.armed && t.on_ground == Some(false) && heard;
@@ -178,7 +180,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// A companion with its flash and the parameters kept there.
+/// A new companion with the store in its flash, which holds parameters and uploaded files.
 fn start(config: &Config<VEHICLES>, flash: &mut DeskFlash) -> anyhow::Result<Box<DeskCompanion>> {
     let store = Store::mount(flash::LAYOUT, flash);
     let mut companion = new_companion(config.clone())?;

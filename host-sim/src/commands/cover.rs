@@ -1,4 +1,4 @@
-//! `host-sim cover`: a fleet's plan to photograph an area; no flight.
+//! `host-sim cover`: plans how a fleet photographs an area, and exports the flights; no flight.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,20 +25,20 @@ use crate::scenario::{self, Scenario};
 /// Arguments of `host-sim cover`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The scenario, with an `[area]`
+    /// The scenario, which has an `[area]`
     scenario: PathBuf,
     /// Directory for `result.json`, `timing.json`, `report.html`, `waypoints.csv`, `area.geojson`,
-    /// and for each vehicle's `vehicle-N.plan` and `vehicle-N.waypoints` (`vehicle-N-sortie-K`
-    /// where it takes more than one battery)
+    /// and for each vehicle `vehicle-N.plan` and `vehicle-N.waypoints` (`vehicle-N-sortie-K` if it
+    /// takes more than one battery)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Divide the work so, whatever the scenario says: simple-binpat, binpat, powell-binpat or
-    /// exact
+    /// Method of dividing the area, instead of the scenario's: simple-binpat, binpat, powell-binpat
+    /// or exact
     #[arg(long, value_name = "METHOD", value_parser = Method::named)]
     method: Option<Method>,
 }
 
-/// `result.json` of a coverage plan.
+/// The `result.json` of `host-sim cover`.
 #[derive(Debug, Serialize)]
 pub(crate) struct CoverResult {
     command: &'static str,
@@ -53,10 +53,10 @@ pub(crate) struct CoverResult {
     coverage: CoverageResult,
 }
 
-/// Runs the command.
+/// Plans the area and writes all files. Exit code 0 if the check finds no fault.
 ///
 /// # Errors
-/// Bad input, by name and place.
+/// The input is bad or there is no plan; the error names the place in the scenario.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = scenario::load(&args.scenario)?;
@@ -90,14 +90,15 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Names of the files beside the usual ones.
+/// Names of the files that are written in addition to [`output::RESULT_FILES`].
 fn extra_file_names(scenario: &Scenario) -> Vec<String> {
     let own = |id: u8| [format!("vehicle-{id}.plan"), format!("vehicle-{id}.waypoints")];
     let shared = ["waypoints.csv", "area.geojson"].map(str::to_owned);
     scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
 }
 
-/// Adds the plans of all flights and what is beside them; returns the names of the plans.
+/// Adds each flight's plans, `waypoints.csv` and `area.geojson` to the results. Returns the names
+/// of the plans.
 fn add_flights(
     planned: &CoveragePlan<'_>,
     flights: &[Flight],
@@ -125,8 +126,8 @@ fn add_flights(
     Ok(written)
 }
 
-/// Removes the plans of an earlier run that this one did not write: nobody is to upload one of them
-/// with the others.
+/// Removes plans in the directory that an earlier run wrote and this one did not, so that none of
+/// them is uploaded together with the new ones.
 fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_plan = |name: &str| {
@@ -149,7 +150,7 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Description of a plan for `result.json`.
+/// The `result.json` of a plan and its check.
 pub(crate) fn cover_result(planned: &CoveragePlan<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
@@ -260,7 +261,8 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
     say!("report     {}", dir.join("report.html").display());
 }
 
-/// Without `endurance_s` nothing says whether a battery lasts.
+/// Prints the longest flight of a vehicle without `endurance_s`, for which it cannot be checked
+/// whether its battery lasts.
 fn print_batteries(planned: &CoveragePlan<'_>) {
     let unknown = planned.sorties.iter().filter(|sortie| {
         planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none()

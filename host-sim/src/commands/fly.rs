@@ -1,4 +1,4 @@
-//! `host-sim fly` and `host-sim demo`: plan, fly, report.
+//! `host-sim fly` and `host-sim demo`: plan a mission, fly it in the simulation, write the report.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ use crate::swarm;
 use crate::swarm::faults;
 use crate::swarm::gateway::Gateway;
 
-/// The demo's scenario, in the program itself: nothing to find on the machine.
+/// The demo's scenario, compiled into the program so that no file is needed.
 const DEMO: &str = include_str!("../../scenarios/demo.toml");
 
 /// Arguments of `host-sim fly`.
@@ -34,42 +34,42 @@ pub struct FlyArgs {
     /// Directory for `result.json`, `timing.json` and `report.html`
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Fly at the speed of the clock instead of as fast as it goes
+    /// Fly at the speed of the clock instead of as fast as possible
     #[arg(long)]
     realtime: bool,
     /// Show the swarm to a ground station behind this link, at the speed of the clock:
     /// udp:HOST:14550 for QGroundControl
     #[arg(long, value_name = "URL")]
     qgc: Option<LinkUrl>,
-    /// Take this seed instead of the scenario's
+    /// Seed to use instead of the scenario's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// A board or another process decides for the scenario's first vehicle; given again, for the
-    /// second, and so on. Its port for the autopilot: tcp:HOST:PORT, udp:HOST:PORT,
-    /// serial:PATH:BAUD or one that listens. Flies at the speed of the clock
+    /// Link to a board or another process that runs the companion of the scenario's first vehicle,
+    /// by its port for the autopilot: tcp:HOST:PORT, udp:HOST:PORT, serial:PATH:BAUD or one that
+    /// listens. Given again, the second vehicle's, and so on. Flies at the speed of the clock
     #[arg(long, value_name = "URL")]
     companion: Vec<LinkUrl>,
-    /// The first such companion's port for the radio; given again, the second's, and so on. One
-    /// without it and the others hear each other only where its own radio joins them, and do not
-    /// start where they are to
+    /// Link to that companion by its port for the radio; given again, to the second companion, and
+    /// so on. A companion without it and the others hear each other only if its own radio joins
+    /// them; otherwise none of them starts
     #[arg(long, value_name = "URL", requires = "companion")]
     radio: Vec<LinkUrl>,
-    /// Boards in QEMU decide, in lock step with the simulation: the firmware that
-    /// `cargo xtask build --board qemu` makes. Each has roadmap and mission in its flash and logs
-    /// to board-N.defmt in the directory
+    /// Firmware for boards in QEMU that run the companions in lock step with the simulation, from
+    /// `cargo xtask build --board qemu`. Each board has roadmap and mission in its flash and logs
+    /// to board-N.defmt in the output directory
     #[arg(long, value_name = "FIRMWARE", conflicts_with = "companion")]
     emulate: Option<PathBuf>,
-    /// Keep what each companion keeps in its flash in this directory, as boards do: parameters, and
-    /// in a coverage mission what is photographed. The next flight continues there, and is judged
-    /// by the pictures of all
+    /// Directory for what each companion keeps in its flash, as boards do: parameters, and in a
+    /// coverage mission the waypoints that are photographed. The next flight continues there, and
+    /// is judged by the pictures of all flights
     #[arg(long, value_name = "DIR", conflicts_with_all = ["companion", "emulate"])]
     flash: Option<PathBuf>,
-    /// How many of the scenario's first vehicles have such a board, if not all
+    /// Number of the scenario's first vehicles that have such a board; all if absent
     #[arg(long, value_name = "N", requires = "emulate")]
     boards: Option<usize>,
 }
 
-/// Display of a running flight: clock speed and ground station.
+/// How a running flight is shown: paced by the clock, and to which ground station.
 #[derive(Default)]
 struct FlightDisplay<'a> {
     realtime: bool,
@@ -84,10 +84,10 @@ pub struct DemoArgs {
     out: PathBuf,
 }
 
-/// Runs `fly`.
+/// Runs `host-sim fly`. Exit code 0 if the mission is complete.
 ///
 /// # Errors
-/// Bad input, by name and place.
+/// The input is bad; the error names its place.
 pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     let mut scenario = load(&args.scenario, args.seed)?;
     set_board_links(&mut scenario, &args.companion, &args.radio)?;
@@ -101,7 +101,7 @@ pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     plan_and_fly(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
-/// The first vehicles are decided for behind these links.
+/// Makes the scenario's first vehicles use companions behind these links, one link each.
 fn set_board_links(
     scenario: &mut Scenario,
     companions: &[LinkUrl],
@@ -125,7 +125,7 @@ fn set_board_links(
     Ok(())
 }
 
-/// Each companion has a file in this directory for its flash.
+/// Gives each companion a file in this directory for its flash.
 fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(dir)
         .with_context(|| format!("cannot keep flashes: {}", quoted_path(dir)))?;
@@ -141,7 +141,8 @@ fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The first vehicles have boards in QEMU.
+/// Makes the scenario's first `boards` vehicles use companions on boards in QEMU; all vehicles
+/// without a number.
 fn set_emulated_boards(
     scenario: &mut Scenario,
     program: &Path,
@@ -162,7 +163,7 @@ fn set_emulated_boards(
     Ok(())
 }
 
-/// Runs `demo`.
+/// Runs `host-sim demo`. Exit code 0 if the mission is complete.
 ///
 /// # Errors
 /// The output cannot be written.

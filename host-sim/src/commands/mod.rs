@@ -1,4 +1,4 @@
-//! The commands of `host-sim` that work on a scenario.
+//! The commands of `host-sim`, one module each; `map` has its command in [`crate::map`].
 
 pub mod autopilot;
 pub mod companion;
@@ -14,7 +14,8 @@ use std::path::Path;
 
 use crate::scenario::{self, Scenario};
 
-/// Reads a scenario and refuses what is not built yet by name.
+/// Loads a scenario and refuses features that are not available yet; `seed` replaces the
+/// scenario's.
 fn load(path: &Path, seed: Option<u64>) -> anyhow::Result<Scenario> {
     let mut scenario = scenario::load(path)?;
     scenario.check_supported()?;

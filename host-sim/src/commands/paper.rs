@@ -1,4 +1,4 @@
-//! `host-sim paper`: a paper's tables, ours beside theirs.
+//! `host-sim paper`: prints the tables of a paper beside the results of this program.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,14 +10,14 @@ use crate::paper::cpp;
 /// Arguments of `host-sim paper`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Which paper: cpp (Luna 2022, coverage)
+    /// The paper: cpp (Luna 2022, coverage)
     paper: Paper,
     /// Directory for `tables.json`, `result.json`, `timing.json` and `report.html`
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
-/// The papers.
+/// Papers by their short names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Paper {
     /// Madridano 2020
@@ -30,10 +30,10 @@ enum Paper {
     Fm2,
 }
 
-/// Runs the command.
+/// Runs the comparison with a paper.
 ///
 /// # Errors
-/// A paper that is not built yet; results that cannot be written.
+/// The paper is not available yet, or results cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match args.paper {
         Paper::Cpp => cpp::run(&args.out),

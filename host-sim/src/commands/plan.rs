@@ -1,4 +1,5 @@
-//! `host-sim plan`: roadmap, assignment and paths; no flight.
+//! `host-sim plan`: plans roadmap, assignment, paths and schedule, and writes the files for boards;
+//! no flight.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,20 +24,21 @@ pub struct Args {
     /// The scenario
     scenario: PathBuf,
     /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`, and
-    /// for the files that a board is given: `roadmap.bin`, or `field.bin` over terrain, and
+    /// for the files to upload to a board: `roadmap.bin`, or `field.bin` over terrain, and
     /// `mission.bin`
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Make files that this board holds: nucleo-h743, qemu or pico2. Of the roadmap's edges some
-    /// are left out, paths lengthen little
+    /// Board that the files have to fit: nucleo-h743, qemu or pico2. Some edges of the roadmap are
+    /// left out for it, which lengthens paths little
     #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
     board: Option<&'static BoardCapacity>,
 }
 
-/// Runs the command.
+/// Plans the mission and writes all files. Exit code 0 if as many goals are served as vehicles and
+/// goals allow.
 ///
 /// # Errors
-/// Bad input, by name and place.
+/// The input is bad, there is no plan, or it does not fit the board; the error names the place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = load(&args.scenario, None)?;
@@ -55,7 +57,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     output::add(&mut results, &result, &mission.timing, page)?;
     let starts = output::points_to_text(mission.scenario.vehicles.iter().map(|v| v.start));
     let goals = output::points_to_text(mission.goals.iter().copied());
-    // A coverage mission has no roadmap, over level ground no field.
+    // A coverage mission has no roadmap, and no field over level ground: empty files are not
+    // written.
     let (roadmap, field) = match mission.scenario.area {
         None => (&mission.roadmap_file[..], &[][..]),
         Some(_) => (&[][..], &mission.roadmap_file[..]),
@@ -121,7 +124,8 @@ fn planned_result(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
         command: "plan",
         scenario: mission.scenario.path.clone(),
         seed: mission.scenario.seed,
-        // The lanes of an area are divided among those that fly, all of them.
+        // The plan of an area always covers all of it; otherwise every goal or every vehicle must
+        // be served.
         complete: mission.scenario.area.is_some()
             || flying().count() == mission.goals.len().min(vehicles.len()),
         vehicles,

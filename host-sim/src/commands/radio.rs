@@ -1,4 +1,4 @@
-//! `host-sim radio`: the radio of a swarm whose companions are boards or processes of their own.
+//! `host-sim radio`: the simulated radio of a swarm whose companions are boards or other processes.
 
 use std::process::ExitCode;
 use std::thread::sleep;
@@ -17,17 +17,17 @@ use crate::swarm::radio::{Radio, RadioConfig};
 /// Arguments of `host-sim radio`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A companion's or ground station's link, one for each: udp-listen:HOST:PORT,
+    /// Link to a companion or ground station, given once for each: udp-listen:HOST:PORT,
     /// tcp-listen:HOST:PORT, udp:HOST:PORT, tcp:HOST:PORT or serial:PATH:BAUD
     #[arg(long, value_name = "URL", required = true)]
     listen: Vec<LinkUrl>,
-    /// Share of frames that a receiver misses
+    /// Share of frames that each receiver loses, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share)]
     loss: f64,
-    /// Time from sending to hearing, seconds
+    /// Delay from sending to receiving, seconds
     #[arg(long, value_name = "S", default_value_t = 0.05, value_parser = parse_seconds)]
     delay: f64,
-    /// Seed of the losses
+    /// Seed of the random losses
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -47,11 +47,11 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_number(text, 60.0)
 }
 
-/// Passes every frame on to all other links until the process is ended. Prints `listening URL` for
-/// each.
+/// Forwards each frame from one link to all others, with loss and delay, until the process is
+/// ended. Prints `listening URL` for each link.
 ///
 /// # Errors
-/// A link that cannot be opened or is lost for good.
+/// A link cannot be opened or is permanently lost.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let config = RadioConfig { range_m: f32::INFINITY, loss: args.loss, delay_s: args.delay };
     let mut radio = Radio::new(config, args.listen.len(), args.seed);

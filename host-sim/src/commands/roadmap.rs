@@ -1,4 +1,4 @@
-//! `host-sim roadmap build|info`.
+//! The commands `host-sim roadmap build` and `host-sim roadmap info`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,21 +31,21 @@ enum Action {
         /// The file to write
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
-        /// Make a file that this board holds: nucleo-h743, qemu or pico2
+        /// Board that the file has to fit: nucleo-h743, qemu or pico2
         #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
         board: Option<&'static BoardCapacity>,
     },
-    /// Check a roadmap file and say what it holds
+    /// Check a roadmap file and print its figures
     Info {
         /// A roadmap file
         file: PathBuf,
     },
 }
 
-/// Runs the command.
+/// Runs the command and prints the roadmap's figures.
 ///
 /// # Errors
-/// Bad input, by name and place.
+/// The scenario or file is bad; the error names it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Build { scenario, out, board } => {
@@ -91,7 +91,7 @@ fn print(view: &RoadmapView<'_>) {
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }
 
-/// A file that is a roadmap and nothing else.
+/// Parses a roadmap file; bytes after the roadmap's end are an error.
 pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
     let view = RoadmapView::parse(bytes).map_err(|error| anyhow!(describe_error(&error)))?;
     ensure!(
@@ -102,7 +102,7 @@ pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
     Ok(view)
 }
 
-/// Description of a file's fault.
+/// Text of a roadmap file's error, for messages.
 fn describe_error(error: &RoadmapError) -> String {
     match error {
         RoadmapError::File(error) => error.to_string(),

@@ -1,4 +1,4 @@
-//! `host-sim upload`: a roadmap or mission file goes to a companion by MAVLink FTP.
+//! `host-sim upload`: uploads a roadmap, field or mission file to a companion by MAVLink FTP.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,28 +20,31 @@ use crate::upload::FtpClient;
 /// Arguments of `host-sim upload`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A roadmap or mission file, as `host-sim plan` writes them
+    /// A roadmap, field or mission file, as `host-sim plan` writes them
     file: PathBuf,
-    /// Link to the vehicle's autopilot, which passes it on, or to the companion itself:
-    /// udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT, tcp-listen:HOST:PORT or serial:PATH:BAUD
+    /// Link to the vehicle's autopilot, which forwards to the companion, or to the companion
+    /// itself: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT, tcp-listen:HOST:PORT or
+    /// serial:PATH:BAUD
     #[arg(long, value_name = "URL")]
     link: LinkUrl,
-    /// Which vehicle, by its MAVLink system id; the first companion heard if not given
+    /// MAVLink system id of the vehicle; if absent, that of the first companion heard
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     id: Option<u8>,
     /// System id to send from: one that the companion's mission names as a ground station
     #[arg(long, value_name = "N", default_value_t = 255, value_parser = clap::value_parser!(u8).range(1..))]
     ground_station: u8,
-    /// The vehicle's board: nucleo-h743, qemu or pico2. A file that it does not hold is not sent;
-    /// without this option, one that no board holds
+    /// The vehicle's board: nucleo-h743, qemu or pico2. A file that does not fit it is not sent;
+    /// without this option, a file that fits no board
     #[arg(long, value_name = "BOARD", value_parser = BoardCapacity::by_name)]
     board: Option<&'static BoardCapacity>,
 }
 
-/// Uploads, and compares the CRC-32 of what arrived. It is used from the companion's next start on.
+/// Uploads the file and verifies the CRC-32 of what arrived. The companion uses the file from its
+/// next start on.
 ///
 /// # Errors
-/// A file that is neither; no companion heard; a companion that refuses it; a link that fails.
+/// The file is no roadmap, field or mission or does not fit the board, no companion is heard, the
+/// companion refuses the file, or the link fails.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let path = quoted_path(&args.file);
     let bytes = files::read(&args.file, files::BINARY_BYTES)
@@ -64,14 +67,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Kind of the file, if the board holds it.
+/// Kind of a file by its magic number; an error if it is malformed or exceeds the board's capacity.
 fn file_kind(bytes: &[u8], board: &BoardCapacity) -> anyhow::Result<File> {
     let (file, excess) = if bytes.starts_with(&roadmap::MAGIC) {
         let view = super::roadmap::parse(bytes).context("no sound roadmap")?;
         (File::Roadmap, board.roadmap_excess(&view))
     } else if bytes.starts_with(&field::MAGIC) {
         FieldView::parse(bytes).map_err(|e| anyhow!("no sound field: {e}"))?;
-        // Every board holds the largest.
+        // Every board holds the largest field.
         (File::Field, None)
     } else if bytes.starts_with(&mission_file::MAGIC) {
         let view = MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {e}"))?;

@@ -1,11 +1,11 @@
-//! The one checker of coverage plans: is everything photographed, every waypoint once, on routes
-//! without a break, outside no-fly zones?
+//! The checker of coverage plans: it checks that all of the area is photographed, that each
+//! waypoint is flown once, on routes without gaps, and that no leg enters a no-fly zone.
 //!
-//! It compares flights as they are written, or at pictures as they were taken, in f64, and shares
-//! no code with the planner. Cells are a tenth of the lane spacing. A cell counts if its middle is
-//! in the area and outside no-fly zones; it is photographed if one picture shows all its corners.
-//! Where overlaps are less than a cell, pictures must show its middle and each corner that is in
-//! the area.
+//! It takes planned flights, or pictures as they were taken in a flight, computes in f64, and
+//! shares no code with the planner. The area is split into square cells of a tenth of the lane
+//! spacing. A cell counts if its centre is in the area and outside no-fly zones; it is photographed
+//! if one picture shows all four of its corners. Where pictures overlap by less than a cell,
+//! several pictures together must show its centre and each of its corners that lies in the area.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
@@ -16,38 +16,39 @@ use super::heights::{self, HeightFindings};
 pub use super::taken::Picture;
 use super::{CoveragePlan, Flight, taken};
 
-/// Most cells of the area that are checked; a larger area is checked in larger cells.
+/// Most cells of the grid over the area; a larger area gets larger cells.
 const MAX_CHECKED_CELLS: f64 = 4e7;
 
-/// Findings of the check.
+/// Result of the check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
-    /// Share of the cells that are photographed.
+    /// Photographed cells divided by all cells that count, 0 to 1.
     pub covered_share: f64,
-    /// Cells that count.
+    /// Number of cells that count.
     pub cells: u64,
-    /// The middle of a cell that is left out, metres east and north.
+    /// Centre of the first cell that is not photographed, metres east and north; `None` if all are.
     pub missing: Option<[f64; 2]>,
     /// Side of a cell, metres.
     pub cell_m: f64,
-    /// Pictures taken.
+    /// Number of pictures.
     pub photos: u64,
-    /// Waypoints flown by nobody.
+    /// Number of waypoints at which no picture is taken.
     pub left: u64,
-    /// Waypoints flown more than once.
+    /// Number of waypoints that are flown more than once.
     pub twice: u64,
-    /// Routes whose waypoints do not follow each other.
+    /// Number of flights whose waypoint numbers do not rise or fall by one from picture to picture.
     pub broken: u64,
-    /// Legs that enter a no-fly zone.
+    /// Number of legs that enter a no-fly zone.
     pub forbidden: u64,
-    /// Findings about the heights above terrain.
+    /// Heights of lanes above terrain; `None` over level ground, and for pictures.
     pub heights: Option<HeightFindings>,
-    /// When each picture first showed a cell: time and number of cells, by rising time.
+    /// For each picture, by rising time: its time, seconds, and the number of cells that it is the
+    /// first to complete.
     pub over_time: Vec<(f32, u64)>,
 }
 
 impl Findings {
-    /// Whether the check found no fault.
+    /// Whether the area is covered, each waypoint flown once, and no other fault was found.
     pub fn is_clean(&self) -> bool {
         self.covered_share >= 1.0
             && self.left + self.twice + self.broken + self.forbidden == 0
@@ -55,13 +56,13 @@ impl Findings {
     }
 }
 
-/// Checks what a plan flies.
+/// Checks the flights of a coverage plan.
 pub fn check_plan(planned: &CoveragePlan<'_>) -> Findings {
     let flights: Vec<_> = planned.flights();
     check_flights(planned, &flights_to_check(planned, &flights))
 }
 
-/// The flights as the checker takes them.
+/// Pairs each planned flight with the id of its vehicle, as [`check_flights`] needs it.
 pub fn flights_to_check<'f>(
     planned: &CoveragePlan<'_>,
     flights: &'f [Flight],
@@ -73,7 +74,7 @@ pub fn flights_to_check<'f>(
     flights.iter().map(flown).collect()
 }
 
-/// Checks flights against the area.
+/// Checks the waypoints, no-fly zones, heights and pictures of flights.
 pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Findings {
     let mut findings = Findings::default();
     count_waypoints(planned, flights, &mut findings);
@@ -92,7 +93,7 @@ pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) ->
     findings
 }
 
-/// The pictures that a plan takes.
+/// Pictures at the photo stops of planned flights, each with the lanes' direction as its heading.
 pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Vec<Picture> {
     let along = planned.tracks.lane_direction();
     let heading = along.y.atan2(along.x);
@@ -107,8 +108,8 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
     flights.iter().flat_map(taken).collect()
 }
 
-/// Judges pictures that were taken in a flight, by where the camera truly was. Waypoints are judged
-/// as [`taken`] says.
+/// Checks pictures that were taken in a flight, by the true position of the camera. [`taken`]
+/// counts waypoints without a picture and those flown twice.
 pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Findings {
     let (left, twice) = taken::count_waypoints(planned, &pictures);
     let mut findings =
@@ -117,7 +118,8 @@ pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Fin
     findings
 }
 
-/// Corners of what each picture shows, in turn, metres east and north.
+/// The four corners of each picture's footprint on the ground, in order around it, metres east and
+/// north.
 pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32; 2]; 4]> {
     let cells = CoverageCells::new(planned);
     pictures.iter().map(|picture| cells.footprint_corners(planned, picture)).collect()
@@ -145,8 +147,8 @@ fn count_waypoints(
     findings.twice = times.iter().filter(|times| **times > 1).count() as u64;
 }
 
-/// Whether a straight leg enters a no-fly zone: its middle between two edges that it crosses is
-/// inside, or an end is.
+/// Whether a straight leg enters a no-fly zone. The leg is split where it crosses edges of the
+/// zone: it enters if the midpoint of a part lies inside.
 fn does_leg_enter_zone(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> bool {
     let wide = |place: &Flat| [f64::from(place.x), f64::from(place.y)];
     let (a, b) = (wide(from), wide(to));
@@ -179,7 +181,7 @@ fn ring_contains(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
     inside
 }
 
-/// Cells along and across the lanes.
+/// A grid of square cells over the area, with axes along and across the lanes.
 struct CoverageCells {
     along: [f64; 2],
     low: [f64; 2],
@@ -207,7 +209,8 @@ impl CoverageCells {
         cells
     }
 
-    /// Cells of which some count, so that an area narrower than one is judged too.
+    /// A grid whose cells are halved until at least one of them counts, so that an area narrower
+    /// than a cell is checked too; stops at [`MAX_CHECKED_CELLS`].
     fn finest_needed(planned: &CoveragePlan<'_>) -> Self {
         let mut cells = Self::new(planned);
         let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MAX_CHECKED_CELLS;
@@ -224,8 +227,9 @@ impl CoverageCells {
         [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
     }
 
-    /// Whether the area holds each place of a grid, row by row: the middles of the cells, or their
-    /// corners, half a cell before them and one more each way.
+    /// For each point of a grid, row by row: whether it lies in the area and outside no-fly zones.
+    /// The points are the centres of the cells (`offset` 0.5), or their corners (`offset` 0, one
+    /// more column and row).
     fn cells_inside_area(
         &self,
         planned: &CoveragePlan<'_>,
@@ -255,7 +259,8 @@ impl CoverageCells {
         held
     }
 
-    /// Does something to the places of a row, which begins at `at`, that are inside rings.
+    /// Applies `to` to each point of a grid row that lies inside the rings by the even-odd rule;
+    /// the row's first point is `at`.
     fn for_row_inside_rings(
         &self,
         row: &mut [bool],
@@ -280,8 +285,10 @@ impl CoverageCells {
         }
     }
 
-    /// Half of what a picture shows along and across the lanes. Of one that is taken askew, as
-    /// large a rectangle of the same sides' ratio as lies within it.
+    /// Half the length of a picture's footprint along the lanes and across them, metres, at the
+    /// camera's height above the ground. Of a picture that is rotated against the lanes: the
+    /// largest rectangle of the same aspect ratio, parallel to the lanes, that lies within the
+    /// footprint.
     fn half_footprint(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [f64; 2] {
         let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.height_m);
         let above_m = picture.position.z - planned.wanted.ground_m(&picture.position.xy());
@@ -293,7 +300,8 @@ impl CoverageCells {
         half.map(|side| side * share * f64::from(above_m) / f64::from(height_m))
     }
 
-    /// Corners of what a picture is judged to show, in turn, metres east and north.
+    /// The four corners of the rectangle that a picture is counted to show, in order around it,
+    /// metres east and north.
     fn footprint_corners(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [[f32; 2]; 4] {
         let ([u, v], [along, across]) =
             (self.to_lane_frame(&picture.position.xy()), self.half_footprint(planned, picture));
@@ -312,14 +320,14 @@ impl CoverageCells {
     ) {
         let spacing = planned.wanted.spacing;
         let counted = self.cells_inside_area(planned, self.size, 0.5);
-        // Where pictures overlap by a cell, one of them must show all corners of the cell.
+        // Neighbouring pictures overlap by a cell or more: one must show all corners of a cell.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
             >= self.side;
         pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         let [columns, rows] = self.size;
-        // In other cells each corner that is in the area must be in a picture, and so must the
-        // middle.
+        // Elsewhere corners outside the area are marked as shown; all other corners, and the
+        // centre, must be in some picture.
         let mut corners: Vec<bool> = match whole {
             true => vec![false; (columns + 1) * (rows + 1)],
             false => self
@@ -333,7 +341,7 @@ impl CoverageCells {
         for picture in pictures {
             let (time, place) = (picture.t_s, self.to_lane_frame(&picture.position.xy()));
             let half = self.half_footprint(planned, &picture);
-            // Corners in the picture; a rounding beyond it is in it.
+            // Range of cell corners in the picture; 1e-3 cell of tolerance absorbs rounding.
             let range = |axis: usize, most: usize| {
                 let from = (place[axis] - half[axis] - self.low[axis]) / self.side;
                 let to = (place[axis] + half[axis] - self.low[axis]) / self.side;
@@ -350,7 +358,7 @@ impl CoverageCells {
                 let middle = self.low[axis] + (index as f64 + 0.5) * self.side;
                 (middle - place[axis]).abs() <= half[axis]
             };
-            // Cells of which a corner is new: one more each way where other pictures show the rest.
+            // Cells that the picture shows whole; without `whole`, also those it shows in part.
             let more = i64::from(!whole);
             let mut new = 0;
             for row in (r0 - more).max(0)..(r1 + more).min(rows as i64) {

@@ -1,11 +1,11 @@
-//! Flights as ground stations read them: QGroundControl `.plan`, `.waypoints` (QGC WPL 110), CSV
-//! and GeoJSON.
+//! Flights in the formats of ground stations: QGroundControl `.plan`, `.waypoints` (QGC WPL 110),
+//! CSV and GeoJSON.
 //!
-//! A flight is NAV_DELAY (93) where it leaves later than others, NAV_TAKEOFF (22), DO_CHANGE_SPEED
-//! (178), waypoints (16), the camera's trigger, and NAV_RETURN_TO_LAUNCH (20) above the pad.
-//! Heights are relative to the vehicle's home (frame 3), so that neither map nor geoid matters;
-//! terrain is relative to the vehicle's home too, as the height map has both. Between both ends of
-//! a lane nothing is written where the autopilot triggers by distance.
+//! A flight consists of NAV_DELAY (93) if the vehicle departs later than others, NAV_TAKEOFF (22),
+//! DO_CHANGE_SPEED (178), NAV_WAYPOINT (16) with the camera's trigger, and NAV_RETURN_TO_LAUNCH
+//! (20) above the pad. Altitudes are relative to the vehicle's home (frame 3), so that errors of
+//! maps and geoid cancel; over terrain too, since the height map holds home and ground alike. With
+//! trigger by distance only the two ends of a lane become waypoints.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -26,21 +26,23 @@ const NAV_DELAY: u16 = 93;
 const DO_CHANGE_SPEED: u16 = 178;
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
-/// MAV_FRAME_GLOBAL_RELATIVE_ALT: frame of an item that has a place.
+/// MAV_FRAME_GLOBAL_RELATIVE_ALT: frame of a mission item that has a position.
 const FRAME_RELATIVE: u8 = 3;
-/// MAV_FRAME_MISSION: frame of an item without a place.
+/// MAV_FRAME_MISSION: frame of a mission item without a position.
 const FRAME_MISSION: u8 = 2;
 
-/// One item of a mission.
+/// One MAVLink mission item.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Item {
-    /// MAV_CMD.
+    /// Command: a MAV_CMD number.
     pub command: u16,
-    /// MAV_FRAME.
+    /// Coordinate frame: a MAV_FRAME number.
     pub frame: u8,
-    /// Parameters 1 to 4; none is NaN, "as it is".
+    /// Parameters 1 to 4. `None` becomes null (NaN: the current value) in `.plan`, and 0 in
+    /// `.waypoints`.
     pub params: [Option<f64>; 4],
-    /// Latitude, longitude, metres above home; zeros where the item has no place.
+    /// Latitude and longitude, degrees, and metres above home; zeros where the item has no position
+    /// (parameter 5 of commands stands in the first).
     pub place: [f64; 3],
 }
 
@@ -50,13 +52,15 @@ impl Item {
     }
 }
 
-/// The place where a vehicle stands.
+/// Home position of a route's vehicle, WGS84: its start in the scenario, with the altitude of the
+/// ground there.
 fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
     Geodetic { alt_m: planned.wanted.origin.alt_m + f64::from(start.z), ..planned.geodetic(&start) }
 }
 
-/// Which lane is flown at a stop and which way a vehicle looks there, degrees from north.
+/// Yaw commanded at stop `index`, degrees clockwise from north, rounded to 0.01: the lanes' common
+/// direction, or, with [`HeadingRule::Lane`], the direction of flight along the stop's lane.
 fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
     let along = planned.tracks.lane_direction();
     let sweep = heading_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
@@ -75,7 +79,7 @@ fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
     f64::from((yaw * 100.0).round() / 100.0)
 }
 
-/// All items of a flight.
+/// All mission items of one flight, from its delay and take-off to the return.
 pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item> {
     let (scenario, route) = (planned.scenario, &sortie.route);
     let home = home_position(planned, route);
@@ -118,7 +122,7 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
             (StopAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
                 items.push(Item::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
-                // Parameter 5 asks for a picture.
+                // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
                 if let Some(last) = items.last_mut() {
                     last.place[0] = 1.0;
                 }
@@ -134,14 +138,14 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
                     let step = next.map_or(planned.wanted.spacing.waypoint_m, |next| {
                         (next.position - stop.position).xy().norm()
                     });
-                    // The first picture at once, the others each so far from the last.
+                    // Takes a picture at once, then one each `step` metres.
                     let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
                     items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
-                    // The last one at once too: autopilots look some times a second, and by then
-                    // are past the distance, so that pictures are a little further apart than asked
-                    // for, and the last would be behind the end.
+                    // Takes the last picture at once and stops the trigger. Autopilots check the
+                    // distance some times a second, so pictures are a little further apart than
+                    // `step`, and the last one would otherwise lie beyond the lane's end.
                     items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
                 }
             }
@@ -155,7 +159,7 @@ fn round_to(value: f64, by: f64) -> f64 {
     (value * by).round() / by
 }
 
-/// A QGroundControl plan.
+/// The mission of one flight as a QGroundControl `.plan` document (JSON).
 pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Value {
     let home = home_position(planned, route);
     let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
@@ -202,7 +206,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Va
     })
 }
 
-/// The mission as `.waypoints`: one item a line, the home first.
+/// The mission of one flight as `.waypoints` text: one item a line, home first.
 pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> String {
     let home = home_position(planned, route);
     let mut text = "QGC WPL 110\n".to_owned();
@@ -229,8 +233,8 @@ pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> S
     text
 }
 
-/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in
-/// both frames, sortie, the ground there.
+/// A CSV table with every stop of every flight: vehicle, order, time, action, waypoint number where
+/// a picture is taken, WGS84 and ENU position, sortie, and height of the ground there.
 pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
     let mut text =
         "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n"
@@ -261,7 +265,8 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
     text
 }
 
-/// The area, its zones and every vehicle's lanes, for maps.
+/// GeoJSON features: the rings of the area, its holes and no-fly zones, and a line along the lanes
+/// of each flight.
 pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
     let place = |x: f32, y: f32| {
         let place = planned.geodetic(&Point::new(x, y, 0.0));

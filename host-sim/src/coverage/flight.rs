@@ -1,8 +1,9 @@
-//! The flight of one vehicle: up to its layer, over to the first waypoint, down, along the lanes,
-//! up, home, down.
+//! The stops of one vehicle's flight: up to its layer, over to the first waypoint, down, along the
+//! lanes, up, home in its layer, down.
 //!
-//! Metres, ENU in the mission frame. The height of the pictures is above the mission's origin, or
-//! above terrain: then lanes and the ways between them have corners where they rise and fall.
+//! Metres, ENU in the mission frame. Over level ground all pictures are at one height above the
+//! mission's origin. Over terrain, lanes and the ways between them have corners where they rise and
+//! fall.
 
 use std::convert::Infallible;
 
@@ -14,44 +15,44 @@ use planner_core::coverage::pack::Route;
 use super::{CoveragePlan, MAX_CORNERS};
 use crate::scenario::coverage::Trigger;
 
-/// A corner within this distance of a picture is at the picture's place, metres.
+/// A corner of the path within this distance of a picture is at the picture's position, metres.
 const SAME_PLACE_M: f32 = 0.01;
 
-/// Action of a vehicle at a stop.
+/// Action of a vehicle at a stop of its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopAction {
     /// The vehicle stands on its pad.
     Pad,
-    /// The vehicle passes in its layer.
+    /// The vehicle passes at the height of its layer.
     Transit,
-    /// The vehicle comes down to the lanes, or is about to leave them; no picture.
+    /// The vehicle passes at the height of the lanes, on a lane or between two, without a picture.
     Lane,
-    /// The vehicle takes a picture: the waypoint of this number.
+    /// The vehicle takes the picture of the waypoint of this number.
     Photo(u32),
 }
 
-/// A point of a flight.
+/// A point that a flight passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// Where.
+    /// Position, metres ENU.
     pub position: Point,
     /// Action at the stop.
     pub act: StopAction,
-    /// The lane it lies on, where it does.
+    /// Index of the lane that the stop lies on; `None` outside lanes.
     pub lane: Option<u16>,
 }
 
-/// One vehicle's flight: its stops, and when it passes each.
+/// The flight of one vehicle: its stops, and the time at which it passes each.
 pub struct TimedFlight<'a> {
-    /// MAVLink system id.
+    /// MAVLink system id of the vehicle.
     pub vehicle: u8,
-    /// The stops.
+    /// The stops, in the order of flight.
     pub stops: &'a [Stop],
-    /// Seconds.
+    /// Time at which each stop is passed, seconds after the mission's start.
     pub times_s: &'a [f32],
 }
 
-/// The whole flight of a route, from pad to pad.
+/// All stops of a route's flight, from pad to pad.
 pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
     let (vehicle, pad) = {
         let index = usize::from(route.vehicle);
@@ -83,7 +84,7 @@ pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
     stops
 }
 
-/// The lanes of a route and the ways between them.
+/// Appends the stops on the lanes of a route and on the ways between them.
 fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Stop>) {
     let numbers: Vec<u32> = route.waypoints().collect();
     let mut here: Option<Point> = None;
@@ -115,7 +116,8 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
     }
 }
 
-/// Start of the first lane.
+/// Point where the vehicle begins its first lane: at the height of the pictures, or over terrain at
+/// the height from which the lane has the fewest corners.
 fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Point {
     match &planned.following {
         Some(following) => following.start_point(begin, end),
@@ -123,7 +125,8 @@ fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Poi
     }
 }
 
-/// The corners of a straight way from a point above the ground, the last of them its end.
+/// Corners of the straight leg from `from` to above `to`, which is the last of them; over level
+/// ground there is no other.
 fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point> {
     let mut corners = Vec::new();
     let Some(following) = &planned.following else { return vec![Point::new(to.x, to.y, from.z)] };
@@ -137,7 +140,8 @@ fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point
     }
 }
 
-/// Pictures along a lane's path, and its corners between them.
+/// Appends the stops along one lane: its pictures, and corners of `path` (over terrain) between
+/// them.
 fn add_picture_stops(
     planned: &CoveragePlan<'_>,
     path: &[Point],
@@ -153,7 +157,7 @@ fn add_picture_stops(
         while leg + 2 < path.len() && along_m(&path[leg + 1].xy()) <= at_m + SAME_PLACE_M {
             leg += 1;
             let corner = path[leg];
-            // Where each picture is a waypoint, the corner is one already.
+            // With trigger by waypoint the stop of the picture already stands for this corner.
             if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
                 stops.push(Stop { position: corner, act: StopAction::Lane, lane });
             }
@@ -171,23 +175,23 @@ fn add_picture_stops(
     }
 }
 
-/// The corners of the way between two places.
+/// Corners of the shortest way around no-fly zones between two points; empty for a straight way.
 fn corners_between(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, MAX_CORNERS> {
     let mut corners = Fixed::new();
-    // The plan has a finite length, so there is a way between all that it joins.
+    // There is a way between any two points of a plan: its length was finite. So this never fails.
     if planned.transit.shortest_path(from, to, &mut corners).is_err() {
         corners.clear();
     }
     corners
 }
 
-/// Heading of a vehicle on a lane, degrees from north to the right, if it flies from `from` to
-/// `to`: the way it flies, or one of the two along the lanes.
+/// Course from `from` to `to`, degrees clockwise from north, 0 to 360.
 pub fn heading_deg(from: &Point, to: &Point) -> f32 {
     (to.x - from.x).atan2(to.y - from.y).to_degrees().rem_euclid(360.0)
 }
 
-/// Times at which each stop is passed, seconds from the start: at cruise speed, without turns.
+/// Time at which each stop is passed, seconds after the departure: at cruise speed and the
+/// vehicle's climb and descent speeds, without braking at corners.
 pub fn stop_times_s(planned: &CoveragePlan<'_>, route: &Route, stops: &[Stop]) -> Vec<f32> {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
     let mut time_s = 0.0;

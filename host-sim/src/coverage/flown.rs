@@ -1,4 +1,4 @@
-//! A coverage flight: what its pictures show.
+//! Checks the pictures of a coverage mission that was flown.
 
 use planner_core::plan::SwarmPlan;
 
@@ -8,19 +8,20 @@ use crate::report::{Outline, Plot};
 use crate::result::CoverageResult;
 use crate::scenario::Scenario;
 
-/// Findings about a flight.
+/// Result of checking the pictures of a flight.
 pub struct FlightFindings {
-    /// The part of `result.json` about the coverage.
+    /// The coverage section of `result.json`.
     pub result: CoverageResult,
-    /// Borders of the area.
+    /// Borders of the area, its holes and no-fly zones, for the report page.
     pub outlines: Vec<Outline>,
-    /// Share of the area that is photographed, over time.
+    /// Curve of the share of the area that is photographed, over time.
     pub plot: Plot,
-    /// Whether no part of the area was left out.
+    /// Whether every cell of the area that counts is photographed.
     pub complete: bool,
 }
 
-/// Judges the pictures of a flight of this scenario by this plan.
+/// Checks the pictures that were taken in a flight of this scenario. Departures in the result are
+/// those of `plan`, which was flown.
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].

@@ -1,41 +1,42 @@
-//! The checker's part on heights: the ground is the height map itself, not the field that the
-//! planner follows.
+//! Checks the heights of flights above terrain. The ground is the height map itself, not the field
+//! that planned paths follow.
 
 use planner_core::Point;
 
 use super::CoveragePlan;
 use super::flight::{Stop, StopAction, TimedFlight};
 
-/// Greatest distance between the height samples of a leg, metres; over fine maps a quarter of a
-/// cell.
+/// Greatest spacing of the height samples along a leg, metres; a quarter of a cell of the height
+/// map where that is less.
 const MAX_SAMPLE_SPACING_M: f32 = 1.0;
-/// Rounding of a height, metres.
+/// Tolerance for the rounding of heights, metres.
 const HEIGHT_ROUNDING_M: f32 = 0.02;
 
-/// Findings about the heights above terrain.
+/// Heights and slopes of flights above terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightFindings {
-    /// The least height of lanes and of ways between them above the ground, metres.
+    /// Least height of lanes and of the ways between them above the ground, metres.
     pub least_m: f32,
-    /// The greatest.
+    /// Greatest height of lanes and of the ways between them above the ground, metres.
     pub most_m: f32,
-    /// The steepest of them, metres for each metre over ground.
+    /// Steepest lane or way between lanes, metres of height per metre over ground.
     pub steepest: f32,
-    /// Legs, above pads or not, that come nearer to the ground than the height of the pictures.
+    /// Number of legs, transits in layers included, that are lower above the ground than the height
+    /// of the pictures; vertical legs above pads are left out.
     pub too_low: u64,
-    /// Lanes and ways between that are steeper than their vehicle climbs or descends at cruise
-    /// speed.
+    /// Number of lanes and ways between them that are steeper than their vehicle climbs or descends
+    /// at cruise speed.
     pub too_steep: u64,
 }
 
 impl HeightFindings {
-    /// Whether the check found no fault.
+    /// Whether no leg is too low and no lane or way between lanes is too steep.
     pub fn is_clean(&self) -> bool {
         self.too_low + self.too_steep == 0
     }
 }
 
-/// Checks flights against the ground; none where it is level.
+/// Checks the heights of flights above the ground; `None` over level ground.
 pub fn check_heights(
     planned: &CoveragePlan<'_>,
     flights: &[TimedFlight<'_>],
@@ -77,7 +78,7 @@ pub fn check_heights(
     Some(findings)
 }
 
-/// The least and the greatest height of a leg above the ground.
+/// Least and greatest height of a leg above the ground, metres.
 fn height_range_above_ground(
     planned: &CoveragePlan<'_>,
     from: &Point,
@@ -93,7 +94,8 @@ fn height_range_above_ground(
     heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], h| [least.min(h), most.max(h)])
 }
 
-/// Whether a stop lies on a lane or on a way between two.
+/// Whether a stop is at the height of the lanes: on a lane or on the way from one lane to the next,
+/// not on a transit in a layer.
 pub fn is_on_lane_or_transit(stop: &Stop) -> bool {
     matches!(stop.act, StopAction::Photo(_) | StopAction::Lane)
 }

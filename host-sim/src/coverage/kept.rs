@@ -1,4 +1,5 @@
-//! The pictures of earlier flights of a mission, beside the flashes of its companions.
+//! Keeps the pictures of earlier flights of a mission in a file beside the flash images of its
+//! companions, so that coverage is judged over all flights.
 
 use std::path::{Path, PathBuf};
 
@@ -9,23 +10,23 @@ use super::check::Picture;
 use crate::files::{self, ResultFiles};
 use crate::quote::quoted_path;
 
-/// File that keeps the pictures taken.
+/// Name of the file with the pictures taken so far.
 const NAME: &str = "pictures.json";
 
-/// Time, place and heading of a picture.
+/// Time, seconds; east, north and up, metres; heading, radians: one picture in the file.
 type PictureRow = [f32; 5];
 
-/// Store of the pictures.
+/// The file of pictures, and the pictures that earlier flights left in it.
 pub struct PictureStore {
     path: PathBuf,
     before: Vec<Picture>,
 }
 
 impl PictureStore {
-    /// Reads those of earlier flights from a directory, if there were any.
+    /// Reads the pictures of earlier flights from a directory; none if the file does not exist.
     ///
     /// # Errors
-    /// The file cannot be read, or is none of these.
+    /// The file cannot be read, or holds no list of pictures.
     pub fn open(dir: &Path) -> anyhow::Result<Self> {
         let path = dir.join(NAME);
         let mut before = Vec::new();
@@ -33,7 +34,7 @@ impl PictureStore {
             let bad = || format!("no pictures of earlier flights: {}", quoted_path(&path));
             let text = files::read(&path, files::BINARY_BYTES).with_context(bad)?;
             let rows: Vec<PictureRow> = serde_json::from_slice(&text).with_context(bad)?;
-            // Before this flight began.
+            // Pictures of earlier flights count as taken at time 0, before this flight.
             let picture = |[_, x, y, z, heading]: PictureRow| Picture {
                 vehicle: None,
                 t_s: 0.0,
@@ -45,13 +46,13 @@ impl PictureStore {
         Ok(Self { path, before })
     }
 
-    /// Adds those of earlier flights.
+    /// Inserts the pictures of earlier flights before those of this flight.
     pub fn add_to(&self, pictures: &mut Vec<Picture>) {
         pictures.splice(..0, self.before.iter().copied());
     }
 
-    /// Keeps all pictures for the next flight; none where the area is whole, which is begun again
-    /// then.
+    /// Writes all pictures to the file for the next flight. Once the area is `whole` it writes
+    /// none: the next flight then photographs it from the beginning.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,7 +1,7 @@
-//! Coverage on the desk: from a scenario to each vehicle's flight.
+//! Coverage missions on the desk: from a scenario to each vehicle's flight.
 //!
-//! `planner_core::coverage` plans; this lends it memory, turns routes into flights ([`flight`]),
-//! writes them for ground stations ([`export`]) and checks what came out ([`check`]).
+//! `planner_core::coverage` plans in memory that this module provides. Its routes become flights
+//! ([`flight`]), which are exported for ground stations ([`export`]) and checked ([`check`]).
 
 pub mod check;
 pub mod export;
@@ -37,25 +37,27 @@ use crate::area::MAX_VERTICES;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
 
-/// Changes of the lanes' order that the desk tries.
+/// Most changes of the lanes' order that the desk tries while it shortens the path.
 pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
 
-/// Greatest distance of a start above or below the ground, metres.
+/// Greatest height of a start above or below the ground, metres.
 const MAX_OFF_GROUND_M: f32 = 1.5;
 
-/// A sortie, its stops, and when each is passed, seconds.
+/// A sortie, its stops, and the time at which each stop is passed, seconds after the mission's
+/// start.
 pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
 
 impl<'a> CoveragePlan<'a> {
-    /// Plans a mission.
+    /// Plans the coverage mission of a scenario by the given method.
     ///
     /// # Errors
-    /// There is no plan: why, and where in the scenario.
+    /// No plan was found; the error says why, and names the place in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
         Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
     }
 
-    /// The plan as companions make it: they compare no more orders of the lanes than a board can.
+    /// Plans as companions do: with the scenario's method and as few changes of the lanes' order as
+    /// a board tries.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -138,8 +140,9 @@ impl<'a> CoveragePlan<'a> {
         Ok(planned)
     }
 
-    /// Latitude and longitude of a place of the plan. Heights are above the ground there, not above
-    /// the plane that touches the earth at the origin: 100 km away that plane is 780 m up.
+    /// Latitude and longitude of a point of the plan, taken at the origin's altitude; `place.z` is
+    /// not used. ENU heights cannot be used far away: the plane that touches the earth at the
+    /// origin is 780 m above the ground 100 km away.
     pub fn geodetic(&self, place: &Point) -> Geodetic {
         let origin = &self.wanted.origin;
         let mut up_m = 0.0;
@@ -151,7 +154,8 @@ impl<'a> CoveragePlan<'a> {
         found
     }
 
-    /// Each sortie with its stops, and when they are passed.
+    /// The flight of each sortie: its stops, and the time at which each is passed, seconds after
+    /// the mission's start.
     pub fn flights(&self) -> Vec<Flight> {
         let flight = |sortie: &Sortie| {
             let stops = flight::route_stops(self, &sortie.route);
@@ -162,29 +166,29 @@ impl<'a> CoveragePlan<'a> {
         self.sorties.iter().map(flight).collect()
     }
 
-    /// The sorties of a route, in the order in which they are flown.
+    /// The sorties of a route's vehicle, in the order in which they are flown.
     pub fn sorties_of(&self, route: &Route) -> impl Iterator<Item = &Sortie> {
         self.sorties.iter().filter(|sortie| sortie.route.vehicle == route.vehicle)
     }
 
-    /// Cost of a route with all its sorties and the swaps between them, seconds.
+    /// Cost of a route: all its sorties and the battery swaps between them, seconds.
     pub fn cost_s(&self, route: &Route) -> f32 {
         let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
         self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>()
             + swaps * BATTERY_SWAP_S
     }
 
-    /// Cost of a route without the swaps, metres.
+    /// Cost of a route: the lengths of all its sorties, metres.
     pub fn cost_m(&self, route: &Route) -> f32 {
         self.sorties_of(route).map(|sortie| sortie.route.cost_m).sum()
     }
 
-    /// The largest of these costs, seconds.
+    /// The largest cost of a route, seconds.
     pub fn max_cost_s(&self) -> f32 {
         self.plan.routes.iter().map(|route| self.cost_s(route)).fold(0.0, f32::max)
     }
 
-    /// All sorties, by round.
+    /// Cuts each route into sorties that a battery lasts for; sorted by round.
     fn cut_into_sorties(&self) -> anyhow::Result<Vec<Sortie>> {
         let mut sorties = Vec::new();
         for route in &self.plan.routes {
@@ -217,7 +221,8 @@ impl<'a> CoveragePlan<'a> {
         Ok(sorties)
     }
 
-    /// In each round no vehicle leaves before it keeps the separation to the others.
+    /// Delays the departures of each round until planned flights keep the separation from each
+    /// other; sets the times of the rounds.
     fn set_departures(&mut self) -> anyhow::Result<()> {
         let flights = self.flights();
         let separation_m = self.scenario.deconfliction.separation_m;
@@ -247,8 +252,8 @@ impl<'a> CoveragePlan<'a> {
         Ok(())
     }
 
-    /// No vehicle is sent out of the geofence: companions, and autopilots that have it, would land
-    /// there.
+    /// Refuses a plan in which a vehicle would leave the geofence: companions, and autopilots with
+    /// that fence, would land there.
     fn check_fence(&self) -> anyhow::Result<()> {
         let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
         for sortie in &self.sorties {
@@ -270,8 +275,8 @@ impl<'a> CoveragePlan<'a> {
         Ok(())
     }
 
-    /// A sortie for each route. Nobody is sent out for longer than its battery lasts, where that is
-    /// known.
+    /// One sortie for each route. Refuses a route that takes longer than the usable share of its
+    /// vehicle's `endurance_s`, where the scenario gives one.
     fn one_sortie_per_route(&self) -> anyhow::Result<Vec<Sortie>> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
@@ -292,10 +297,11 @@ impl<'a> CoveragePlan<'a> {
     }
 }
 
-/// Companions start within 2 m of where they are to: on the ground.
+/// Checks that every vehicle starts at most 1.5 m above or below the ground: with a greater error
+/// of its height a companion does not take off.
 ///
 /// # Errors
-/// A vehicle does not stand there, by name.
+/// A vehicle starts too far above or below the ground; the error names it.
 pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
     let above_m =
@@ -313,7 +319,7 @@ pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// No vehicle starts inside a no-fly zone.
+/// Checks that no vehicle starts inside a no-fly zone.
 fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> anyhow::Result<()> {
     if let Some(index) = vehicles.iter().position(|vehicle| area.is_in_no_fly_zone(&vehicle.place))
     {
@@ -326,7 +332,7 @@ fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> a
     Ok(())
 }
 
-/// A vehicle as the planner sees it.
+/// The planner's description of a vehicle: pad, speeds and weight.
 fn planner_vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
     let [climb_mps, descend_mps] = vehicle.climbs_mps();
@@ -340,14 +346,14 @@ fn planner_vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> V
     }
 }
 
-/// Least share of the path, metres: far below any spacing of waypoints.
+/// Least share of the path for one vehicle, metres: far below any spacing of waypoints.
 const MIN_SHARE_M: f32 = 1e-3;
 
-/// Divides the path by a method. Returns the shares by which companions divide it in the same way,
-/// if there are some.
+/// Divides the path among vehicles by a method. Returns the shares by which BINPAT makes the same
+/// division on companions; `None` if there are none.
 ///
 /// # Errors
-/// As the method.
+/// As the method's planner.
 pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     method: Method,
@@ -380,9 +386,9 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
     }
 }
 
-/// Shares by which BINPAT cuts the path as the exact division does, where the vehicles that it then
-/// gives the parts to take no longer: that plan is the exact one from then on. Companions plan by
-/// shares alone, so none means that they cannot plan it.
+/// Shares with which BINPAT cuts the path where the exact division does; `exact` then becomes
+/// BINPAT's plan. `None` if BINPAT's assignment of the parts to vehicles takes longer: companions
+/// plan by shares alone, so they cannot fly the exact plan.
 fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     exact: &mut Plan<K>,
@@ -391,7 +397,7 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     let mut packed_m = 0.0;
     for (share, route) in shares.iter_mut().zip(&exact.routes) {
         let end_m = work.tracks.distance_to_waypoint_m(route.end - 1);
-        // A bin without length would hold nothing: the first waypoint alone has none.
+        // A share of length 0 would get no waypoint, but the path's first waypoint alone has length 0.
         *share = (end_m - packed_m).max(MIN_SHARE_M);
         packed_m = end_m;
     }
@@ -409,7 +415,7 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     Ok(Some(shares))
 }
 
-/// Reason why there is no plan, for a person.
+/// The error text for a coverage plan that failed, with the place in the scenario.
 fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> anyhow::Error {
     let place = &wanted.place;
     let why = match error {

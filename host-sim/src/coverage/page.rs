@@ -1,4 +1,5 @@
-//! The report of a coverage plan: area and routes in the scene, cells photographed over time.
+//! Data of the report page of a coverage plan: area and routes in the 3D scene, share photographed
+//! over time.
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -9,10 +10,10 @@ use super::flight::Stop;
 use super::{CoveragePlan, Flight, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
-/// Spacing of the points of a height profile, metres.
+/// Spacing of the points of a height profile along a path, metres.
 const PROFILE_SPACING_M: f32 = 5.0;
 
-/// Data of the report page.
+/// All data of the report page of a coverage plan.
 pub fn report_data(
     planned: &CoveragePlan<'_>,
     flights: &[Flight],
@@ -51,7 +52,7 @@ pub fn report_data(
     }
 }
 
-/// The share photographed, and above terrain the heights.
+/// Plots of the share photographed and, over terrain, of the heights.
 fn coverage_plots(
     planned: &CoveragePlan<'_>,
     flights: &[Flight],
@@ -64,7 +65,8 @@ fn coverage_plots(
     plots
 }
 
-/// Heights along each path, and of the ground below it.
+/// Plot with two curves for each flight: the height of its path and that of the ground below it,
+/// metres, over time.
 fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Plot {
     let mut curves = Vec::new();
     for (sortie, stops, times_s) in flights {
@@ -91,7 +93,7 @@ fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Plot {
     Plot { title: "Height along the path".to_owned(), unit: "m".to_owned(), limit: None, curves }
 }
 
-/// Borders of the area.
+/// Outlines of the area, its holes and no-fly zones, at the height of the ground.
 pub(super) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
     let kinds = [
         (RingKind::Outer, OutlineKind::Area),
@@ -106,7 +108,7 @@ pub(super) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
     kinds.into_iter().flat_map(shown).collect()
 }
 
-/// Share of the area that pictures show, over time.
+/// Plot of the share of the area that pictures show, per cent, over time.
 pub(super) fn photographed_share_plot(findings: &Findings) -> Plot {
     let mut cells = 0;
     let mut curve = Curve { name: "photographed".to_owned(), ..Curve::default() };

@@ -1,4 +1,5 @@
-//! Who photographs what, for the page: the parts of the plan, and of each division after a loss.
+//! Data for the report page: which vehicle photographs which waypoints, in the plan and after each
+//! new division.
 
 use std::collections::BTreeMap;
 
@@ -16,10 +17,10 @@ use crate::report::{CoverageLayers, Division, Footprint, Part, Taken};
 use crate::swarm::Flight as Flown;
 use crate::swarm::divisions::Division as Begun;
 
-/// Vehicle of each waypoint.
+/// Id of the vehicle that photographs a waypoint, by waypoint number.
 type WaypointOwners = BTreeMap<u32, u8>;
 
-/// Data of the report page about a plan.
+/// Coverage data of the report page for a plan that was not flown.
 pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[Flight]) -> CoverageLayers {
     let mut parts: Vec<Part> = Vec::new();
     for (sortie, stops, _) in flights {
@@ -43,10 +44,11 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Coverag
     coverage_layers(planned, divisions, pictures)
 }
 
-/// Data of the report page about a flight: its plan and the plan's fate, and its pictures.
+/// Coverage data of the report page for a flight: the planned division, each later division, and
+/// the pictures taken.
 ///
 /// # Errors
-/// A division that cannot be planned here, though companions did.
+/// A division that companions made cannot be planned here.
 pub fn flown_layers(
     planned: &CoveragePlan<'_>,
     mission: &Mission,
@@ -61,8 +63,8 @@ pub fn flown_layers(
         (WaypointOwners::new(), Vec::new(), Vec::<&[DivisionInput]>::new());
     let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, lots: Vec::new(), plan_crc: 0 };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
-        // Other vehicles fly the same later; a division whose inputs no vehicle reported cannot be
-        // planned here.
+        // Skipped: a division already shown, which another vehicle begins to fly later, or one
+        // whose inputs no vehicle reported, which cannot be planned here.
         if usize::from(division.number) != shown.len()
             || (division.number > 0 && division.lots.is_empty())
         {
@@ -135,7 +137,7 @@ fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
     owners
 }
 
-/// Waypoints that changed hands.
+/// Numbers of waypoints that went from one vehicle to another, by pair of vehicles.
 fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<Taken> {
     let mut counts = BTreeMap::<(u8, u8), u32>::new();
     for (number, to) in now {

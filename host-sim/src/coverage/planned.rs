@@ -1,4 +1,4 @@
-//! What a coverage plan holds.
+//! A planned coverage mission and its sorties.
 
 use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::{Plan, Route, Vehicle};
@@ -11,65 +11,64 @@ use crate::scenario::coverage::{self, Method};
 
 /// Most vehicles of a coverage mission.
 pub const MAX_VEHICLES: usize = 32;
-/// Most lanes on the desk.
+/// Most lanes over an area that the desk plans.
 pub const MAX_LANES: usize = 8192;
-/// Most outward corners of no-fly zones on the desk.
+/// Most outward corners of no-fly zones that the desk plans around.
 pub const MAX_CORNERS: usize = 256;
 
-/// Flight of a vehicle on one battery.
+/// One flight of a vehicle on one battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sortie {
-    /// The sortie's part of the vehicle's route.
+    /// The part of the vehicle's route that this sortie flies.
     pub route: Route,
-    /// Which one of its vehicle, from 1; also its round.
+    /// Number of this sortie among its vehicle's, from 1; also the number of its round.
     pub number: u16,
-    /// Number of sorties of the vehicle.
+    /// Total number of sorties of the vehicle.
     pub of: u16,
-    /// When its round begins, seconds.
+    /// Time at which the round of this sortie begins, seconds after the mission's start.
     pub begin_s: f32,
-    /// When it leaves its pad, seconds after that.
+    /// Time at which the vehicle leaves its pad, seconds after the round begins.
     pub depart_s: f32,
-    /// Time from pad to pad, seconds.
+    /// Time from leaving the pad to landing on it, seconds.
     pub flown_s: f32,
 }
 
 impl Sortie {
-    /// When its vehicle has landed, seconds.
+    /// Time at which the vehicle has landed, seconds after the mission's start.
     pub fn end_s(&self) -> f32 {
         self.begin_s + self.depart_s + self.flown_s
     }
 }
 
-/// A planned coverage mission.
+/// A planned coverage mission: its lanes, routes, sorties and figures.
 pub struct CoveragePlan<'a> {
-    /// Scenario of the plan.
+    /// The scenario that was planned.
     pub scenario: &'a Scenario,
-    /// Section `[area]` of the scenario.
+    /// Section `[area]` of the scenario, with settings of the plan.
     pub wanted: &'a coverage::Area,
-    /// Surface that vehicles follow above terrain.
+    /// Surface that paths follow over terrain; `None` over level ground.
     pub following: Option<TerrainFollowing<'a>>,
-    /// Area of the plan.
+    /// The area's rings, checked.
     pub area: Area<'a>,
-    /// How work was divided.
+    /// Method by which the path was divided among vehicles.
     pub method: Method,
-    /// Vehicles as the planner sees them, in the scenario's order.
+    /// The planner's description of each vehicle, in the scenario's order.
     pub vehicles: Vec<Vehicle>,
-    /// The lanes.
+    /// All lanes, in the order of the path.
     pub tracks: Box<Tracks<MAX_LANES>>,
-    /// Ways around no-fly zones.
+    /// Shortest ways around no-fly zones.
     pub transit: Box<Transit<'a, MAX_CORNERS>>,
-    /// The routes.
+    /// Routes of the vehicles that fly, in the order of the path.
     pub plan: Plan<MAX_VEHICLES>,
-    /// The shares W that they are packed by, one a vehicle; none where they follow from nothing of
-    /// the kind.
+    /// The shares W by which companions divide the path into these routes, one a vehicle; `None` if
+    /// no shares give this plan.
     pub shares: Option<Vec<f32>>,
-    /// No division can end before, seconds.
+    /// Lower bound on the largest cost of any division of this path, seconds.
     pub lower_bound_s: f32,
-    /// Sorties of the vehicles, one for each battery, by round; without `batteries` each sortie is
-    /// a whole route.
+    /// All sorties, by round: one for each battery; without `batteries` one for each route.
     pub sorties: Vec<Sortie>,
-    /// The least distance between two vehicles, as planned; infinite for one.
+    /// Least planned distance between two vehicles, metres; infinite for a single vehicle.
     pub least_separation_m: f32,
-    /// Computing time of lanes, transits and routes, seconds.
+    /// Computing times of lanes, of ways around no-fly zones, and of routes, seconds.
     pub seconds: [f64; 3],
 }

@@ -1,4 +1,4 @@
-//! What `result.json` says of an area.
+//! The coverage section of `result.json`.
 
 use planner_core::coverage::pack::Route;
 
@@ -7,7 +7,7 @@ use super::check::Findings;
 use super::sorties::Sortie;
 use crate::result::{CoverageResult, RouteResult, SortieResult, TerrainResult, rounded};
 
-/// The plan, and what was found of its pictures.
+/// The coverage section from a plan and the check of its pictures.
 pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &Findings) -> CoverageResult {
     let routes = &planned.plan.routes;
     let max_cost_s = planned.max_cost_s();
@@ -66,7 +66,7 @@ fn route_results(planned: &CoveragePlan<'_>) -> Vec<RouteResult> {
     planned.plan.routes.iter().map(route).collect()
 }
 
-/// Mean, and the sample's standard deviation: 0 for one value.
+/// Mean and sample standard deviation; the deviation of a single value is 0.
 fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count.max(1.0);

@@ -1,35 +1,36 @@
-//! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up
-//! and down. The vehicle that flies longest leaves first; each other one leaves as soon as it keeps
-//! the separation to all before it, as planned.
+//! Departure times of the planned flights of a coverage mission. Routes of two vehicles may meet at
+//! a waypoint, and transits cross the climbs and descents of others. The vehicle that flies longest
+//! departs first; each other departs as soon as its planned flight keeps the separation from all
+//! flights that are already timed.
 //!
-//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights
-//! deviate from that: on board the safety filter is what keeps vehicles apart, and this only keeps
-//! it from having to.
+//! Planned positions are compared every [`COMPARISON_STEP_S`], at cruise speed without braking at
+//! corners. Real flights deviate from that: on board the safety filter keeps vehicles apart, and
+//! these departures only make it seldom necessary.
 
 use planner_core::Point;
 
 use super::flight::Stop;
 
-/// Time between two comparisons of the vehicles' places, seconds.
+/// Time between two comparisons of the vehicles' planned positions, seconds.
 const COMPARISON_STEP_S: f32 = 0.25;
 /// Time between two departures that are tried, seconds.
 const DEPARTURE_STEP_S: f32 = 2.0;
-/// Horizontal distance from its pad up to which a vehicle is over its pad, metres.
+/// A vehicle within this horizontal distance of its pad is over its pad, metres.
 const OVER_PAD_M: f32 = 0.01;
-/// Longest wait of a vehicle on the ground, seconds.
+/// Latest departure that is tried, seconds.
 const MAX_GROUND_WAIT_S: f32 = 900.0;
 
-/// A flight as planned, from its own departure on.
+/// One planned flight; its times count from its own departure.
 pub struct DepartureFlight<'a> {
-    /// The stops.
+    /// Stops of the flight.
     pub stops: &'a [Stop],
-    /// When each is passed after the departure, seconds.
+    /// Time at which each stop is passed, seconds after the departure.
     pub times_s: &'a [f32],
 }
 
-/// Departures of all flights, seconds, and the least distance between any two vehicles, one of them
-/// in the air; infinite for one vehicle. None where no departure within [`MAX_GROUND_WAIT_S`] keeps
-/// the separation.
+/// Departure time of each flight, seconds, and the least distance between any two vehicles of which
+/// at least one has departed and not landed, metres; infinite for one vehicle. `None` if some
+/// flight has no departure within [`MAX_GROUND_WAIT_S`] that keeps the separation.
 pub fn plan_departures(
     flights: &[DepartureFlight<'_>],
     separation_m: f32,
@@ -63,7 +64,7 @@ pub fn plan_departures(
     ))
 }
 
-/// Place of a vehicle at each step of its flight.
+/// Positions of a vehicle every [`COMPARISON_STEP_S`] of its flight.
 fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
     let end_s = flight.times_s.last().copied().unwrap_or(0.0);
     let mut next = 1;
@@ -79,10 +80,10 @@ fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
     (0..=(end_s / COMPARISON_STEP_S).ceil() as usize).map(place).collect()
 }
 
-/// The least distance between two flights that begin with these delays, while one of them is in the
-/// air. None where it is less than the separation. Pads may be nearer than that, which nothing here
-/// can change: it is all that is kept while both vehicles are over theirs, or one stands on its
-/// own.
+/// Least distance between two flights with these departure delays (in steps), from the first
+/// departure to the last landing, metres. `None` where it is less than the separation. Pads may be
+/// nearer to each other than the separation: while both vehicles are over their pads, or one stands
+/// on its pad, only the distance of the pads is required.
 fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
     let at = |(track, delay): (&[Point], usize), step: usize| {
         track[step.saturating_sub(delay).min(track.len() - 1)]

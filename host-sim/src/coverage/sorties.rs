@@ -1,17 +1,18 @@
-//! Sorties: a route that takes longer than a battery lasts is cut between its lanes, and each part
-//! is flown from the pad and home again, in the route's layer.
+//! Cuts a route that takes longer than a battery lasts into sorties, between its lanes. Each sortie
+//! flies from the pad and back to it, in the route's layer.
 //!
-//! Of all cuts with the fewest sorties, the one that takes least time (dynamic programming over the
-//! lanes). A part costs no less than what it holds: ways are the shortest, so a detour over the pad
-//! never is. So the search for the first lane of a sortie ends at the first one that is too far
-//! back: n lanes, at most m a sortie: n · m.
+//! Of all cuts with the fewest sorties it takes the one with the least total time, by dynamic
+//! programming over the lanes. Adding a lane never shortens a sortie, since its ways are shortest
+//! ways. So the search backwards for a sortie's first lane ends at the first lane that is too far
+//! back: n · m steps for n lanes of which at most m fit into a sortie.
 //!
-//! Sorties are flown in rounds: the k-th of all vehicles begin together, [`BATTERY_SWAP_S`] after
-//! the last one of the round before is home. So departures keep vehicles apart, however long a swap
-//! really takes. Seconds, metres.
+//! Sorties are flown in rounds: the k-th sorties of all vehicles form a round, which begins
+//! [`BATTERY_SWAP_S`] after the last vehicle of the round before has landed. So departures keep
+//! vehicles apart within a round, however long a swap really takes. Units: seconds, metres.
 //!
-//! C_k has one climb and one descent and no turns, as in the paper. A battery has to last for what
-//! is flown: down to the lanes from the layer, up again, and turns from rest to rest, too.
+//! The paper's cost C_k has one climb and one descent and no turns. The battery has to last for
+//! what is really flown: also the descent from the layer to the lanes, the climb back, and turns
+//! from rest to rest.
 
 use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
@@ -22,12 +23,12 @@ use super::flight::StopAction;
 pub use super::planned::Sortie;
 use crate::scenario;
 
-/// Share of its charge that a vehicle uses before it lands (`FLK_BATT_LOW`).
+/// Share of its battery charge that a vehicle may use before it lands (`FLK_BATT_LOW`).
 pub const USABLE_CHARGE: f32 = 0.85;
-/// Time from a landing to the next start with another battery, seconds.
+/// Planned time from a landing to the next start with another battery, seconds.
 pub const BATTERY_SWAP_S: f32 = 120.0;
 
-/// The whole of a route.
+/// A single sortie that flies the whole route.
 pub(super) fn whole_route_sortie(planned: &CoveragePlan<'_>, route: Route) -> Sortie {
     Sortie {
         route,
@@ -39,12 +40,14 @@ pub(super) fn whole_route_sortie(planned: &CoveragePlan<'_>, route: Route) -> So
     }
 }
 
-/// How long a vehicle's battery lasts, seconds.
+/// Time that a vehicle hovers on a full battery, seconds; the simulator's default where the
+/// scenario gives none.
 pub fn battery_duration_s(vehicle: &scenario::Vehicle) -> f32 {
     vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
 }
 
-/// Time of a route from pad to pad, seconds: at cruise speed, from rest to rest on each leg across.
+/// Time of a route from pad to pad, seconds: at cruise speed, from rest to rest on each horizontal
+/// leg.
 pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let index = usize::from(route.vehicle);
     let (vehicle, heights) = (&planned.vehicles[index], planned.wanted.heights);
@@ -58,8 +61,8 @@ pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
 }
 
-/// Time of all climbs and descents where the ground rises and falls, as if each were flown alone,
-/// and of stops at the corners that follow the ground, seconds.
+/// Time of all climbs and descents of a flight over terrain, each as if flown alone, and of stops
+/// at the corners at which its path rises or falls, seconds.
 fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
     let stops = super::flight::route_stops(planned, route);
@@ -71,33 +74,33 @@ fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 
-/// Further time of stops at both ends of each lane, and over the pad, seconds: a lane, and a
-/// transit from or to the pad, is taken to be long enough for the cruise speed.
+/// Extra time of stops at both ends of each lane and above the pad, seconds. Lanes and transits
+/// from and to the pad are assumed long enough to reach cruise speed.
 fn turns_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let cruise_mps = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
     let [from, to] = [route.first, route.end - 1].map(|number| planned.tracks.lane_of(number));
     let lanes = (to - from + 1) as f32;
     let stop_s = cruise_mps / PLANNED_ACCEL_MPS2;
-    // The distance from one lane to the next may be too short for that.
+    // The way from one lane to the next may be too short to reach cruise speed.
     let step_m = planned.wanted.spacing.lane_m.min(cruise_mps * stop_s);
     let step_s = 2.0 * (step_m / PLANNED_ACCEL_MPS2).sqrt() - step_m / cruise_mps;
     (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
 }
 
-/// A lane that takes longer than a battery lasts.
+/// Error: a lane that takes longer than a battery lasts, flown alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneTooLong {
-    /// Index of the lane.
+    /// Index of the lane in the path.
     pub lane: usize,
-    /// There, along it and home, seconds.
+    /// Time from the pad to the lane, along it and home, seconds.
     pub takes_s: f32,
 }
 
-/// Cuts a route into as few parts as there can be that take at most `most_s` each, in the order in
+/// Cuts a route into the fewest parts that take at most `most_s` seconds each, in the order in
 /// which they are flown.
 ///
 /// # Errors
-/// A lane that takes longer alone.
+/// A single lane takes longer than `most_s`.
 pub fn cut_route(
     planned: &CoveragePlan<'_>,
     route: &Route,
@@ -108,7 +111,8 @@ pub fn cut_route(
     }
     let lanes = RouteLanes::new(planned, route);
     let count = lanes.ways_m.len();
-    // Sorties and seconds up to a lane, and where the last of these sorties begins.
+    // For each number of lanes: fewest sorties that fly them, their total time, seconds, and index
+    // of the first lane of the last of these sorties.
     let mut best = vec![(0u32, 0.0f64, 0usize)];
     for end in 1..=count {
         let parts = (0..end)
@@ -129,20 +133,21 @@ pub fn cut_route(
         parts.push(lanes.sub_route(first, end));
         end = first;
     }
-    // Now the last of the path comes first.
+    // The parts are now in reverse order along the path, which is the order of flight of a backward
+    // route.
     if route.end_waypoints().0 == route.first {
         parts.reverse();
     }
     Ok(parts)
 }
 
-/// The lanes of a route, each as far as it belongs to it.
+/// The lanes of a route, the first and the last of them possibly only in part.
 struct RouteLanes<'a> {
     planned: &'a CoveragePlan<'a>,
     route: &'a Route,
-    /// The first waypoint of each, and what follows the last one.
+    /// First waypoint of each lane within the route, and the end of the route (exclusive).
     bounds: Vec<u32>,
-    /// Distances from the pad to the first waypoint of each sortie, and to its last, metres.
+    /// For each lane: distance from the pad to its first waypoint and to its last, metres.
     ways_m: Vec<[f32; 2]>,
 }
 
@@ -161,7 +166,7 @@ impl<'a> RouteLanes<'a> {
         Self { planned, route, bounds, ways_m }
     }
 
-    /// Lanes `first` up to before `end` as a route of their own.
+    /// The lanes `first..end` of the route as a route of their own.
     fn sub_route(&self, first: usize, end: usize) -> Route {
         let (planned, heights) = (self.planned, self.planned.wanted.heights);
         let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];

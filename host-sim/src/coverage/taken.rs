@@ -1,24 +1,25 @@
-//! Which waypoints of a plan have their picture after a flight, and which were flown more than
-//! once.
+//! Counts waypoints of a plan that have no picture after a flight, and waypoints that were flown
+//! more than once.
 //!
-//! Pictures are not taken where waypoints are. By distance each waits for the autopilot's next
-//! look, so that all further ones are later: on a long lane they lie anywhere between waypoints,
-//! and are none the worse for it. So waypoints are judged by the gaps between pictures. One has its
-//! picture
+//! Pictures are not taken exactly at waypoints. With trigger by distance each picture waits for the
+//! autopilot's next check of the distance, so all further ones are later too: on a long lane they
+//! lie anywhere between waypoints, which does no harm. So waypoints are judged by the gaps between
+//! pictures. A waypoint has its picture
 //!
-//! - if one was taken no further from it along its lane than half a spacing, or than
+//! - if a picture was taken within half a spacing of it along its lane, or within
 //!   [`Tolerance::off_m`] where that is more;
-//! - or if the pictures before it and behind it on its lane are no further apart than the spacing
-//!   and `off_m`: one of them as far off as a picture may be.
+//! - or if the last picture before it and the first one after it on its lane are no further apart
+//!   than the spacing plus `off_m`: one of them is then as far off as a picture may be.
 //!
-//! A picture is on a lane within half a lane spacing of it, or [`Tolerance::beside_m`] where that
-//! is more. One that is missing leaves a gap of two spacings: its waypoint is found while a spacing
-//! is more than `off_m`. On a short lane whose waypoints are nearer than the spacing it may not be
-//! found; the cells judge whether the area is photographed.
+//! A picture belongs to a lane if it is within half a lane spacing of it, or within
+//! [`Tolerance::beside_m`] where that is more. A missing picture leaves a gap of two spacings, so
+//! it is found while a spacing is more than `off_m`. On a short lane whose waypoints are nearer
+//! than the spacing it may not be found; the check of cells then decides whether the area is
+//! photographed.
 //!
-//! A waypoint is flown twice if vehicles came to it twice: each picture belongs to the nearest
-//! waypoint, and pictures that a vehicle takes there one after the other belong to one pass.
-//! Metres, mission frame.
+//! A waypoint is flown twice if vehicles came to it twice: each picture counts for its nearest
+//! waypoint, and consecutive pictures of one vehicle there count as one pass. Metres, ENU in the
+//! mission frame.
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -27,30 +28,33 @@ use planner_core::coverage::tracks::Lane;
 use super::CoveragePlan;
 use crate::margins;
 
-/// A picture: when, where, and how.
+/// A picture: time, position and heading of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picture {
-    /// Vehicle that took the picture, its MAVLink system id; none in an earlier flight.
+    /// MAVLink system id of the vehicle that took the picture; `None` for a picture of an earlier
+    /// flight.
     pub vehicle: Option<u8>,
-    /// Seconds.
+    /// Time of the picture, seconds after the mission's start.
     pub t_s: f32,
-    /// Position of the camera, which looks straight down.
+    /// Position of the camera, metres ENU; it looks straight down.
     pub position: Point,
-    /// Direction of the picture's upper edge, radians from east to the left.
+    /// Direction of the picture's upper edge, radians counterclockwise from east.
     pub heading: f32,
 }
 
-/// How far pictures may be from their waypoints in a flight that is as good as the plan supposes.
+/// Greatest distances of pictures from their waypoints in a flight with errors no greater than
+/// planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Beside the path: tracking, estimate and gusts.
+    /// Distance beside the path from tracking, estimate and gusts, metres.
     pub beside_m: f32,
-    /// Flown at cruise speed from the place where a picture is due to where it is taken.
+    /// Distance flown at cruise speed between the due place of a picture and its true place,
+    /// metres.
     pub late_m: f32,
 }
 
 impl Tolerance {
-    /// That of a plan, from the margins of its scenario.
+    /// The tolerance from the margins of the plan's scenario.
     pub fn of_plan(planned: &CoveragePlan<'_>) -> Self {
         let scenario = planned.scenario;
         let distances = margins::required_distances(&scenario.simulation, 0.0, &scenario.vehicles);
@@ -60,14 +64,14 @@ impl Tolerance {
         }
     }
 
-    /// From a waypoint to its picture along the lane: the most that [`margins::usable_footprint`]
-    /// counts with.
+    /// Greatest distance along the lane between a waypoint and its picture, metres;
+    /// [`margins::usable_footprint`] plans with the same.
     pub fn off_m(&self) -> f32 {
         self.beside_m + self.late_m
     }
 }
 
-/// Counts of waypoints without a picture, and flown more than once.
+/// Number of waypoints without a picture, and number of waypoints flown more than once.
 pub fn count_waypoints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
     let tolerance = Tolerance::of_plan(planned);
     let lanes = planned.tracks.lanes();
@@ -76,7 +80,7 @@ pub fn count_waypoints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64
     (left, flown_twice(lanes, planned.tracks.waypoint_count(), pictures))
 }
 
-/// Place along a lane from its first waypoint, and how far beside it.
+/// Distance of a point along a lane from its first waypoint, and distance beside the lane, metres.
 fn along_and_beside(lane: &Lane, place: &Flat) -> (f32, f32) {
     let (way, from) = (lane.to - lane.from, place - lane.from);
     let length_m = lane.length_m();
@@ -113,7 +117,7 @@ fn left_on_lane(
     (0..lane.count).filter(|k| !has_picture(k)).count() as u64
 }
 
-/// The waypoint that a picture is nearest to.
+/// Number of the waypoint nearest to a picture taken at `place`; `None` if there are no lanes.
 fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
     let nearest = |lane: &Lane| {
         let share = along_and_beside(lane, place).0 / lane.length_m().max(f32::MIN_POSITIVE);
@@ -133,7 +137,8 @@ fn flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
         let own = pictures.iter().filter(|picture| picture.vehicle == vehicle);
         let mut flown: Vec<u32> =
             own.filter_map(|p| nearest_waypoint(lanes, &p.position.xy())).collect();
-        // Of earlier flights it is not known which vehicle took which.
+        // Which vehicle took a picture of earlier flights is unknown, nor the order: repeats of a
+        // waypoint count once.
         if vehicle.is_none() {
             flown.sort_unstable();
         }

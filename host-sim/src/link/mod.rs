@@ -1,18 +1,18 @@
-//! Byte links between processes and devices: URLs, and nonblocking TCP, UDP and serial ports behind
-//! one small trait.
+//! Byte links between processes and devices: link URLs, and nonblocking TCP, UDP and serial ports
+//! behind the trait [`Link`].
 //!
 //! | URL | is |
 //! |---|---|
 //! | `tcp:HOST:PORT` | a TCP client |
-//! | `tcp-listen:HOST:PORT` | a TCP server of one client at a time; a new client replaces the old |
-//! | `udp:HOST:PORT` | sends to that peer and hears it, as PX4's SITL does |
+//! | `tcp-listen:HOST:PORT` | a TCP server with one client at a time; a new client replaces the old |
+//! | `udp:HOST:PORT` | sends to that peer and receives from it alone, as PX4's SITL does |
 //! | `udp-listen:HOST:PORT` | receives from all peers and sends to those heard in the last minute |
-//! | `serial:PATH:BAUD` | a serial port, for itself alone |
+//! | `serial:PATH:BAUD` | a serial port, opened exclusively |
 //!
-//! A TCP client and a serial port that are lost are opened again, tried once a second.
+//! A TCP client or serial port whose connection is lost is opened again: one attempt per second.
 //!
-//! A datagram is one or more whole frames: a sender hands whole frames to [`Link::send`]. A stream
-//! may cut anywhere.
+//! A datagram is one or more whole frames, since senders hand whole frames to [`Link::send`]. A
+//! stream (TCP, serial) may be split anywhere.
 
 mod reconnect;
 mod serial;
@@ -29,41 +29,41 @@ use std::time::Duration;
 pub use self::transport::Link;
 use crate::quote::quoted;
 
-/// The longest wait for a TCP server at the start.
+/// Longest wait for a TCP connection when a link is first opened.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Target of a link.
+/// Kind and address of a link.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum LinkUrl {
-    /// TCP client of HOST:PORT.
+    /// TCP client of the server at HOST:PORT.
     Tcp(String),
-    /// TCP server on HOST:PORT.
+    /// TCP server that listens on HOST:PORT.
     TcpListen(String),
-    /// UDP to HOST:PORT.
+    /// UDP socket with one peer, at HOST:PORT.
     Udp(String),
-    /// UDP bound to HOST:PORT.
+    /// UDP socket bound to HOST:PORT, for all peers that send to it.
     UdpListen(String),
-    /// A serial port.
+    /// A serial port at a baud rate.
     Serial {
         /// Path of the device.
         path: String,
-        /// Bits per second.
+        /// Baud rate, bits per second.
         baud: u32,
     },
 }
 
-/// Reason why a link URL or link is no good. Displays as `WHAT: WHERE: WHY`.
+/// Error of parsing a link URL or opening its link. Displays as `WHAT: WHERE: WHY`.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The text is no link URL.
+    /// The text is no link URL: the text, and why.
     #[error("bad link URL: {0}: {1}")]
     Url(String, &'static str),
     /// The link could not be opened.
     #[error("cannot open link: {}: {why}", quoted(&url.to_string()))]
     Open {
-        /// The link.
+        /// URL of the link.
         url: LinkUrl,
-        /// Error of the system.
+        /// Error of the operating system.
         why: io::Error,
     },
 }
@@ -114,10 +114,11 @@ impl fmt::Display for LinkUrl {
 }
 
 impl LinkUrl {
-    /// Opens the link.
+    /// Opens the link; a TCP client or serial port reconnects by itself later.
     ///
     /// # Errors
-    /// Names the URL and why: an unknown host, a port in use, nobody listening.
+    /// The link cannot be opened: unknown host, port in use, no server listening. The error names
+    /// the URL.
     pub fn open(&self) -> Result<Box<dyn Link>, LinkError> {
         let link = self.open_once(CONNECT_TIMEOUT)?;
         Ok(match self {
@@ -130,7 +131,7 @@ impl LinkUrl {
         })
     }
 
-    /// This URL with the actual port where port 0 was requested.
+    /// This URL with the port that the system chose for port 0; unchanged for other kinds of links.
     pub fn with_bound_port(&self, link: &dyn Link) -> Self {
         match (self, link.local_address()) {
             (Self::TcpListen(_), Some(at)) => Self::TcpListen(at.to_string()),

@@ -1,4 +1,4 @@
-//! A link that is opened again when it was lost: a simulator that restarts, an adapter that is
+//! A link that is opened again after it was lost: a simulator that restarts, an adapter that is
 //! plugged in again.
 
 use std::io;
@@ -7,15 +7,15 @@ use std::time::{Duration, Instant};
 
 use super::transport::Link;
 
-/// Time between two attempts to connect.
+/// Time between two attempts to open a lost link.
 pub(super) const RECONNECT_EVERY: Duration = Duration::from_secs(1);
 
-/// Opens the link again, if it can be opened now.
+/// Tries to open the link; `None` if that fails now.
 type OpenLink = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
 
-/// A link that connects again: while it is lost it receives nothing and drops what is sent.
+/// A link that reconnects. While it is lost, it receives nothing and drops what is sent.
 pub struct ReconnectingLink {
-    /// URL of the link.
+    /// URL of the link, for messages.
     name: String,
     open: OpenLink,
     link: Option<Box<dyn Link>>,
@@ -23,7 +23,7 @@ pub struct ReconnectingLink {
 }
 
 impl ReconnectingLink {
-    /// Keeps an open link, and what opens it again.
+    /// Wraps an open link; `open` opens it again after a loss.
     pub fn new(name: String, link: Box<dyn Link>, open: OpenLink) -> Self {
         Self { name, open, link: Some(link), retry_at: Instant::now() }
     }

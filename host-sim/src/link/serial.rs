@@ -1,4 +1,4 @@
-//! Serial links: a device with eight data bits, no parity, one stop bit and no flow control.
+//! Serial links: eight data bits, no parity, one stop bit, no flow control.
 
 use std::io::{self, Read, Write};
 use std::net::SocketAddr;
@@ -8,10 +8,10 @@ use serialport::SerialPort;
 
 use super::transport::{Link, is_would_block};
 
-/// Most bytes that wait for a line slower than its sender: at 57600 baud less than a second. Beyond
-/// it frames are dropped, since old setpoints are worse than none.
+/// Most bytes that wait to be written, if the line is slower than its sender: less than a second at
+/// 57600 baud. A frame that would exceed it is dropped, since old setpoints are worse than none.
 const MAX_QUEUED_BYTES: usize = 4096;
-/// Bytes written at once: the system takes this much without waiting whenever it is ready for any.
+/// Most bytes per write: a device that is ready to write at all takes this many without blocking.
 const WRITE_CHUNK: usize = 256;
 
 /// An open serial port.
@@ -21,14 +21,14 @@ pub struct Port {
 }
 
 impl Port {
-    /// Opens a device for itself alone.
+    /// Opens a device exclusively.
     pub fn open(path: &str, baud: u32) -> io::Result<Self> {
         let device = serialport::new(path, baud).timeout(Duration::ZERO).open()?;
         Ok(Self { device, queue: Vec::new() })
     }
 }
 
-/// Whether nothing is there, or nothing is taken, now.
+/// Whether an error only means that no byte can be read or written now.
 fn is_idle(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::TimedOut || is_would_block(error)
 }

@@ -1,5 +1,5 @@
-//! TCP links. What a peer does not take at once waits in a queue; a peer that lags
-//! [`MAX_QUEUED_BYTES`] bytes behind is cut off.
+//! TCP links. Bytes that the peer does not accept at once wait in a queue; a peer for which more
+//! than [`MAX_QUEUED_BYTES`] wait is disconnected.
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::transport::{Link, is_would_block};
 
-/// Most bytes that wait for a client: about ten seconds of PX4's flood.
+/// Most bytes that wait for a peer: about ten seconds of all that a PX4 streams.
 const MAX_QUEUED_BYTES: usize = 256 * 1024;
 
 struct Connection {
@@ -18,7 +18,8 @@ struct Connection {
 impl Connection {
     fn new(stream: TcpStream) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
-        // Setpoints and acks are small and must not wait to be gathered.
+        // Setpoints and acknowledgements are small and must not wait until Nagle's algorithm has
+        // gathered more bytes.
         stream.set_nodelay(true)?;
         Ok(Self { stream, queue: Vec::new() })
     }
@@ -53,11 +54,11 @@ impl Connection {
     }
 }
 
-/// A client.
+/// A TCP client.
 pub struct Client(Connection);
 
 impl Client {
-    /// Connects; waits for `timeout` at most.
+    /// Connects to a server; fails after `timeout`.
     pub fn connect(to: SocketAddr, timeout: Duration) -> io::Result<Self> {
         Ok(Self(Connection::new(TcpStream::connect_timeout(&to, timeout)?)?))
     }
@@ -77,14 +78,14 @@ impl Link for Client {
     }
 }
 
-/// A server of one client at a time.
+/// A TCP server that serves one client at a time.
 pub struct Server {
     listener: TcpListener,
     client: Option<Connection>,
 }
 
 impl Server {
-    /// Listens.
+    /// Listens on an address.
     pub fn bind(at: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(at)?;
         listener.set_nonblocking(true)?;
@@ -92,7 +93,7 @@ impl Server {
     }
 
     fn accept(&mut self) {
-        // A failed accept (the client gave up already) leaves things as they are.
+        // A failed accept (the client has already closed) leaves the current client connected.
         if let Ok((stream, _)) = self.listener.accept()
             && let Ok(connection) = Connection::new(stream)
         {

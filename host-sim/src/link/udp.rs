@@ -1,4 +1,4 @@
-//! UDP links. Datagrams nobody takes are lost, as UDP has it.
+//! UDP links. A datagram that no peer receives is lost without an error.
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use super::transport::{Link, is_would_block};
 
-/// Silence after which a client gets nothing more.
+/// A peer that has sent nothing for this long is sent nothing any more.
 const CLIENT_LIFETIME: Duration = Duration::from_secs(60);
-/// Most clients of one hub; the one longest unheard makes room.
+/// Most peers of one hub; a further one replaces the peer that was heard longest ago.
 const MAX_CLIENTS: usize = 16;
 
 fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {
@@ -18,14 +18,15 @@ fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> 
     }
 }
 
-/// One peer, known from the start.
+/// A UDP socket with one fixed peer; datagrams of other senders are dropped.
 pub struct UdpPeer {
     socket: UdpSocket,
     peer: SocketAddr,
 }
 
 impl UdpPeer {
-    /// Binds any free port, on the loopback for a peer there.
+    /// Binds any free port: of the loopback interface for a peer on this host, else of all
+    /// interfaces.
     pub fn new(peer: SocketAddr) -> io::Result<Self> {
         let local: SocketAddr = match (peer, peer.ip().is_loopback()) {
             (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),
@@ -60,14 +61,14 @@ impl Link for UdpPeer {
     }
 }
 
-/// A bound socket and the peers that sent to it.
+/// A bound UDP socket that sends to every peer from which it has received lately.
 pub struct UdpHub {
     socket: UdpSocket,
     clients: Vec<(SocketAddr, Instant)>,
 }
 
 impl UdpHub {
-    /// Binds.
+    /// Binds an address.
     pub fn bind(at: SocketAddr) -> io::Result<Self> {
         let socket = UdpSocket::bind(at)?;
         socket.set_nonblocking(true)?;

@@ -1,12 +1,13 @@
-//! Distances from segments to a map's obstacles, by a tree of boxes: for the many edges of a
-//! roadmap.
+//! Distances from segments to a map's obstacles by a tree of bounding boxes, for the many edges of
+//! a roadmap.
 //!
-//! The obstacles are joined into boxes, each brick of 4 × 4 × 4 cells by itself and then along x, y
-//! and z where boxes have equal sides: a wall is one box or a few. Over them lies a tree of boxes,
-//! eight to a node. The nearest is found by branch and bound: what is no nearer than what is known
-//! already is not opened. Work does not grow with the cube of the distance, as that of
-//! [`planner_core::segment::segment_clearance`] does, and the result is the same but for rounding:
-//! both are f32 in cells, n · 2⁻²³ a coordinate of n cells. Memory: 30 bytes a box.
+//! The occupied cells are merged into boxes: within each brick of 4 × 4 × 4 cells, then along x, y
+//! and z where boxes have equal cross-sections, so a wall is one box or a few. Over the boxes lies
+//! a bounding volume hierarchy with eight boxes to a node. A search by branch and bound finds the
+//! nearest box: it skips nodes that are no nearer than the nearest box found so far. Its cost does
+//! not grow with the cube of the distance, as that of [`planner_core::segment::segment_clearance`]
+//! does. The result is the same but for rounding: both compute in f32 in cells, with an error of n
+//! · 2⁻²³ in a coordinate of n cells. Memory: 30 bytes a box.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
@@ -18,15 +19,15 @@ use search::{BOXES_PER_NODE, Node, Search, Segment};
 mod lanes;
 mod search;
 
-/// Most boxes that one thread parts; more are parted on several threads.
+/// Most boxes whose subtree one thread builds alone; larger subtrees are built on several threads.
 const MAX_BOXES_PER_THREAD: usize = 512;
-/// Places along an axis at which boxes may be parted.
+/// Number of bins along an axis at whose borders boxes may be split.
 const SPLIT_BINS: usize = 16;
-/// Distance within which a segment opens the nodes that it passes, metres: the clearance of most
-/// edges is less.
+/// Distance from a segment within which nodes are assumed to be opened when the tree is built,
+/// metres: the clearance of most edges is less.
 const OPEN_NODE_WITHIN_M: f32 = 0.6;
 
-/// Cells `low..high`.
+/// A box of the cells `low..high` along x, y and z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct CellBox {
     low: [u16; 3],
@@ -34,7 +35,7 @@ struct CellBox {
 }
 
 impl CellBox {
-    /// Twice the centre along an axis.
+    /// Twice the centre along an axis, cells.
     fn center(&self, axis: usize) -> u32 {
         u32::from(self.low[axis]) + u32::from(self.high[axis])
     }
@@ -46,28 +47,29 @@ impl CellBox {
         }
     }
 
-    /// The sides across an axis, one number.
+    /// The bounds along the other two axes as one number: equal for two boxes with the same
+    /// cross-section.
     fn cross_section_key(&self, axis: usize) -> u64 {
         let (v, w) = ((axis + 1) % 3, (axis + 2) % 3);
         let sides = [self.low[v], self.high[v], self.low[w], self.high[w]];
         sides.into_iter().fold(0, |all, side| all << 16 | u64::from(side))
     }
 
-    /// A measure of how many segments pass it within a distance, in cells: half the surface of all
-    /// places that near, but for a constant.
+    /// Estimated number of segments that pass the box within `near` cells, up to a factor: half the
+    /// surface of the box grown by `near`, less a constant.
     fn split_cost(&self, near: f32) -> f32 {
         let [x, y, z] = [0, 1, 2].map(|a| f32::from(self.high[a] - self.low[a]));
         x * y + y * z + z * x + core::f32::consts::PI * near * (x + y + z)
     }
 }
 
-/// Takes the obstacles of a brick apart into boxes.
+/// Splits the occupied cells of one brick into boxes.
 fn brick_to_boxes(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
     while word != 0 {
         let bit = word.trailing_zeros();
         let first = [bit & 3, bit >> 2 & 3, bit >> 4];
-        // A box reaches as far along x as it goes, then over as many such rows, then as many such
-        // layers.
+        // From the first cell left, a box extends along x as far as cells are occupied, then along
+        // y as long as whole rows are, then along z as long as whole layers are.
         let mut size = [1, 1, 1];
         let mut mask = 1_u64 << bit;
         for (axis, stride) in [1, 4, 16].into_iter().enumerate() {
@@ -85,7 +87,7 @@ fn brick_to_boxes(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
     }
 }
 
-/// Joins boxes that touch along an axis and have equal sides across it.
+/// Merges boxes that touch along an axis and have the same cross-section.
 fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
     boxes.sort_by_cached_key(|b| (b.cross_section_key(axis), b.low[axis]));
     boxes.dedup_by(|next, last| {
@@ -98,7 +100,7 @@ fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
     });
 }
 
-/// Boxes that hold all obstacles of a map, and nothing else.
+/// Disjoint boxes that together hold exactly the occupied cells of a map.
 fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
     let [bx, by, _] = grid.shape().bricks().map(|n| n as usize);
     let layers: Vec<Vec<CellBox>> = grid
@@ -120,28 +122,29 @@ fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
     boxes
 }
 
-/// The tree over a map.
+/// A bounding volume hierarchy over the obstacles of a map.
 #[derive(Debug)]
 pub struct BoxTree {
     shape: GridShape,
     outside: Outside,
-    /// The first is the root.
+    /// The root is the first node.
     nodes: Vec<Node>,
-    /// The vector instructions that this machine has.
+    /// Vector instructions that this machine supports.
     arch: Arch,
 }
 
 impl BoxTree {
-    /// The tree over a map. O(bricks + boxes · log boxes).
+    /// Builds the tree over a map. Cost: O(bricks + boxes · log boxes).
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
         let nodes =
             build_nodes(&mut boxes_of_map(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
         Self { shape: *grid.shape(), outside: grid.outside(), nodes, arch: Arch::new() }
     }
 
-    /// Distance from the segment to the nearest obstacle, metres, at most `max_m`. Once it is seen
-    /// to be at most `enough_m`, the search ends with what it has. Of a segment that touches an
-    /// obstacle it may be a rounding above zero; an end that is not finite is at distance 0.
+    /// Distance from the segment `a`–`b` to the nearest obstacle, metres, at most `max_m`. The
+    /// search stops as soon as it has found a distance of at most `enough_m`, and returns that. For
+    /// a segment that touches an obstacle, rounding may give slightly more than zero; the result is
+    /// 0 if a coordinate is not finite.
     pub fn clearance_m(&self, a: &Point, b: &Point, max_m: f32, enough_m: f32) -> f32 {
         let resolution_m = self.shape.resolution_m;
         let cells =
@@ -167,7 +170,7 @@ impl BoxTree {
     }
 }
 
-/// Puts the box that is around some others into a node.
+/// Stores the bounding box of some boxes in one lane of a node.
 fn put_bounding_box(node: &mut Node, lane: usize, part: &[CellBox]) {
     let Some((first, others)) = part.split_first() else { return };
     let whole = others.iter().fold(*first, |whole, b| whole.union(b));
@@ -177,7 +180,8 @@ fn put_bounding_box(node: &mut Node, lane: usize, part: &[CellBox]) {
     }
 }
 
-/// The nodes over some boxes and below; the first is over all. `near` as [`split_boxes`] has it.
+/// Nodes of the subtree over some boxes; the first is its root. `near` is passed to
+/// [`split_boxes`].
 fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     let mut node = Node::EMPTY;
     if boxes.len() <= BOXES_PER_NODE {
@@ -209,9 +213,9 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     std::iter::once(node).chain(below.into_iter().flatten()).collect()
 }
 
-/// Parts two boxes or more so that few segments have to open both halves, of which neither has less
-/// than a third: the surface area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for
-/// segments that pass within `near` cells. O(boxes).
+/// Splits two or more boxes into two groups so that few segments have to open both, by the surface
+/// area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for segments that pass within
+/// `near` cells. With this heuristic each group gets at least a third of the boxes. Cost: O(boxes).
 fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
@@ -252,7 +256,8 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
             }
         }
     } else {
-        // Most are in one bin of each axis.
+        // No border between bins leaves a third on either side: splits at the median along the axis
+        // with the largest extent.
         let spread = |axis: usize| centre_extent(boxes, axis).map_or(0, |(low, high)| high - low);
         let axis = (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0);
         middle = boxes.len() / 2;
@@ -261,14 +266,14 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
     boxes.split_at_mut(middle)
 }
 
-/// Least and greatest of the boxes' centres along an axis, twice.
+/// Least and greatest value of twice the boxes' centres along an axis; `None` without boxes.
 fn centre_extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
     let centers = || boxes.iter().map(|b| b.center(axis));
     Some((centers().min()?, centers().max()?))
 }
 
-/// Which of [`SPLIT_BINS`] bins along an axis a box is in; `None` where the centres of all are at
-/// one place.
+/// Function from a box to its bin, 0 to [`SPLIT_BINS`] − 1, along an axis; `None` if all centres
+/// coincide along it.
 fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
     let (low, high) = centre_extent(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {

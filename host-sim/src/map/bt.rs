@@ -1,11 +1,12 @@
-//! OctoMap's binary octree file, `.bt`: occupied, free and unknown, without probabilities.
+//! Reads and writes OctoMap's binary octree file, `.bt`: cells are occupied, free or unknown,
+//! without probabilities.
 //!
-//! A text header (`# Octomap OcTree binary file`, then `id`, `size`, `res` and `data`, one a line),
-//! then the inner nodes depth first, each one little-endian 16-bit word of eight children, two bits
-//! a child from the lowest up: 0 unknown, 1 free leaf, 2 occupied leaf, 3 inner node, whose word
-//! follows. Source: OctoMap 1.9, `OccupancyOcTreeBase::readBinaryNode`. Every inner node read has
-//! taken two bytes of the file, so memory is bounded by four times its length whatever the header
-//! claims.
+//! The file has a text header (`# Octomap OcTree binary file`, then `id`, `size`, `res` and `data`,
+//! one a line), then the inner nodes depth first. Each is a little-endian 16-bit word with two bits
+//! for each of its eight children, from the lowest bits up: 0 unknown, 1 free leaf, 2 occupied
+//! leaf, 3 inner node, whose own word follows. Source: OctoMap 1.9,
+//! `OccupancyOcTreeBase::readBinaryNode`. Each inner node takes two bytes of the file and eight in
+//! memory, so memory is bounded by four times the file's length, whatever the header claims.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -14,13 +15,13 @@ use super::error::MapError;
 use super::octree::{INNER, Inner, Octree, TREE_DEPTH};
 use crate::files;
 
-/// Values of the header's `id` that are read; the colours of a ColorOcTree are dropped.
+/// Accepted values of the header's `id`; the colours of a ColorOcTree are ignored.
 const IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
 const MAGIC: &str = "# Octomap OcTree binary file";
-/// Longest file read: four times its length is what it takes in memory. The largest public scans
-/// have a tenth of it.
+/// Longest file that is read, bytes: in memory it takes four times as much. The largest public
+/// scans are a tenth of it.
 const MAX_BYTES: u64 = 1 << 26;
-/// Longest header line; OctoMap's own comment takes 75 bytes.
+/// Longest header line, bytes; OctoMap's own comment line has 75.
 const MAX_LINE: usize = 1024;
 
 /// Reads a `.bt` file.
@@ -30,7 +31,7 @@ pub fn read(path: &Path) -> Result<Octree, MapError> {
     parse(&bytes, path)
 }
 
-/// Parses a `.bt` file's bytes; `path` only names it in errors.
+/// Parses the bytes of a `.bt` file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
     let mut reader = Reader { bytes, at: 0, path, inner: Vec::new(), nodes: 0 };
     let header = reader.header()?;
@@ -79,7 +80,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The next header line and where it began; the newline is taken too.
+    /// Reads the next header line, without its end of line; also returns the offset at which it
+    /// begins.
     fn header_line(&mut self, expected: &str) -> Result<(&'a str, usize), MapError> {
         let begin = self.at;
         let rest = &self.bytes[begin..self.bytes.len().min(begin + MAX_LINE)];
@@ -157,7 +159,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the inner node at `depth`, whose word comes next. Recursion ends at [`DEPTH`].
+    /// Reads the inner node at `depth`, whose word comes next, and its children. Recursion ends at
+    /// [`TREE_DEPTH`].
     fn node(&mut self, depth: u32) -> Result<Inner, MapError> {
         let begin = self.at;
         let Some(&[low, high]) = self.bytes.get(begin..begin + 2) else {
@@ -195,12 +198,12 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Header text as it may be shown: short and printable.
+/// Header text for an error message: at most 40 characters, escaped.
 fn quoted(text: &str) -> String {
     format!("`{}`", text.chars().take(40).flat_map(char::escape_default).collect::<String>())
 }
 
-/// The bytes of a `.bt` file.
+/// Encodes a tree as a `.bt` file.
 pub fn to_bytes(tree: &Octree) -> Vec<u8> {
     let mut header = String::new();
     let (nodes, res) = (tree.counts().nodes, tree.resolution_m());

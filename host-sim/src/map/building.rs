@@ -1,13 +1,14 @@
-//! `builtin:building`: the nine-floor building of P3D §4, 41 × 24 × 49 m, generated from a seed.
+//! `builtin:building`: a nine-floor building like that of P3D §4, 41 × 24 × 49 m, generated from a
+//! seed.
 //!
-//! The paper gives the outer size (its Fig. 8) and that there are many rooms, doors, windows and a
-//! stairwell, no plan. Ours: a corridor along the middle of every floor with rooms on both sides, a
-//! stairwell at the west end, an atrium in the middle and a lift shaft at the east end, all three
-//! open through every slab between the floors; the ground floor is a lobby. The seed places
-//! partitions and doors. Doors and shafts are as wide as they are so that a uniform roadmap of the
-//! paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's does, and no
-//! longer with far fewer. The interior is known to be free; nothing is unknown. Corner of the outer
-//! walls at (0, 0, 0), metres.
+//! The paper states its outer size (its Fig. 8) and that it has many rooms, doors, windows and a
+//! stairwell; it has no floor plan. Ours: a corridor along the middle of every floor with rooms on
+//! both sides, a stairwell at the west end, an atrium in the middle and a lift shaft at the east
+//! end, all three open through every slab between floors. The ground floor is a lobby. The seed
+//! places partitions and doors. Doors and shafts are just so wide that a uniform roadmap of the
+//! paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's does, and one of
+//! far fewer nodes does not. All cells are known, free or occupied. The corner of the outer walls
+//! is at (0, 0, 0), metres.
 
 use planner_core::Point;
 use planner_core::voxel::GridShape;
@@ -24,27 +25,27 @@ pub const SIZE_M: [f32; 3] = [41.0, 24.0, 49.0];
 pub const FLOORS: u32 = 9;
 /// Height from one floor's slab to the next, metres.
 pub const FLOOR_HEIGHT_M: f32 = 5.44;
-/// The seed of the building that has no `?seed=`.
+/// Seed of `builtin:building` without `?seed=`.
 pub const DEFAULT_SEED: u64 = 1;
 
 const WALL_M: f32 = 0.25;
-/// The corridor between y = 9.5 and y = 14.5, walls excluded.
+/// Range of the corridor in y between its walls, metres.
 const CORRIDOR_M: [f32; 2] = [9.5, 14.5];
-/// Shafts through the slabs, as wide as the corridor: x from and to.
+/// Ranges in x of the shafts through the slabs, metres; in y they are as wide as the corridor.
 const SHAFTS_M: [[f32; 2]; 3] = [[0.75, 6.25], [17.5, 23.0], [34.75, 40.25]];
-/// Walls across the corridor, before and behind the shafts: x of their west faces.
+/// West faces, in x, of the walls across the corridor west and east of the shafts, metres.
 const CROSS_WALLS_M: [f32; 4] = [6.75, 16.75, 23.5, 34.0];
-/// The lobby's partition-free part of the ground floor, along x.
+/// Range in x of the ground floor without partitions (the lobby), metres.
 const LOBBY_M: [f32; 2] = [7.5, 31.0];
 
-/// An axis-parallel box to fill or to carve, metres.
+/// An axis-aligned box of one occupancy, metres.
 struct Block {
     min: [f32; 3],
     max: [f32; 3],
     state: Occupancy,
 }
 
-/// The building at `resolution_m`; walls are never thinner than one cell.
+/// The building as a map with cells of `resolution_m`; walls are at least one cell thick.
 pub fn building_map(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> {
     let name = "builtin:building";
     if !(0.05..=1.0).contains(&resolution_m) {
@@ -62,7 +63,7 @@ pub fn building_map(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapErr
     Ok(map)
 }
 
-/// Later blocks overwrite earlier ones.
+/// Boxes of the building, in order: a later box overwrites earlier ones.
 fn building_blocks(seed: u64) -> Vec<Block> {
     let mut plan = BlockList { blocks: Vec::new(), rng: Pcg32::seed_from_u64(seed) };
     let [length, width, height] = SIZE_M;
@@ -94,7 +95,7 @@ impl BlockList {
         self.blocks.push(Block { min, max, state: Occupancy::Free });
     }
 
-    /// Uniform in `[from, to)`.
+    /// A random number, uniform in `[from, to)`.
     fn uniform(&mut self, from: f32, to: f32) -> f32 {
         from + (to - from) * (self.rng.next_u32() >> 8) as f32 / 16_777_216.0
     }
@@ -112,7 +113,8 @@ impl BlockList {
             (CORRIDOR_M[1] + WALL_M, width - WALL_M, CORRIDOR_M[1]),
         ] {
             self.add_solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
-            // Five or six rooms a side: partitions near even shares, moved by up to 0.4 m.
+            // Five or six rooms on each side of the corridor; partitions at equal shares of the
+            // length, each moved by up to 0.4 m.
             let rooms = 5 + (self.rng.next_u32() % 2) as usize;
             let mut west = WALL_M;
             for room in 1..=rooms {
@@ -147,7 +149,8 @@ impl BlockList {
         }
     }
 
-    /// A door from the corridor into the room between `west` and `east`.
+    /// Adds a door from the corridor into the room between x = `west` and x = `east`, in the
+    /// corridor wall at y = `wall`, above the floor at `z`.
     fn add_door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
         let width = self.uniform(3.5, 4.25);
         let at = self.uniform(west + 0.75, east - 0.75 - width);

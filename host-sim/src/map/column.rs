@@ -1,12 +1,12 @@
-//! The vertical flight between the ground and a start or goal: has it the clearance that every edge
-//! has?
+//! The vertical flight between the ground and a start or goal: checks that it has the clearance
+//! that every edge has.
 //!
-//! The ground is the top of the first seen obstacle below the point; unknown space and the map's
-//! bottom are none. A vehicle stands there with its centre a radius above. From that place up to
-//! the point, every cell that rises above the ground must be farther than the required clearance:
-//! obstacles, unknown space where that is blocked, and the map's faces. The segment is vertical and
-//! cells are boxes, so distances are exact but for rounding in f64. Metres, mission frame. Cost:
-//! the cells within the required clearance.
+//! The ground is the top of the first occupied cell below the point; unknown space and the map's
+//! bottom are no ground. A vehicle stands there with its centre one radius above. From there up to
+//! the point, every blocked cell above the ground must be farther away than the required clearance:
+//! obstacles, unknown space where that is blocked, and then also the map's faces. The segment is
+//! vertical and cells are boxes, so distances are exact but for rounding in f64. Metres, ENU in the
+//! mission frame. Cost: the cells within the required clearance.
 
 use planner_core::Point;
 use planner_core::voxel::Outside;
@@ -15,44 +15,46 @@ use super::VoxelMap;
 
 /// Greatest distance at which [`nearest_column`] searches, metres.
 const NEAREST_COLUMN_WITHIN_M: f32 = 5.0;
-/// Most cells that [`nearest_column`] reads: a second or two.
+/// Most cells that [`nearest_column`] reads in all, which takes a second or two.
 const NEAREST_COLUMN_CELLS: f32 = 3e8;
-/// Spacing of the places that [`nearest_column`] tries, metres.
+/// Spacing of the points that [`nearest_column`] tries, metres.
 const NEAREST_COLUMN_STEP_M: f32 = 0.1;
 
-/// Reason why a vehicle cannot fly straight up or down between the ground and a point.
+/// Reason why a vehicle may not fly vertically between the ground and a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColumnError {
     /// The point lies in an obstacle, in unknown space or outside the map.
     NotFree,
-    /// No ground is below the point.
+    /// No occupied cell is below the point.
     NoGround,
-    /// Unknown space below the point, up to this height: what is below it nobody has seen.
+    /// The first blocked cell below the point is unknown: the ground below it was never seen.
     UnknownBelow {
-        /// Top of the ground, metres.
+        /// Top of the unknown space, metres ENU.
         top_m: f32,
     },
-    /// The point is nearer to the ground than the vehicle's radius.
+    /// The point is less than the vehicle's radius above the ground.
     TooLow {
-        /// Height of the ground, metres.
+        /// Height of the ground, metres ENU.
         ground_m: f32,
     },
-    /// An obstacle above the ground is too near.
+    /// A blocked cell above the ground, or a face of the map, is nearer than the required
+    /// clearance.
     TooNear {
-        /// The nearest place of it, metres.
+        /// The point of the obstacle that is nearest to the vertical flight, metres ENU.
         place: Point,
-        /// Distance of the obstacle from the vehicle's centre on its way, metres.
+        /// Distance from that point to the vehicle's centre where it passes nearest, metres.
         distance_m: f32,
-        /// Whether it is unknown space or lies beyond the map, rather than an obstacle.
+        /// Whether the obstacle is unknown space or a face of the map, rather than an occupied
+        /// cell.
         unknown: bool,
     },
 }
 
-/// Height of the ground below `point`, if a vehicle that needs `required_m` may fly straight
-/// between the two.
+/// Height of the ground below `point`, metres ENU, if a vehicle with `required_m` of clearance may
+/// fly vertically between the two.
 ///
 /// # Errors
-/// The first thing that is wrong; of all that is too near, the nearest.
+/// The first requirement that is not met; [`ColumnError::TooNear`] names the nearest obstacle.
 pub fn ground_below_column(
     map: &VoxelMap,
     point: &Point,
@@ -82,9 +84,9 @@ pub fn ground_below_column(
     Err(ColumnError::TooNear { place, distance_m: distance_m as f32, unknown })
 }
 
-/// The nearest cell or face to the segment from the height `low_m` up to `point`, of all cells
-/// above layer `ground` and the faces of the map but the lowest: its place, its distance, and
-/// whether it is unknown. Only cells within `reach_m` are compared.
+/// Obstacle nearest to the vertical segment from `low_m` up to `point`: its nearest point, its
+/// distance, and whether it is unknown. Obstacles are the blocked cells above layer `ground` within
+/// `reach_m`, and, where the outside is blocked, the faces of the map but the lowest.
 fn nearest_above(
     map: &VoxelMap,
     point: &Point,
@@ -107,14 +109,15 @@ fn nearest_above(
     let mut reach_m = reach_m;
     if map.outside == Outside::Blocked {
         for (axis, end) in [(0, min.x), (0, max.x), (1, min.y), (1, max.y), (2, max.z)] {
-            // No cell beyond the nearest face can be nearer.
+            // A cell beyond the nearest face is outside the map, so cells farther than the face
+            // need no check.
             reach_m = reach_m.min((end - at[axis]).abs());
             let mut place = [at.x, at.y, at.z];
             place[axis] = end;
             consider(place, true);
         }
     }
-    // One cell more on either side than the reach, so that rounding loses none.
+    // One cell more on either side than the reach, so that rounding leaves none out.
     let range = |axis: usize, from: f64, to: f64| {
         let first = ((from - reach_m - min[axis]) / cell_m).floor() - 1.0;
         let last = ((to + reach_m - min[axis]) / cell_m).floor() + 1.0;
@@ -128,7 +131,7 @@ fn nearest_above(
                 if !grid.is_occupied([i, j, k]) {
                     continue;
                 }
-                // The place of the box that is nearest to the segment: each axis by itself.
+                // The point of the cell nearest to the segment, axis by axis.
                 let span = |axis: usize, cell: u32| {
                     let from = min[axis] + f64::from(cell) * cell_m;
                     (from, from + cell_m)
@@ -143,8 +146,8 @@ fn nearest_above(
     nearest
 }
 
-/// The nearest place at the same height whose column is clear, within 5 m, or nearer where much
-/// room is required.
+/// The nearest point at the same height whose vertical flight has the required clearance: within 5
+/// m, or within less where the required clearance makes each check costly. `None` if there is none.
 pub fn nearest_column(
     map: &VoxelMap,
     point: &Point,
@@ -155,7 +158,8 @@ pub fn nearest_column(
     let mut offsets: Vec<(i32, i32)> =
         (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))).collect();
     offsets.sort_by_key(|&(i, j)| (i * i + j * j, i, j));
-    // Only what two decimals can say, so that what is printed is what was tried.
+    // Rounded to the two decimals that the hint prints, so that the printed point is the one that
+    // was checked.
     let round = |x: f32| (f64::from(x) * 100.0).round() as f32 / 100.0;
     let across = 2.0 * required_m / map.shape.resolution_m + 3.0;
     let layers = (map.shape.dims[2] as f32)

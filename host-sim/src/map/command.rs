@@ -1,4 +1,4 @@
-//! `host-sim map info|convert`.
+//! The commands `host-sim map info` and `host-sim map convert`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use super::{MapError, RESOLUTION_RANGE_M, Source, bt, building};
 use crate::files::ResultFiles;
 use crate::say;
 
-/// Planning resolution where none is given, metres.
+/// Resolution of a built-in map where none is given, metres.
 pub const DEFAULT_RESOLUTION_M: f32 = 0.25;
 
 /// Arguments of `host-sim map`.
@@ -24,11 +24,11 @@ pub struct MapArgs {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Say what a map holds
+    /// Print the size, leaves and volumes of a map
     Info {
         /// An OctoMap `.bt` file or `builtin:building`
         file: String,
-        /// Cells of this edge, metres; a file's own resolution if absent, 0.25 for a builtin
+        /// Edge of a cell, metres; if absent, a file's own resolution, 0.25 for a built-in map
         #[arg(long, value_name = "METRES", value_parser = parse_resolution)]
         resolution: Option<f32>,
         /// Print JSON
@@ -41,41 +41,41 @@ enum Action {
         file: String,
         /// The `.bt` file to write
         out: PathBuf,
-        /// Cells of this edge, metres; a file's own resolution if absent, 0.25 for a builtin
+        /// Edge of a cell, metres; if absent, a file's own resolution, 0.25 for a built-in map
         #[arg(long, value_name = "METRES", value_parser = parse_resolution)]
         resolution: Option<f32>,
     },
 }
 
-/// What `map info` prints.
+/// What `host-sim map info` prints about a map.
 #[derive(Debug, Serialize)]
 pub struct MapInfo {
     /// `"octomap"` or `"builtin"`.
     pub kind: &'static str,
     /// Edge of the smallest cell, metres.
     pub resolution_m: f64,
-    /// Smallest cells along east, north, up, over the known space.
+    /// Number of smallest cells along east, north and up that span the known space.
     pub dims: [u32; 3],
     /// Lower corner of the known space, metres.
     pub min_m: [f64; 3],
     /// Upper corner of the known space, metres.
     pub max_m: [f64; 3],
-    /// Nodes of the octree.
+    /// Number of nodes of the octree.
     pub nodes: usize,
-    /// Its occupied leaves.
+    /// Number of occupied leaves of the octree.
     pub occupied_leaves: usize,
-    /// Its free leaves.
+    /// Number of free leaves of the octree.
     pub free_leaves: usize,
-    /// Volume of the occupied leaves.
+    /// Volume of the occupied leaves, m³.
     pub occupied_m3: f64,
-    /// Volume of the free leaves.
+    /// Volume of the free leaves, m³.
     pub free_m3: f64,
-    /// The rest of the known space's box.
+    /// Volume of the box around the known space that is neither occupied nor free, m³.
     pub unknown_m3: f64,
 }
 
 impl MapInfo {
-    /// Sums up a tree that lies `shift_m` beside its keys.
+    /// Summary of an octree whose true position is `shift_m` away from that of its keys.
     pub fn from_octree(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
         let counts = tree.counts();
         let (lo, hi) = tree.key_bounds().unwrap_or_default();
@@ -116,10 +116,10 @@ impl MapInfo {
     }
 }
 
-/// Runs the command; what it prints goes to standard output.
+/// Runs the command and prints its result to standard output.
 ///
 /// # Errors
-/// Bad input, by name and place.
+/// The map cannot be read or written; the error names the file.
 pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Info { file, resolution, json } => {
@@ -145,13 +145,14 @@ pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A map as it is, or laid on a planning grid.
+/// A map as the octree of its file, or resampled onto a planning grid.
 enum Map {
     Tree(Octree),
     Grid(OccupancyMap),
 }
 
-/// Reads or makes a map; the same grid as is planned on if a resolution is asked for.
+/// Loads a map: the octree of a `.bt` file, or, with a resolution given or for a built-in map, the
+/// grid that missions are planned on.
 fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), MapError> {
     match (Source::parse(file)?, resolution_m) {
         (Source::Building(seed), _) => {
@@ -176,7 +177,7 @@ fn map_info(file: &str, resolution_m: Option<f32>) -> Result<MapInfo, MapError> 
     Ok(MapInfo::from_octree(kind, &tree.ok_or_else(refuse)?, shift))
 }
 
-/// Edge of a planning cell as scenarios take it.
+/// Parses the edge of a planning cell, metres, within the range that scenarios accept.
 fn parse_resolution(text: &str) -> Result<f32, String> {
     let given = text.parse().ok().filter(|r: &f32| RESOLUTION_RANGE_M.contains(&f64::from(*r)));
     let (least, most) = (RESOLUTION_RANGE_M.start(), RESOLUTION_RANGE_M.end());

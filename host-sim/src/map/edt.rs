@@ -1,32 +1,33 @@
-//! A clearance that is never too large: squared distances between cells' cubes, from an exact
-//! distance transform.
+//! Lower bounds of the clearance at points, from an exact Euclidean distance transform between
+//! cells.
 //!
-//! Two cells whose indices differ by `d` are at least `√Σ max(|dᵢ| − 1, 0)²` cells apart, wherever
-//! in them two points lie. As `max(|d| − 1, 0)² = min over e of (d − e)²` for e in −1, 0, 1, that
-//! is the ordinary squared distance to the obstacles grown by one cell along every axis, which
-//! separates by axis (Felzenszwalb & Huttenlocher 2012). Squares are kept in 16 bits and end at 255
-//! cells. The simulator asks this first at every step and the exact distance only where it is
-//! small. Cost: O(cells) once, two bytes a cell; one load a query.
+//! Points in two cells whose indices differ by `d` are at least `√Σ max(|dᵢ| − 1, 0)²` cells apart.
+//! Since `max(|d| − 1, 0)² = min over e of (d − e)²` for e in −1, 0, 1, that is the ordinary
+//! squared distance to the obstacles grown by one cell along every axis, which separates by axis
+//! (Felzenszwalb & Huttenlocher 2012). Squares are stored in 16 bits, so distances saturate at 255
+//! cells. At every step the simulator reads this bound first, and computes the exact distance only
+//! where the bound is small. Cost: O(cells) once, two bytes a cell; one load a query.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 use rayon::prelude::*;
 
-/// Lower bounds of the distance to the nearest obstacle.
+/// For every cell of a map: a lower bound of the distance from any point in it to the nearest
+/// obstacle.
 #[derive(Clone, Debug)]
 pub struct ClearanceField {
     shape: GridShape,
     outside: Outside,
-    /// Squared, in cells; z fastest, then x, then y.
+    /// Squared distances, cells²; in memory z varies fastest, then x, then y.
     squared: Vec<u16>,
 }
 
 impl ClearanceField {
-    /// Transforms a grid.
+    /// Computes the field of a map.
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
         let shape = *grid.shape();
         let [nx, ny, nz] = shape.dims.map(|d| d as usize);
-        // Along x and y in each layer, layers side by side.
+        // Transform along x and y within each layer, layers in parallel.
         let mut layers = vec![u16::MAX; nx * ny * nz];
         layers.par_chunks_mut(nx * ny).enumerate().for_each(|(k, layer)| {
             for j in 0..ny {
@@ -50,7 +51,7 @@ impl ClearanceField {
                 }
             }
         });
-        // Along z, turning the order so that each column is contiguous.
+        // Transform along z; the memory order changes so that each column is contiguous.
         let mut squared = vec![0; nx * ny * nz];
         squared.par_chunks_mut(nx * nz).enumerate().for_each(|(j, sheet)| {
             let mut scratch = Scratch::new(nz);
@@ -63,7 +64,7 @@ impl ClearanceField {
         Self { shape, outside: grid.outside(), squared }
     }
 
-    /// A distance, metres, that the nearest obstacle is not nearer than. NaN is at distance 0.
+    /// Lower bound of the distance from `point` to the nearest obstacle, metres; 0 for NaN.
     pub fn lower_bound_m(&self, point: &Point) -> f32 {
         let (min, max) = (self.shape.min, self.shape.max());
         let Some([i, j, k]) = self.shape.cell_of(point) else {
@@ -80,22 +81,22 @@ impl ClearanceField {
     }
 }
 
-/// One line's transform with its buffers.
+/// Buffers for the transform along one line of cells.
 struct Scratch {
     line: Vec<u16>,
     out: Vec<u16>,
-    /// The lower envelope.
+    /// Parabolas of the lower envelope, from left to right.
     envelope: Vec<Parabola>,
 }
 
-/// Squared distance from a site: `height + (x − site)²`. A side has at most 2¹⁵ cells, so squares
-/// fit.
+/// The squared distance from a site plus the site's own value, as a parabola over x:
+/// `height + (x − site)²`. A side has at most 2¹⁵ cells, so squares fit into i32.
 #[derive(Clone, Copy, Debug)]
 struct Parabola {
     site: i32,
     /// Value of the parabola at x = 0.
     at_zero: i32,
-    /// The first place where it is the lowest.
+    /// First x at which this parabola is the lowest of the envelope.
     from: i32,
 }
 
@@ -116,13 +117,13 @@ impl Scratch {
         Self { out: line.clone(), line, envelope: Vec::with_capacity(length) }
     }
 
-    /// `out[x] = min over q of line[q] + max(|x − q| − 1, 0)²`, ending at the largest u16. Cost:
-    /// O(length).
+    /// Sets `out[x] = min over q of line[q] + max(|x − q| − 1, 0)²`, saturated at the largest u16.
+    /// Cost: O(length).
     fn transform(&mut self) {
         let n = self.line.len();
         self.envelope.clear();
         for q in 0..n {
-            // Growing by one cell: the least of three neighbours.
+            // Grows obstacles by one cell: the least value of the cell and its two neighbours.
             let near = &self.line[q.saturating_sub(1)..n.min(q + 2)];
             let height = near.iter().fold(u16::MAX, |a, &b| a.min(b));
             if height == u16::MAX {
@@ -132,7 +133,8 @@ impl Scratch {
             let at_zero = i32::from(height) + site * site;
             let mut from = 0;
             while let Some(last) = self.envelope.last() {
-                // The first whole x where this parabola is no higher than the last.
+                // The first integer x where the new parabola is no higher than the last one of the
+                // envelope.
                 let width = 2 * (site - last.site);
                 let cross = (at_zero - last.at_zero + width - 1).div_euclid(width);
                 if cross > last.from {

@@ -1,51 +1,51 @@
-//! What can be wrong with a map, said so that the user can mend it.
+//! Errors of reading, generating and writing maps, with enough detail for the user to correct them.
 
 use std::path::{Path, PathBuf};
 
 use crate::quote::{quoted, quoted_path};
 
-/// Reason why a map could not be read, made or written.
+/// Reason why a map could not be read, generated or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
-    /// The file system said no.
+    /// The operating system reported an error.
     #[error("cannot {action} the map: {}", quoted_path(file))]
     Io {
-        /// Attempted action: "read", "write".
+        /// What failed: "read" or "write".
         action: &'static str,
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The bytes are not what the format asks for.
+    /// The bytes of the file do not follow its format.
     #[error(
         "malformed map: {}: byte {offset}: expected {expected}, found {found}",
         quoted_path(file)
     )]
     Malformed {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// Where, in bytes from its beginning.
+        /// Offset of the error, bytes from the beginning of the file.
         offset: u64,
-        /// Text that the format requires there.
+        /// What the format requires there.
         expected: String,
-        /// Text that stands there.
+        /// What the file has there.
         found: String,
     },
-    /// No reader for such a name.
+    /// The map's name has the ending of no known format, and is no built-in map.
     #[error("unknown kind of map: {}: expected {expected}", quoted(file))]
     UnknownKind {
-        /// The name as given.
+        /// The map's name as given.
         file: String,
-        /// Formats that can be read.
+        /// Names that are accepted.
         expected: &'static str,
     },
-    /// The map cannot be laid on the grid that was asked for.
+    /// The map cannot be represented on the requested grid.
     #[error("map does not fit: {}: {why}", quoted(file))]
     Grid {
-        /// The name as given.
+        /// The map's name as given.
         file: String,
-        /// Why, with the numbers.
+        /// Reason, with the numbers that matter.
         why: String,
     },
 }

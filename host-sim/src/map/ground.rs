@@ -1,4 +1,4 @@
-//! Level ground, where a mission has no map: free space over a floor.
+//! A map of level ground for missions without a map: free space above a floor.
 
 use planner_core::Point;
 use planner_core::voxel::GridShape;
@@ -7,14 +7,14 @@ use super::error::MapError;
 use super::occupancy::OccupancyMap;
 use super::octree::Occupancy;
 
-/// Most cells of a ground; larger grounds have larger cells.
+/// Most cells of such a map; a larger area gets larger cells.
 const MAX_GROUND_CELLS: f32 = 4e6;
 
-/// The ground, whose top is as high as `low`, with the air over it to `high`, in cells of `cell_m`
-/// or larger ones.
+/// A map whose floor has its top at the height of `low`, with free space above it up to `high`, in
+/// cells of `cell_m` or larger ones.
 ///
 /// # Errors
-/// It is larger than a map can be.
+/// The area is too large for a map.
 pub fn level_ground_map(low: &Point, high: &Point, cell_m: f32) -> Result<OccupancyMap, MapError> {
     let size = high - low;
     let mut cell_m = cell_m;

@@ -1,4 +1,4 @@
-//! Maps: read, made and written here, queried by planner-core as bit-packed voxel grids.
+//! Maps are read, generated and written here; planner-core queries them as bit-packed voxel grids.
 
 pub mod boxes;
 pub mod bt;
@@ -22,24 +22,24 @@ pub use ground::level_ground_map;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 
-/// Description of the maps that can be given.
+/// The names of maps that are accepted, for messages.
 pub const ACCEPTED_MAPS: &str =
     "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
 
-/// Range of the planning resolution, metres.
+/// Allowed edge of a planning cell, metres.
 pub const RESOLUTION_RANGE_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
 
-/// Map that a name stands for.
+/// What the name of a map stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source<'a> {
-    /// The nine-floor building with this seed.
+    /// The generated nine-floor building with this seed.
     Building(u64),
-    /// An OctoMap binary file.
+    /// The path of an OctoMap binary file.
     Bt(&'a Path),
 }
 
 impl<'a> Source<'a> {
-    /// Decides by the name alone.
+    /// Parses the name of a map; no file is opened.
     pub fn parse(file: &'a str) -> Result<Self, MapError> {
         let unknown = || MapError::UnknownKind { file: file.into(), expected: ACCEPTED_MAPS };
         if let Some(builtin) = file.strip_prefix("builtin:") {
@@ -57,8 +57,8 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Loads a map at the planning resolution. `file` is a builtin's name, or a path (relative to the
-/// working directory).
+/// Loads a map onto a planning grid with cells of `resolution_m`. `file` is the name of a built-in
+/// map, or a path relative to the working directory.
 pub fn load(file: &str, resolution_m: f32) -> Result<OccupancyMap, MapError> {
     match Source::parse(file)? {
         Source::Building(seed) => building::building_map(seed, resolution_m),

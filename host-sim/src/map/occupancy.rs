@@ -1,10 +1,10 @@
-//! Dense occupancy at the planning resolution, and the bit grids that planner-core queries.
+//! Occupancy of all cells of a planning grid, and the bit grids that planner-core queries.
 //!
-//! A map's leaves are laid on the planning grid so that nothing known is lost on the unsafe side: a
-//! planning cell is occupied if any occupied leaf reaches into it, else unknown if any part of it
-//! is unknown, else free. Leaves that reach in by less than [`NEGLIGIBLE_CELL_SHARE`] of a cell
-//! (rounding of the resolution) do not count. With the map's own resolution, or a multiple of it,
-//! the grid begins at a cell boundary of the map, and the map's own resolution is kept exactly.
+//! The leaves of an octree are resampled conservatively: a planning cell is occupied if any
+//! occupied leaf reaches into it, else unknown if any part of it is unknown, else free. Occupied
+//! leaves that reach in by less than [`NEGLIGIBLE_CELL_SHARE`] of a cell (rounding of the
+//! resolution) do not count. With the octree's own resolution, or a multiple of it, planning cells
+//! begin at cell boundaries of the octree; with its own resolution every cell keeps its state.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
@@ -12,24 +12,25 @@ use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
 use super::error::MapError;
 use super::octree::{KEY_ORIGIN, KEYS_PER_AXIS, Occupancy, Octree};
 
-/// Share of a planning cell's edge that counts as nothing: above the rounding of f32 over
+/// Share of a planning cell's edge that is neglected: more than the rounding error of f32 over
 /// [`MAX_DIM`] cells.
 pub const NEGLIGIBLE_CELL_SHARE: f64 = 2e-3;
-/// Most cells of a planning grid; 4 bytes each while a map is laid on it.
+/// Most cells of a planning grid; each takes 4 bytes more while an octree is resampled.
 pub const MAX_CELLS: u64 = 1 << 27;
 
-/// Whether unknown space may be flown through.
+/// Whether paths may pass through unknown space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Unknown {
     /// Unknown space is an obstacle, and so is everything beyond the map.
     #[default]
     Blocked,
-    /// Unknown space is passable but never sampled (P3D's `castRay(…, ignoreUnknown = true)`).
+    /// Unknown space is passable, but no node is placed in it (P3D's
+    /// `castRay(…, ignoreUnknown = true)`).
     Free,
 }
 
-/// A tri-state map: two bits a cell, in the bricks of [`GridShape::address`].
+/// A map with three states per cell, two bits each, in the bricks of [`GridShape::address`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupancyMap {
     shape: GridShape,
@@ -37,19 +38,20 @@ pub struct OccupancyMap {
     free: Vec<u64>,
 }
 
-/// Cells of each state.
+/// Number of cells of each state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CellCounts {
-    /// Obstacles.
+    /// Occupied cells.
     pub occupied: u64,
     /// Cells known to be empty.
     pub free: u64,
-    /// Neither.
+    /// Cells that were never seen.
     pub unknown: u64,
 }
 
 impl OccupancyMap {
-    /// A map of unknown cells. `name` is the map's, for the error when the grid is too large.
+    /// A map in which every cell is unknown. Fails if the grid is too large; `name` names the map
+    /// in that error.
     pub fn all_unknown(shape: GridShape, name: &str) -> Result<Self, MapError> {
         let cells = shape.dims.iter().map(|&d| u64::from(d)).product::<u64>();
         if shape.dims.iter().any(|&d| d == 0 || d > MAX_DIM) || cells > MAX_CELLS {
@@ -65,16 +67,16 @@ impl OccupancyMap {
         Ok(Self { shape, occupied: words.clone(), free: words })
     }
 
-    /// Lays an octree on a grid of `resolution_m`, conservatively. Cost: the leaves and the cells
-    /// they cover.
+    /// Resamples an octree onto a grid with cells of `resolution_m`, conservatively. Cost: all
+    /// leaves, and all cells that they cover.
     pub fn from_octree(tree: &Octree, resolution_m: f32, name: &str) -> Result<Self, MapError> {
         let refuse = |why: &str| MapError::Grid { file: name.into(), why: why.into() };
         if !(resolution_m.is_finite() && resolution_m > 0.0) {
             return Err(refuse("resolution_m must be positive"));
         }
         let (lo, hi) = tree.key_bounds().ok_or_else(|| refuse("it holds no known space"))?;
-        // Planning cells to one smallest cell. A ratio that is whole but for f32 rounding is meant
-        // to be whole.
+        // Planning cells per smallest cell of the octree. A ratio that is a whole number, or one
+        // over it, but for f32 rounding is taken to be exact.
         let cells_per_metre = 1.0 / f64::from(resolution_m);
         let exact = tree.resolution_m() * cells_per_metre;
         let (multiple, fraction) = ((1.0 / exact).round(), exact.round());
@@ -92,13 +94,13 @@ impl OccupancyMap {
             lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
         let shape = GridShape { dims, min: Point::from(corner), resolution_m };
         let mut map = Self::all_unknown(shape, name)?;
-        // Share of each cell that is known to be free, by volume.
+        // Share of each cell's volume that free leaves fill.
         let mut free_share = vec![0f32; dims.iter().map(|&d| d as usize).product()];
         tree.for_each_leaf(|leaf| {
             let from = [0, 1, 2].map(|a| f64::from(leaf.min[a] - lo[a]) * scale);
             let to = from.map(|f| f + f64::from(leaf.size) * scale);
-            // An obstacle reaching in by a hair is rounding; free space is summed to the last
-            // sliver.
+            // An occupied leaf that reaches into a cell by less than a hair is rounding; free
+            // volume is summed exactly.
             let hair = if leaf.occupied { NEGLIGIBLE_CELL_SHARE } else { 0.0 };
             let first = from.map(|f| (f + hair).floor() as u32);
             let last =
@@ -126,12 +128,12 @@ impl OccupancyMap {
         Ok(map)
     }
 
-    /// Unknown cells that are free in their whole volume are free; shares are in the order of the
-    /// cells, x first.
+    /// Turns unknown cells that free leaves fill entirely into free cells; `free_share` is in cell
+    /// order, x fastest.
     fn settle_free(&mut self, free_share: &[f32]) {
         let dims = self.shape.dims;
-        // Far above the rounding of the sum, and an unknown cube of a twentieth of the cell's edge
-        // still counts.
+        // The tolerance is far above the rounding of the sum; an unknown cube with a twentieth of
+        // the cell's edge still keeps the cell unknown.
         let whole = 1.0 - 1e-4;
         let mut at = 0;
         for k in 0..dims[2] {
@@ -146,8 +148,8 @@ impl OccupancyMap {
         }
     }
 
-    /// The cells as a pruned octree, its keys aligned with this grid; exact if the grid's corner
-    /// lies on a multiple of the resolution (an error otherwise, or beyond ±32768 cells).
+    /// The cells as a pruned octree. Fails if the grid's corner does not lie on a multiple of the
+    /// resolution, as the keys of an octree do, or if the grid reaches beyond ±32768 cells.
     pub fn to_octree(&self, name: &str) -> Result<Octree, MapError> {
         let refuse = |why: String| MapError::Grid { file: name.into(), why };
         let corner = self.shape.min;
@@ -165,11 +167,11 @@ impl OccupancyMap {
         tree.ok_or_else(|| refuse("it reaches beyond OctoMap's 65536 cells a side".into()))
     }
 
-    /// The cells as a pruned octree beside its place, and the shift that brings the tree there,
-    /// metres east, north, up. `None` where the tree would have no root: see
+    /// The cells as a pruned octree whose keys are rounded to the nearest cell, and the shift from
+    /// the octree to the grid, metres east, north, up. No octree where it would have no root: see
     /// [`Octree::from_cells`].
     pub fn to_shifted_octree(&self) -> (Option<Octree>, [f64; 3]) {
-        // The shortest decimal that reads as this f32: 0.1, not 0.10000000149.
+        // The shortest decimal that parses to this f32: 0.1, not 0.10000000149.
         let resolution: f64 =
             self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
         let (mut min, mut shift) = ([0; 3], [0.0; 3]);
@@ -183,12 +185,12 @@ impl OccupancyMap {
         (Octree::from_cells(resolution, min, self.shape.dims, |cell| self.state_at(cell)), shift)
     }
 
-    /// Shape and place.
+    /// Dimensions, corner and resolution of the grid.
     pub fn shape(&self) -> &GridShape {
         &self.shape
     }
 
-    /// State of a cell. Panics outside the grid.
+    /// State of a cell. Panics for a cell outside the grid.
     pub fn state_at(&self, cell: [u32; 3]) -> Occupancy {
         let (word, mask) = self.shape.address(cell);
         if self.occupied[word] & mask != 0 {
@@ -200,7 +202,7 @@ impl OccupancyMap {
         }
     }
 
-    /// Sets the state of a cell. Panics outside the grid.
+    /// Sets the state of a cell. Panics for a cell outside the grid.
     pub fn set(&mut self, cell: [u32; 3], state: Occupancy) {
         let (word, mask) = self.shape.address(cell);
         self.set_bits(word, mask, state);
@@ -216,7 +218,7 @@ impl OccupancyMap {
         }
     }
 
-    /// Sets the state of the cells `from..to` along each axis. Panics beyond the grid.
+    /// Sets the state of all cells in `from..to` along each axis. Panics beyond the grid.
     pub fn fill(&mut self, from: [u32; 3], to: [u32; 3], state: Occupancy) {
         let [bx, by, _] = self.shape.bricks();
         let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, from[axis], to[axis]));
@@ -229,7 +231,7 @@ impl OccupancyMap {
         }
     }
 
-    /// Cells of each state.
+    /// Number of cells of each state.
     pub fn counts(&self) -> CellCounts {
         let ones = |words: &[u64]| words.iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
         let (occupied, free) = (ones(&self.occupied), ones(&self.free));
@@ -237,7 +239,7 @@ impl OccupancyMap {
         CellCounts { occupied, free, unknown: all - occupied - free }
     }
 
-    /// The bit grids to plan on.
+    /// The bit grids that planner-core plans on; `unknown` says how unknown cells count.
     pub fn voxel_map(&self, unknown: Unknown) -> VoxelMap {
         let inside = self.inside_mask();
         let not_free: Vec<u64> =
@@ -250,7 +252,8 @@ impl OccupancyMap {
         VoxelMap { shape: self.shape, words, seen, never_sample, outside }
     }
 
-    /// Bits of the cells inside the dimensions; the last brick of a row may be wider.
+    /// For each brick, the bits of its cells inside the grid; bricks at the upper faces may extend
+    /// beyond it.
     fn inside_mask(&self) -> Vec<u64> {
         let mut words = Vec::with_capacity(self.free.len());
         let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, 0, self.shape.dims[axis]));
@@ -263,7 +266,7 @@ impl OccupancyMap {
     }
 }
 
-/// The bricks that the cells `from..to` of an axis reach into, each with the bits of those cells.
+/// Bricks along one axis that the cells `from..to` reach into: index, and mask of those cells.
 fn lanes(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
     let lane = |c: u32| match axis {
         0 => 0x1111_1111_1111_1111 << c,
@@ -278,45 +281,47 @@ fn lanes(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
         .collect()
 }
 
-/// Bit grids to plan on, owned.
+/// The bit grids of a map that planner-core plans on.
 #[derive(Clone, Debug)]
 pub struct VoxelMap {
-    /// Shape and place.
+    /// Dimensions, corner and resolution of the grid.
     pub shape: GridShape,
-    /// Obstacles.
+    /// One bit per cell: set if the cell is an obstacle.
     pub words: Vec<u64>,
-    /// Obstacles that were seen, if those are fewer: without unknown space.
+    /// Bits of the occupied cells alone, if unknown cells are obstacles too; `None` if `words`
+    /// holds no unknown cells.
     pub seen: Option<Vec<u64>>,
-    /// Cells where no sample is drawn, if they are more than the obstacles.
+    /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
     pub never_sample: Option<Vec<u64>>,
-    /// Content of the space beyond the faces.
+    /// Whether the space beyond the map's faces is an obstacle.
     pub outside: Outside,
 }
 
 impl VoxelMap {
-    /// The obstacles.
+    /// The bit grid of obstacles that planner-core queries.
     pub fn grid(&self) -> VoxelGrid<'_> {
         VoxelGrid::new(self.shape, self.outside, &self.words)
             .expect("the words were made for the shape")
     }
 
-    /// Cells where no sample may lie; beyond the grid's faces none lies either.
+    /// The bit grid of cells in which no roadmap node may lie; space beyond the map counts as such.
     pub fn never_sample(&self) -> VoxelGrid<'_> {
         let words = self.never_sample.as_deref().unwrap_or(&self.words);
         VoxelGrid::new(self.shape, Outside::Blocked, words)
             .expect("the words were made for the shape")
     }
 
-    /// Whether a cell is an obstacle only because nobody has seen it. Panics outside the grid.
+    /// Whether a cell is an obstacle only because it is unknown. Panics for a cell outside the
+    /// grid.
     pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
         let (word, mask) = self.shape.address(cell);
         self.seen.as_ref().is_some_and(|seen| self.words[word] & !seen[word] & mask != 0)
     }
 
-    /// Height of the top of the first obstacle below `point`, metres: where a vehicle sinking from
-    /// there comes to stand. An obstacle around the point itself counts up to the point. Without
-    /// one it is the bottom of a map beyond which all is blocked. `None` beside the map, or over
-    /// nothing.
+    /// Height on which a vehicle that sinks vertically from `point` comes to stand, metres: the top
+    /// of the first obstacle below it, or `point` itself inside an obstacle. Without an obstacle it
+    /// is the map's bottom if the outside is blocked, else `None`. Also `None` for a point beside
+    /// or below the map.
     pub fn ground_below(&self, point: &Point) -> Option<f32> {
         let mut inside = *point;
         inside.z =

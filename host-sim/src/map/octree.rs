@@ -1,36 +1,37 @@
-//! Occupancy octree with OctoMap's shape: depth 16, every leaf free or occupied, a missing leaf
-//! unknown.
+//! An octree with OctoMap's structure: depth 16, every leaf free or occupied; space without a leaf
+//! is unknown.
 //!
-//! OctoMap (Hornung et al. 2013) addresses the smallest cells by 16-bit keys, key 32768 beginning
-//! at coordinate 0. Only inner nodes are stored, eight bytes each: two bits a child as in the `.bt`
-//! file, and where the inner children of that node begin. A lookup walks at most 16 nodes; a walk
-//! over all leaves touches each inner node once.
+//! OctoMap (Hornung et al. 2013) addresses its smallest cells by 16-bit keys; the cell with key
+//! 32768 begins at coordinate 0. Only inner nodes are stored, in eight bytes each: two bits for
+//! each child as in the `.bt` file, and the index at which the node's inner children begin. A
+//! lookup reads at most 16 nodes; a traversal of all leaves reads each inner node once.
 
-/// Levels below the root; the smallest cell has this depth.
+/// Levels below the root; the smallest cells are at this depth.
 pub const TREE_DEPTH: u32 = 16;
-/// Smallest cells along one edge of the root.
+/// Smallest cells along one edge of the octree.
 pub const KEYS_PER_AXIS: u32 = 1 << TREE_DEPTH;
 /// Key of the cell whose lower faces pass through coordinate 0.
 pub const KEY_ORIGIN: u32 = KEYS_PER_AXIS / 2;
 
-/// Occupancy of a place.
+/// State of a cell or point of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Occupancy {
-    /// Never seen.
+    /// Never observed.
     Unknown,
-    /// Seen to be empty.
+    /// Observed to be empty.
     Free,
-    /// Seen to be an obstacle.
+    /// Observed to be an obstacle.
     Occupied,
 }
 
-/// A child as the `.bt` file codes it.
+/// Codes of a child in a `.bt` file.
 pub(super) const UNKNOWN: u16 = 0;
 pub(super) const FREE: u16 = 1;
 pub(super) const OCCUPIED: u16 = 2;
 pub(super) const INNER: u16 = 3;
 
-/// An inner node: two bits a child, and the index of its first inner child (the others follow it).
+/// An inner node: two bits for each child, and the index of its first inner child; the others
+/// follow it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Inner {
     pub(super) children: u16,
@@ -42,7 +43,7 @@ impl Inner {
         self.children >> (2 * index) & 3
     }
 
-    /// Index at which the inner child `index` is stored.
+    /// Index in the node list of the inner child in octant `index`.
     pub(super) fn inner_index(self, index: u32) -> usize {
         let before = self.children & ((1 << (2 * index)) - 1);
         let inner = before & before >> 1 & 0x5555;
@@ -50,25 +51,25 @@ impl Inner {
     }
 }
 
-/// A leaf: a cube of `size` smallest cells along each edge, from the key `min` on.
+/// A leaf: a cube of `size` smallest cells along each edge, whose lowest cell has the key `min`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Leaf {
-    /// Keys of the cube's lowest corner along x, y, z.
+    /// Keys of the cube's lowest cell along x, y, z.
     pub min: [u32; 3],
-    /// Edge in smallest cells, a power of two.
+    /// Edge of the cube in smallest cells, a power of two.
     pub size: u32,
-    /// Whether it is an obstacle; free if not.
+    /// Whether the cube is an obstacle; otherwise it is free.
     pub occupied: bool,
 }
 
-/// Content of a tree.
+/// Numbers of nodes and leaves of an octree, and their volumes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// All nodes, root and leaves included (OctoMap's `size()`).
+    /// Number of all nodes, root and leaves included (OctoMap's `size()`).
     pub nodes: usize,
-    /// Occupied leaves of any size.
+    /// Number of occupied leaves of any size.
     pub occupied_leaves: usize,
-    /// Free leaves of any size.
+    /// Number of free leaves of any size.
     pub free_leaves: usize,
     /// Volume of the occupied leaves, cubic metres.
     pub occupied_m3: f64,
@@ -76,11 +77,11 @@ pub struct Counts {
     pub free_m3: f64,
 }
 
-/// An occupancy octree in one arena.
+/// An occupancy octree whose inner nodes are stored in one list.
 #[derive(Clone, Debug)]
 pub struct Octree {
     resolution_m: f64,
-    /// The root is the last; an empty tree has none.
+    /// Inner nodes; the root is the last. An empty octree has none.
     pub(super) inner: Vec<Inner>,
 }
 
@@ -89,9 +90,9 @@ impl Octree {
         Self { resolution_m, inner }
     }
 
-    /// Builds the pruned tree of a box of smallest cells: `dims` cells from the key `min` on,
-    /// `cell` giving each by its index in the box. Cost: one call a cell. `None` if the box leaves
-    /// the key space.
+    /// Builds the pruned octree of a box of `dims` smallest cells whose lowest cell has the key
+    /// `min`; `cell` returns the state of each cell by its index in the box, and is called once for
+    /// each. `None` if the box reaches beyond the key space, or fills it with one known state.
     pub fn from_cells(
         resolution_m: f64,
         min: [u32; 3],
@@ -106,8 +107,8 @@ impl Octree {
             Builder { inner: Vec::new(), min, end: end.map(|e| e as u32), cell: &mut cell };
         match builder.build([0; 3], KEYS_PER_AXIS) {
             Child::Leaf(UNKNOWN) => {}
-            // A root without children has no code in the file; only a box of all 65536³ cells comes
-            // here.
+            // A root without children has no code in the file; only a box of all 65536³ cells in
+            // one state gets here.
             Child::Leaf(_) => return None,
             Child::Inner(root) => builder.inner.push(root),
         }
@@ -123,7 +124,7 @@ impl Octree {
         self.inner.last().copied()
     }
 
-    /// Calls `visit` for every leaf, in the file's order.
+    /// Calls `visit` for every leaf, in the order of the file.
     pub fn for_each_leaf(&self, mut visit: impl FnMut(Leaf)) {
         if let Some(root) = self.root() {
             self.walk(root, [0; 3], KEYS_PER_AXIS / 2, &mut visit);
@@ -141,7 +142,7 @@ impl Octree {
         }
     }
 
-    /// Occupancy of the smallest cell with these keys; beyond the key space it is unknown.
+    /// State of the smallest cell with these keys; unknown beyond the key space.
     pub fn at_key(&self, key: [u32; 3]) -> Occupancy {
         let Some(mut node) = self.root() else { return Occupancy::Unknown };
         if key.iter().any(|&k| k >= KEYS_PER_AXIS) {
@@ -159,7 +160,7 @@ impl Octree {
         Occupancy::Unknown
     }
 
-    /// Occupancy of a point, metres in the map's frame.
+    /// State at a point, metres in the map's frame.
     pub fn occupancy_at(&self, point: [f64; 3]) -> Occupancy {
         let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
         if key.iter().all(|k| (0.0..f64::from(KEYS_PER_AXIS)).contains(k)) {
@@ -169,7 +170,7 @@ impl Octree {
         }
     }
 
-    /// Nodes, leaves and volumes.
+    /// Counts nodes and leaves, and sums up volumes.
     pub fn counts(&self) -> Counts {
         let mut counts = Counts { nodes: usize::from(!self.inner.is_empty()), ..Counts::default() };
         for node in &self.inner {
@@ -188,8 +189,8 @@ impl Octree {
         counts
     }
 
-    /// Lowest and highest key (exclusive) of the known space along each axis, or `None` for an
-    /// empty tree.
+    /// Lowest key and highest key (exclusive) of the known space along each axis; `None` for an
+    /// empty octree.
     pub fn key_bounds(&self) -> Option<([u32; 3], [u32; 3])> {
         let (mut lo, mut hi) = ([KEYS_PER_AXIS; 3], [0; 3]);
         self.for_each_leaf(|leaf| {
@@ -201,7 +202,7 @@ impl Octree {
         (hi[0] > 0).then_some((lo, hi))
     }
 
-    /// Corners of the known space, metres, or `None` for an empty tree.
+    /// Lowest and highest corner of the known space, metres; `None` for an empty octree.
     pub fn metric_bounds(&self) -> Option<([f64; 3], [f64; 3])> {
         let metres =
             |key: [u32; 3]| key.map(|k| (f64::from(k) - f64::from(KEY_ORIGIN)) * self.resolution_m);
@@ -209,7 +210,8 @@ impl Octree {
     }
 }
 
-/// Lowest corner of the octant `index` (x in bit 0, y in bit 1, z in bit 2) with edge `size`.
+/// Lowest key of the octant `index` (x in bit 0, y in bit 1, z in bit 2) of a node at `min`; `size`
+/// is the octant's edge.
 fn octant_corner(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
     [0, 1, 2].map(|axis| min[axis] + (index >> axis & 1) * size)
 }
@@ -252,7 +254,8 @@ impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
             };
             children |= code << (2 * index);
         }
-        // Eight like leaves are one, as OctoMap prunes; eight unknown ones are nothing.
+        // Eight equal leaves become one, as OctoMap prunes; eight unknown children become an
+        // unknown leaf.
         match children {
             0x0000 => Child::Leaf(UNKNOWN),
             0x5555 => Child::Leaf(FREE),

@@ -1,5 +1,5 @@
-//! A coverage mission as it is flown: the ground, the mission file, and what all companions plan
-//! from it.
+//! A coverage mission as companions fly it: the ground as a map, the mission file, and the plan
+//! that all companions compute from it.
 
 use std::iter;
 
@@ -32,15 +32,15 @@ use crate::scenario::coverage::{Method, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
 
-/// Height over the pad at which the take-off ends and the landing begins, metres: everything
-/// between them is path.
+/// Height above the pad at which the take-off ends and the landing begins, metres; in between the
+/// vehicle flies its path.
 const PATH_OVER_PAD_M: f32 = 3.0;
-/// Extent of the ground beyond area and pads, and of the air over the highest layer, metres.
+/// Distance by which the map extends beyond area and pads, and above the highest layer, metres.
 const AROUND_AREA_M: f32 = 30.0;
 
 type DeskWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 
-/// The mission up to its files.
+/// Prepares a coverage mission: checks that companions can fly it, and encodes its files.
 pub(super) fn prepare(
     mut scenario: Scenario,
     board: Option<&'static BoardCapacity>,
@@ -72,8 +72,8 @@ pub(super) fn prepare(
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
     }
-    // Over fields there is nothing but the others to keep clear of: each may deviate half of what
-    // lies between.
+    // Over fields vehicles have to keep clear only of each other: each may deviate from its path by
+    // half of what the separation leaves beyond the safety distance.
     let stray_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
@@ -106,8 +106,8 @@ pub(super) fn prepare(
     Ok(mission)
 }
 
-/// No vehicle is sent out for longer than its simulated battery lasts until it has to land:
-/// companions fly a route whole.
+/// Refuses a route that would use more than the usable share of the vehicle's simulated battery:
+/// companions fly a route without a battery swap.
 fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
@@ -139,7 +139,8 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A vehicle that believes to be at the height of the pictures must be above the ground.
+/// Refuses pictures so low that a vehicle whose estimate is too high by the greatest error could
+/// touch the ground.
 fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = above_ground_m(planned.wanted);
     for vehicle in &planned.scenario.vehicles {
@@ -158,31 +159,33 @@ fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Method by which the work is divided.
+/// The scenario's method of dividing the area among vehicles; the default one without an area.
 pub fn division_method(scenario: &Scenario) -> Method {
     scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
 
-/// The ground as the mission file has it.
+/// The terrain settings of the mission file: height above ground, tolerance, lowest and highest
+/// ground.
 fn ground_of(area: &scenario::coverage::Area, terrain: &Terrain) -> anyhow::Result<Ground> {
     let [low_m, high_m] = ground_height_range_m(terrain)?;
     Ok(Ground { height_m: area.height_m, tolerance_m: terrain.tolerance_m, low_m, high_m })
 }
 
-/// The least height of pictures above the ground.
+/// Least height of the pictures above the ground, metres.
 fn above_ground_m(area: &scenario::coverage::Area) -> f32 {
     if area.terrain.is_some() { area.height_m } else { area.heights.mission_m }
 }
 
-/// The lowest and the highest ground below an area, where it is not level, metres above the origin.
+/// The lowest and the highest ground of a terrain, metres above the origin. The highest is limited
+/// to that of the field which paths follow.
 fn ground_height_range_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
     let field = FieldView::parse(&terrain.field).map_err(|error| anyhow!("no field: {error}"))?;
     let [low_m, high_m] = terrain.grid.range_m().context("no ground")?;
     Ok([low_m, high_m.min(field.highest_m())])
 }
 
-/// Level ground below area and pads, as low as it is anywhere: the map of a flight over terrain has
-/// that beside.
+/// A map of level ground below area and pads. Over terrain its ground is at the terrain's lowest
+/// height; the real heights are then in the terrain's grid.
 fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
     let places = planned.wanted.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
     let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
@@ -202,7 +205,7 @@ fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
 }
 
 impl Mission {
-    /// Writes the mission file.
+    /// Encodes the mission file of an area, with each vehicle's share.
     fn encode_area(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
         let Some(area) = &self.scenario.area else { return Ok(()) };
         let parts = match division_method(&self.scenario) {
@@ -233,7 +236,8 @@ impl Mission {
         Ok(())
     }
 
-    /// Plans as every companion does.
+    /// Plans the flights of all vehicles as every companion does, without the waypoints `done`,
+    /// after the divisions `losses`; `ws` keeps the lanes and routes.
     fn plan_area<'l>(
         &self,
         done: &[WaypointRange],
@@ -270,20 +274,22 @@ impl Mission {
         Ok(plan)
     }
 
-    /// The heights to fly above, as a board reads them; none over level ground.
+    /// The field of heights that paths follow over terrain, parsed as on a board; `None` over level
+    /// ground.
     fn height_field(&self) -> Option<FieldView<'_>> {
         FieldView::parse(&self.roadmap_file).ok()
     }
 
-    /// The plan of a coverage mission.
+    /// Plans the coverage mission from its start, with nothing photographed.
     pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
         self.plan_area(&[], iter::empty(), &mut on_heap(DeskWorkspace::new))
     }
 
-    /// The plan of what is left when these waypoints are photographed, after these losses.
+    /// Plans what is left: without the waypoints `done`, and after the divisions `losses`, each of
+    /// which is one [`DivisionInput`] per vehicle.
     ///
     /// # Errors
-    /// Reason why there is none.
+    /// No plan was found; the error says why.
     pub fn plan_rest<'l>(
         &self,
         done: &[WaypointRange],
@@ -292,7 +298,8 @@ impl Mission {
         self.plan_area(done, losses, &mut on_heap(DeskWorkspace::new))
     }
 
-    /// A vehicle's path home over the area, or aside.
+    /// Plans one vehicle's path over the area to its pad or to a place aside, clear of the keep-out
+    /// zones `obstacles`.
     pub(super) fn plan_area_detour(
         &self,
         request: &DetourRequest,
@@ -312,7 +319,8 @@ impl Mission {
         Ok(own)
     }
 
-    /// The first of a board's limits that the area exceeds.
+    /// Text about the first capacity of a board that the area exceeds; `None` if the board holds
+    /// it.
     pub(super) fn area_excess(
         &self,
         view: &CoverageView<'_>,

@@ -1,5 +1,6 @@
-//! Whether a board that gets the files plans what the desk planned: it searches with less memory,
-//! so it may find no plan, or another one, with which it would take off with nobody.
+//! Checks whether a board computes the desk's plan from the same files. A board searches with less
+//! memory, so it may find no plan, or one with another CRC: its vehicle would then not start with
+//! the others.
 
 use companion::planner;
 use companion::storage::mission_file::MissionKind;
@@ -11,7 +12,8 @@ use super::ready::{Mission, SwarmPlan};
 use crate::capacity::{BoardCapacity, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
 
 impl Mission {
-    /// The first of a board's limits that the mission exceeds.
+    /// Text about the first capacity of a board that the mission or its plan exceeds; `None` if the
+    /// board can fly it.
     pub fn board_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
         let mission = self.mission_view();
         let of_mission = || board.mission_excess(&mission);
@@ -30,7 +32,8 @@ impl Mission {
         }
     }
 
-    /// The first reason why a board cannot make the same plan.
+    /// Plans with the capacities of a board: `None` if the plan's CRC equals that of `plan`, else a
+    /// text that says why not.
     fn plan_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
         let planned = if board.nodes == NUCLEO_H743.nodes {
             self.plan_crc_on_board::<{ NUCLEO_H743.nodes }, { NUCLEO_H743.vehicles }, { NUCLEO_H743.pieces }>(
@@ -60,7 +63,8 @@ impl Mission {
         }
     }
 
-    /// The CRC of the plan that is found with the memory of a board.
+    /// CRC of the plan that the planner finds with a board's capacities: `N` nodes, `V` vehicles,
+    /// `P` timed segments.
     fn plan_crc_on_board<const N: usize, const V: usize, const P: usize>(
         &self,
         board: &BoardCapacity,

@@ -16,11 +16,12 @@ use crate::roadmap::passages::WantedConnection;
 use crate::roadmap::{self, BuildTimes, Roadmap};
 use crate::scenario::{self, Scenario, Terminals};
 
-/// Spacing of the places tried as slots around a single goal, metres.
+/// Spacing of the grid on which slots around a single goal are searched, metres.
 const SLOT_GRID_M: f32 = 0.25;
 
-/// Height of a start or goal over where a vehicle of this radius stands below it; its column has
-/// the required clearance.
+/// Height of a start or goal above the hull centre of a vehicle of `radius_m` that stands on the
+/// ground below it, metres. Fails if the vertical column between is nearer to an obstacle than the
+/// required clearance; the error suggests the nearest place that is not.
 pub(super) fn height_over_ground(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -104,8 +105,8 @@ pub(super) fn vehicle_tasks(
     scenario.vehicles.iter().enumerate().map(task).collect()
 }
 
-/// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough
-/// apart to land in.
+/// The goals of the scenario. In mode `"single-goal"`: as many slots around the one goal as there
+/// are vehicles, far enough apart that vehicles can stand on all of them.
 pub(super) fn goal_points(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -117,9 +118,10 @@ pub(super) fn goal_points(
     }
     let (goal, wanted) = (given[0], scenario.vehicles.len());
     let (largest_m, required_m) = (scenario.largest_radius_m(), scenario.required_clearance_m());
-    // Vehicles that stand on two of them must not keep each other from landing.
+    // A vehicle that has landed in one slot must not keep another from landing in the next.
     let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
-    // The circle fits this many discs of half the spacing, with room to spare for walls.
+    // Half the side of the square that is searched, metres: it fits that many slots, with room to
+    // spare for walls.
     let reach_m = apart_m * (2.0 + (wanted as f32).sqrt() * 2.0);
     let steps = (reach_m / SLOT_GRID_M) as i32;
     let mut offsets: Vec<(i32, i32)> =
@@ -149,7 +151,8 @@ pub(super) fn goal_points(
     )
 }
 
-/// Shortest and longest edge, metres; shares are of the map's longest side.
+/// Shortest and longest edge of the roadmap, metres; lengths given as shares are of the map's
+/// longest side.
 fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32)> {
     let settings = &scenario.roadmap;
     let size_m = (map.shape.max() - map.shape.min).max();
@@ -166,8 +169,8 @@ fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32
     Ok((min_m, max_m))
 }
 
-/// Which starts and goals are to be joined: a vehicle and its own goal, or else each of them with
-/// each.
+/// Pairs of start and goal that the roadmap should join, with the clearance they need: each
+/// vehicle's start with its own goal, or with every goal where none is its own.
 fn wanted_connections(scenario: &Scenario, goals: usize) -> Vec<WantedConnection> {
     let vehicles = scenario.vehicles.len();
     let pairs = scenario.vehicles.iter().enumerate().flat_map(|(start, vehicle)| {
@@ -190,8 +193,8 @@ pub(super) fn build_roadmap(
     let starts = scenario.vehicles.iter().map(|v| v.start);
     let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
     let settings = &scenario.roadmap;
-    // Tested for the smallest vehicle; a larger one leaves out the edges whose clearance is too
-    // small for it.
+    // Edges are tested with the clearance of the smallest vehicle; the search of a larger one skips
+    // edges whose stored clearance is too small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
     let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
     let config = Config {

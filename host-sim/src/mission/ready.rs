@@ -1,5 +1,5 @@
-//! A mission ready to be planned and flown: what all kinds have in common, and the file that boards
-//! get.
+//! A mission ready to be planned and flown: data that missions with goals and with an area share,
+//! and the encoding of the mission file.
 
 use std::sync::OnceLock;
 
@@ -21,45 +21,48 @@ use crate::result::{RoadmapSize, Timing};
 use crate::roadmap::Roadmap;
 use crate::scenario::{self, Scenario};
 
-/// The plan of a swarm with the desk's capacities.
+/// The swarm's plan, with the desk's capacities.
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
-/// One companion's part of the swarm's plan.
+/// One vehicle's part of the swarm's plan, with its gates.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
 /// Acceleration and braking that missions are planned with, m/s².
 pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
-/// Nominal speed of take-off and landing, m/s.
+/// Nominal speed of take-off and landing in a plan, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;
-/// Mean speed of a flight over its cruise speed: corners, braking and gusts take the rest.
+/// Mean speed along a path that the schedule assumes, as a share of cruise speed: corners, braking
+/// and gusts take the rest.
 const MEAN_SPEED_SHARE: f32 = 0.9;
 
 /// A mission ready to be planned and flown.
 pub struct Mission {
-    /// Scenario of the mission.
+    /// The scenario that the mission was made from.
     pub scenario: Scenario,
     /// The map on the planning grid.
     pub map: VoxelMap,
-    /// Where the vehicles go: the scenario's goals, or the slots around its single one.
+    /// Goals of the scenario, or the slots around its single goal, metres ENU.
     pub goals: Vec<Point>,
-    /// The roadmap.
+    /// The roadmap of a mission with goals; empty for an area.
     pub roadmap: Roadmap,
-    /// The roadmap as the file on the board, or the field of an area over terrain.
+    /// Bytes of the roadmap file for a board; over terrain those of the field file; empty over
+    /// level ground.
     pub roadmap_file: Vec<u8>,
-    /// The mission as the file on the board.
+    /// Bytes of the mission file for a board.
     pub mission_file: Vec<u8>,
     /// The vehicles' tasks, in the order of the scenario.
     pub tasks: Vec<VehicleTask>,
-    /// Height of each goal over where a vehicle of the largest radius stands below it, metres.
+    /// For each goal: its height above the hull centre of a vehicle of the largest radius that
+    /// stands on the ground below it, metres; the length of the landing.
     pub descents_m: Vec<f32>,
     pub(super) schedule: ScheduleConfig,
-    /// Computing times so far.
+    /// Computing times of the steps done so far.
     pub timing: Timing,
-    /// The board that the files are for; none if they are for the desk.
+    /// The board that the files have to fit; `None` if they are for the desk.
     pub(super) board: Option<&'static BoardCapacity>,
     pub(super) clearance_field: OnceLock<ClearanceField>,
 }
 
-/// Separation and nominal speeds of a scenario.
+/// Separations and nominal speeds by which the scenario's flights are scheduled.
 pub(super) fn schedule_config(scenario: &Scenario) -> ScheduleConfig {
     ScheduleConfig {
         separation_m: scenario.deconfliction.separation_m,
@@ -74,7 +77,7 @@ pub(super) fn schedule_config(scenario: &Scenario) -> ScheduleConfig {
 }
 
 impl Mission {
-    /// A mission without goals, roadmap and files.
+    /// A mission with empty goals, roadmap and files, for its caller to fill in.
     pub(super) fn new(
         scenario: Scenario,
         map: VoxelMap,
@@ -98,18 +101,19 @@ impl Mission {
         }
     }
 
-    /// The map's distance field, made when first asked for: only a flight needs it.
+    /// Lower bounds of the distance from the map's cells to the nearest obstacle; computed at the
+    /// first call, since only a flight needs them.
     pub fn clearance_field(&self) -> &ClearanceField {
         self.clearance_field.get_or_init(|| ClearanceField::new(&self.map.grid()))
     }
 
-    /// Separation and nominal speeds that the mission file carries; [`Mission::set_separation`]
-    /// changes them.
+    /// Separations and nominal speeds of the mission file; [`Mission::set_separation`] changes the
+    /// separations.
     pub fn schedule(&self) -> &ScheduleConfig {
         &self.schedule
     }
 
-    /// One companion's part of the swarm's plan.
+    /// The part of `plan` that vehicle `index` flies, with its gates.
     pub fn own_plan(&self, plan: &SwarmPlan, index: usize) -> Result<Box<OwnPlan>, ScheduleError> {
         let mut workspace = Default::default();
         let mut own = Box::new(OwnPlan::default());
@@ -117,20 +121,21 @@ impl Mission {
         Ok(own)
     }
 
-    /// The roadmap as a board reads it; the whole file is checked at each call.
+    /// The roadmap file, parsed as on a board: each call checks the whole file.
     pub fn view(&self) -> RoadmapView<'_> {
         parse_roadmap(&self.roadmap_file)
     }
 
-    /// Height of what a vehicle comes to stand on that sinks from a place, metres; none beside the
-    /// map.
+    /// Height of the ground on which a vehicle that sinks vertically from `place` would come to
+    /// stand, metres ENU; `None` where the map has no ground below. Over terrain it is the
+    /// terrain's.
     pub fn ground_below(&self, place: &Point) -> Option<f32> {
         let below_m = self.map.ground_below(place)?;
         let terrain = self.scenario.area.as_ref().and_then(|area| area.terrain.as_ref());
         Some(terrain.and_then(|terrain| terrain.grid.height_at(&place.xy())).unwrap_or(below_m))
     }
 
-    /// Size of the roadmap.
+    /// Numbers of nodes and edges, and bytes, of the roadmap.
     pub fn roadmap_size(&self) -> RoadmapSize {
         RoadmapSize {
             nodes: self.roadmap.nodes.len(),
@@ -139,7 +144,7 @@ impl Mission {
         }
     }
 
-    /// Place of a vehicle in the scenario.
+    /// Index, in the scenario's order, of the vehicle with this id.
     ///
     /// # Errors
     /// No vehicle has this id.
@@ -151,14 +156,15 @@ impl Mission {
         })
     }
 
-    /// Place of the centre of a vehicle's body while it stands on its pad.
+    /// Position of the hull centre of vehicle `index` while it stands on its pad, WGS84.
     pub fn pad_position(&self, index: usize) -> Geodetic {
         let start = self.scenario.vehicles[index].start;
         let pad = start - Point::new(0.0, 0.0, self.tasks[index].climb_m);
         enu_to_geodetic(&self.scenario.map.origin, &pad)
     }
 
-    /// The mission as a companion reads it; its CRC covers all that companions must agree on.
+    /// The mission file, parsed as by a companion; its CRC covers all that companions must agree
+    /// on.
     pub fn mission_view(&self) -> MissionView<'_> {
         MissionView::parse(&self.mission_file).expect("we wrote it ourselves")
     }

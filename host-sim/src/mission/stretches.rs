@@ -1,4 +1,5 @@
-//! Routes with more lanes than a path holds: how often all divide what is left, if nobody is lost.
+//! Routes with more lanes than one path holds are flown in stretches. Counts the divisions of the
+//! remaining area that they take if no vehicle is lost.
 
 use anyhow::bail;
 use companion::swarm::fleet::{COMMITMENT_S, DivisionInput, MAX_DIVISIONS};
@@ -10,8 +11,8 @@ use crate::capacity::WAYPOINTS;
 /// Number of divisions, out of `MAX_DIVISIONS`, that are reserved for losses of vehicles.
 const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 
-/// Time at which a flight will ask for a division by its plan, seconds after the plan began; none
-/// if its route ends with its path.
+/// Time at which a flight, by its plan, will request a division, seconds after the start; `None` if
+/// the whole route fits into its path.
 fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.goes_on)?;
@@ -19,7 +20,8 @@ fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     Some(flight.depart_s + end.arrive_s - COMMITMENT_S)
 }
 
-/// Lot of a flight if all are to hold `t_s` seconds after the plan began.
+/// What a vehicle contributes to a division if all hold `t_s` seconds after the start: whether it
+/// still takes part, and how far along its path it holds, decimetres (0 on its pad).
 fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
     let waypoints = flight.path.waypoints();
     let flown_s = t_s - flight.depart_s;
@@ -42,8 +44,8 @@ fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
     DivisionInput { alive: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
 }
 
-/// Lots when the first vehicle of a plan requests a division, by rank; none where no route
-/// continues.
+/// Inputs, in the order of ids, of the division that the first vehicle to reach the end of its
+/// stretch requests; `None` if every route fits into its path.
 pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
     let hold_s =
         plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
@@ -53,7 +55,8 @@ pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
 }
 
 impl Mission {
-    /// The divisions that routes need if nobody is lost are fewer than vehicles may agree on.
+    /// Refuses a mission whose routes take more divisions without a loss than `MAX_DIVISIONS` less
+    /// the reserve.
     pub(super) fn check_stretches(&self, plan: &SwarmPlan) -> anyhow::Result<()> {
         let mut losses: Vec<Vec<DivisionInput>> = Vec::new();
         let mut next = next_division_inputs(plan);

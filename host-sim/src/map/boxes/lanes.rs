@@ -1,10 +1,10 @@
-//! Numbers that are calculated with together: as many as the machine's vector instructions take.
+//! Vectors of f32 with arithmetic operators, as wide as the machine's vector instructions.
 
 use std::ops::{Add, Div, Mul, Sub};
 
 use pulp::Simd;
 
-/// A vector of f32 lanes.
+/// One vector of f32 numbers.
 #[derive(Clone, Copy)]
 pub(super) struct SimdLanes<S: Simd> {
     simd: S,
@@ -23,7 +23,7 @@ impl<S: Simd> SimdLanes<S> {
         Self::new(simd, simd.splat_f32s(x))
     }
 
-    /// Three numbers, each in all of its own.
+    /// Three vectors, each with one of the numbers in every lane.
     #[inline(always)]
     pub(super) fn splat_triple(simd: S, [x, y, z]: [f32; 3]) -> [Self; 3] {
         [Self::splat(simd, x), Self::splat(simd, y), Self::splat(simd, z)]
@@ -35,7 +35,7 @@ impl<S: Simd> SimdLanes<S> {
         Self::splat(self.simd, 0.0)
     }
 
-    /// A part of some numbers on three axes.
+    /// Vector number `part` of the arrays of three axes.
     #[inline(always)]
     pub(super) fn load_part<const N: usize>(
         simd: S,
@@ -49,31 +49,31 @@ impl<S: Simd> SimdLanes<S> {
         ]
     }
 
-    /// Writes them as a part of some numbers.
+    /// Writes the vector as vector number `part` of an array.
     #[inline(always)]
     pub(super) fn store_part(self, numbers: &mut [f32], part: usize) {
         S::as_mut_simd_f32s(numbers).0[part] = self.numbers;
     }
 
-    /// The greater ones; the other's where one is no number.
+    /// The greater number of each lane; `other`'s if a lane of `self` is NaN.
     #[inline(always)]
     pub(super) fn max(self, other: Self) -> Self {
         Self::new(self.simd, self.simd.max_f32s(self.numbers, other.numbers))
     }
 
-    /// The smaller ones; the other's where one is no number.
+    /// The smaller number of each lane; `other`'s if a lane of `self` is NaN.
     #[inline(always)]
     pub(super) fn min(self, other: Self) -> Self {
         Self::new(self.simd, self.simd.min_f32s(self.numbers, other.numbers))
     }
 
-    /// Which of them are below the other's.
+    /// Mask of the lanes in which `self` is less than `other`.
     #[inline(always)]
     pub(super) fn is_below(self, other: Self) -> S::m32s {
         self.simd.less_than_f32s(self.numbers, other.numbers)
     }
 
-    /// Lanes of `self` where a mask is true, of the other elsewhere.
+    /// Lanes of `self` where the mask is true, lanes of `other` elsewhere.
     #[inline(always)]
     pub(super) fn select(self, mask: S::m32s, other: Self) -> Self {
         Self::new(self.simd, self.simd.select_f32s(mask, self.numbers, other.numbers))

@@ -1,37 +1,38 @@
-//! The nearest obstacle to a segment, by branch and bound over a tree of boxes.
+//! Finds the obstacle nearest to a segment by branch and bound over a tree of boxes.
 //!
-//! All boxes of a node are treated alike, by vector instructions where the machine has them:
-//! branches that depend on distances cannot be foreseen, and cost more than arithmetic. The results
-//! are the same bits with any of them. What calculates with [`SimdLanes`] is inlined into
-//! [`Search::with_simd`], and closures are not: so there are none.
+//! All boxes of a node are computed at once, with vector instructions where the machine has them:
+//! branches that depend on distances are mispredicted often, and cost more than the arithmetic. The
+//! results are bit-identical with any instruction set. Functions that use [`SimdLanes`] must be
+//! inlined into [`Search::with_simd`]; closures would not be, so there are none.
 
 use pulp::{Simd, WithSimd};
 
 use super::lanes::SimdLanes;
 
-/// Boxes of a node.
+/// Number of boxes in a node.
 pub(super) const BOXES_PER_NODE: usize = 8;
-/// Most nodes that wait to be opened: 7 a level, and the last one's 8. Seven partings, always of
-/// the largest part and into two of which neither has less than a third, leave none with more than
-/// a quarter: 2³² boxes make 16 levels.
+/// Capacity of the search's stack of nodes. Seven splits, always of the largest part, into two with
+/// at least a third each, leave no part with more than a quarter of the boxes: 2³² boxes make 16
+/// levels. Depth first, at most 7 nodes of each level wait, and all 8 of the last: 16 · 7 + 8.
 const MAX_WAITING_NODES: usize = 120;
-/// Child index of a node whose boxes are obstacles.
+/// Value in `child` that marks a node whose boxes are obstacles.
 const LEAF: u32 = 0;
-/// Coordinate of a box that is beyond everything, cells: its square is finite.
+/// Coordinate of unused boxes, beyond every map, cells; its square is still finite in f32.
 const FAR_AWAY_CELLS: f32 = 1e18;
 
-/// Up to [`BOXES_PER_NODE`] boxes, coordinate by coordinate so that they are compared together;
-/// cells. All of them are obstacles, or none is.
+/// Up to [`BOXES_PER_NODE`] boxes, stored by coordinate so that vector instructions compare them
+/// together; cells. Either all of them are obstacles, or all are bounding boxes of child nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     pub(super) low: [[f32; BOXES_PER_NODE]; 3],
     pub(super) high: [[f32; BOXES_PER_NODE]; 3],
-    /// Number of nodes from this one to the one below a box, or [`LEAF`].
+    /// Offset in the node list from this node to the child under each box; [`LEAF`] if the boxes
+    /// are obstacles.
     pub(super) child: [u32; BOXES_PER_NODE],
 }
 
 impl Node {
-    /// Boxes that are beyond everything.
+    /// A node whose boxes are all unused.
     pub(super) const EMPTY: Self = Self {
         low: [[FAR_AWAY_CELLS; BOXES_PER_NODE]; 3],
         high: [[FAR_AWAY_CELLS; BOXES_PER_NODE]; 3],
@@ -43,18 +44,18 @@ impl Node {
     }
 }
 
-/// A node to be opened, and the least square of a distance to what it holds.
+/// A node that waits to be opened, and a lower bound of the squared distance to its boxes.
 #[derive(Clone, Copy, Default)]
 struct OpenNode {
     square: f32,
     node: u32,
 }
 
-/// A search for the squared distance to the nearest obstacle if that is below `bound`, else
-/// `bound`; any that is at most `enough`. A type and no closure, so that all of it is compiled for
-/// the vector instructions that it is given to.
+/// A search for the squared distance, cells², to the nearest obstacle; the result is at most
+/// `bound`. It stops at the first distance found that is at most `enough`. It is a type, not a
+/// closure, so that all of it is compiled for the vector instructions in use.
 pub(super) struct Search<'a> {
-    /// The first is the root.
+    /// All nodes of the tree; the root is the first.
     pub(super) nodes: &'a [Node],
     pub(super) segment: &'a Segment,
     pub(super) bound: f32,
@@ -93,7 +94,7 @@ impl WithSimd for Search<'_> {
     }
 }
 
-/// The least of some numbers.
+/// The least of eight numbers.
 #[inline(always)]
 fn least_of<S: Simd>(simd: S, numbers: &[f32; BOXES_PER_NODE]) -> f32 {
     S::as_simd_f32s(numbers)
@@ -102,15 +103,15 @@ fn least_of<S: Simd>(simd: S, numbers: &[f32; BOXES_PER_NODE]) -> f32 {
         .fold(f32::INFINITY, |least, &some| least.min(simd.reduce_min_f32s(some)))
 }
 
-/// A segment in cells.
+/// A segment, in cells.
 pub(super) struct Segment {
     a: [f32; 3],
     d: [f32; 3],
     low: [f32; 3],
     high: [f32; 3],
-    /// 1 / d, infinite where it does not move.
+    /// 1 / d; infinite along an axis without motion.
     per_d: [f32; 3],
-    /// 1 / |d|², 0 for a point.
+    /// 1 / |d|²; 0 if both ends coincide.
     inv_square: f32,
 }
 
@@ -132,17 +133,19 @@ impl Segment {
         self.d.iter().chain(&self.a).all(|x| x.is_finite())
     }
 
-    /// Distance to the nearest face of the grid, negative outside.
+    /// Distance from the segment to the nearest face of a grid of `dims` cells, cells; negative
+    /// outside.
     pub(super) fn distance_to_faces(&self, dims: [u32; 3]) -> f32 {
         (0..3)
             .map(|axis| self.low[axis].min(dims[axis] as f32 - self.high[axis]))
             .fold(f32::INFINITY, f32::min)
     }
 
-    /// For each box of a node a square that no distance from the segment to it is below, and the
-    /// square of one that there is. The first is the greater of two: the distance of the box around
-    /// the segment, and, as squares of distances along a segment are convex, the tangent where the
-    /// segment is nearest to the box's centre.
+    /// For each box of a node: a lower and an upper bound of its squared distance from the segment.
+    /// The upper bound is the squared distance of one point of the segment, nearest to the box's
+    /// centre. The lower bound is the greater of two: the squared distance between the box and the
+    /// segment's bounding box, and the tangent at that point, since squared distance along a
+    /// segment is convex.
     #[inline(always)]
     fn distance_bounds_sq<S: Simd>(
         &self,
@@ -176,7 +179,7 @@ impl Segment {
                 rate = rate + off * d[axis];
             }
             let fall = (rate * t).max(rate * (t - one));
-            // Less what the terms are rounded by.
+            // Reduced by the rounding errors of its terms, so that it stays a lower bound.
             let tangent = square - two * fall - rounding * (square + fall);
             tangent.max(gap_square).store_part(&mut least, part);
             square.store_part(&mut most, part);
@@ -184,9 +187,9 @@ impl Segment {
         (least, most)
     }
 
-    /// Squared distance to each box of a node. As a function of the place along the segment it is
-    /// convex and piecewise quadratic, with breaks where the segment crosses a face's plane; its
-    /// rate is linear between them.
+    /// Squared distance from the segment to each box of a node. As a function of the position along
+    /// the segment it is convex and piecewise quadratic; the pieces meet where the segment crosses
+    /// the planes of the box's faces. Its derivative is linear within each piece.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "several arrays of three axes, side by side")]
     fn distances_sq_to_boxes<S: Simd>(&self, simd: S, node: &Node) -> [f32; BOXES_PER_NODE] {
@@ -211,7 +214,8 @@ impl Segment {
             let (mut rate_from, mut rate_to) = (boxes.at(zero).1, boxes.at(one).1);
             for axis in 0..3 {
                 for face in [zero - boxes.half[axis], boxes.half[axis]] {
-                    // An axis without motion may give NaN here: then this is `from`.
+                    // On an axis without motion `per_d` is infinite and the product may be NaN:
+                    // `max` then returns `from`.
                     let t = ((face - boxes.start[axis]) * per_d[axis]).max(from).min(to);
                     let (_, rate) = boxes.at(t);
                     let falls = rate.is_below(zero);
@@ -220,7 +224,8 @@ impl Segment {
                         (rate.select(falls, rate_from), rate_to.select(falls, rate));
                 }
             }
-            // Between both ends the distance falls, then rises, and its rate is linear.
+            // Between `from` and `to` the derivative is linear and changes from negative to
+            // positive: its zero is the minimum.
             let between = from + (to - from) * (rate_from / (rate_from - rate_to));
             let t = between.select(rate_from.is_below(zero), from);
             let t = t.select(zero.is_below(rate_to), to);
@@ -230,17 +235,17 @@ impl Segment {
     }
 }
 
-/// Boxes as a segment sees them.
+/// The boxes of a node relative to a segment.
 struct Boxes<S: Simd> {
-    /// Half their sides.
+    /// Half the sides of the boxes.
     half: [SimdLanes<S>; 3],
-    /// The segment's begin, from their centres.
+    /// Start of the segment relative to the boxes' centres.
     start: [SimdLanes<S>; 3],
     d: [SimdLanes<S>; 3],
 }
 
 impl<S: Simd> Boxes<S> {
-    /// Squared distance at a place along the segment, and half its rate.
+    /// Squared distance at the fraction `t` of the segment, and half its derivative.
     #[inline(always)]
     fn at(&self, t: SimdLanes<S>) -> (SimdLanes<S>, SimdLanes<S>) {
         let zero = t.zero();
