@@ -1,4 +1,4 @@
-//! What a planning or flying command leaves in its `--out` directory.
+//! Result files of the commands that plan or fly a mission (`--out`), and the printed summary.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::say;
 use crate::swarm::Flight;
 use crate::swarm::referee::Sample;
 
-/// The page without a flight: map, roadmap, paths.
+/// Report page of a plan that was not flown: map, roadmap and planned paths.
 pub fn planned_page(
     mission: &Mission,
     plan: &SwarmPlan,
@@ -41,7 +41,7 @@ pub fn planned_page(
         command: result.command.to_owned(),
         generated_by: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
         scenario_toml: scenario.text.clone(),
-        // The ground below an area is level, and has no roadmap.
+        // A coverage mission has neither an obstacle map nor a roadmap to draw.
         map: scenario.area.is_none().then(|| MapSurface::of(&mission.map.grid())),
         roadmap: scenario.area.is_none().then(|| RoadmapLines {
             nodes: mission.roadmap.nodes.clone(),
@@ -53,7 +53,8 @@ pub fn planned_page(
     })
 }
 
-/// The page of a flown mission: tracks, log and smallest distances too.
+/// Report page of a flown mission: that of its plan, with tracks, event log and plots of the
+/// smallest distances.
 pub fn flown_page(
     mission: &Mission,
     plan: &SwarmPlan,
@@ -83,17 +84,17 @@ pub fn flown_page(
     let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
     let body = Limit { value: largest_m, label: "vehicle radius".to_owned() };
     page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
-    // Only a mission without an area has goals on the ground.
+    // A coverage mission has no walls, so no clearance to them is plotted.
     if mission.scenario.area.is_none() {
         page.plots.push(plot("Smallest wall clearance", body, |s| s.clearance_m));
     }
     Ok(page)
 }
 
-/// Files that every command with a result writes.
+/// Files in `--out` of every command with a mission result: result, times, page.
 pub const RESULT_FILES: [&str; 3] = ["result.json", "timing.json", "report.html"];
 
-/// Adds the files of [`RESULT_FILES`].
+/// Adds the three files of [`RESULT_FILES`] to `results`.
 ///
 /// # Errors
 /// One cannot be written.
@@ -109,12 +110,12 @@ pub fn add(
     results.add(RESULT_FILES[2], report::page(&page)?.as_bytes())
 }
 
-/// One `x y z` a line, metres, for other programs to be given the same work.
+/// The points as text, one `x y z` a line in metres: other programs read the same problem from it.
 pub fn points_to_text(points: impl Iterator<Item = Point>) -> String {
     points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect()
 }
 
-/// Prints what `result.json` holds, for a person.
+/// Prints the content of `result.json` for a person: a table of vehicles, then totals.
 pub fn print_summary(result: &MissionResult, dir: &Path) {
     say!("vehicle  goal  reached  landed   path m  flown m   time s  end");
     let yes = |b: bool| if b { "yes" } else { "no" };

@@ -1,4 +1,4 @@
-//! Progress bars on a terminal, nothing in a pipe.
+//! Progress bars on a terminal (none in a pipe), and printing that survives a closed output.
 
 use std::io::{IsTerminal, Write as _};
 use std::sync::Mutex;
@@ -7,14 +7,14 @@ use std::time::Duration;
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Shows what is being done, on standard error, if that is a terminal.
+/// Makes progress bars on standard error if that is a terminal, else none.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     shown: bool,
 }
 
 impl Progress {
-    /// Shown if standard error is a terminal.
+    /// Bars are drawn if standard error is a terminal.
     pub fn on_terminal() -> Self {
         Self { shown: std::io::stderr().is_terminal() }
     }
@@ -24,7 +24,7 @@ impl Progress {
         Self { shown: false }
     }
 
-    /// A stage of unknown length; gone when dropped.
+    /// Begins a stage of unknown length: a spinner until the returned [`Stage`] is dropped.
     pub fn begin_stage(self, name: &'static str) -> Stage {
         let bar = self.shown.then(|| {
             let bar = ProgressBar::new_spinner().with_message(name);
@@ -34,7 +34,7 @@ impl Progress {
         Stage { bar }
     }
 
-    /// A stage of `length` steps; gone when dropped.
+    /// Begins a stage of `length` steps: a bar until the returned [`Stage`] is dropped.
     pub fn begin_counted_stage(self, name: &'static str, length: u64) -> Stage {
         let style = ProgressStyle::with_template("{msg:12} {bar:40} {pos}/{len} {elapsed}");
         let bar = self.shown.then(|| {
@@ -46,13 +46,13 @@ impl Progress {
     }
 }
 
-/// One line of progress.
+/// The progress bar of one stage; cleared from the terminal when dropped.
 pub struct Stage {
     bar: Option<ProgressBar>,
 }
 
 impl Stage {
-    /// Shows the progress of the stage.
+    /// Sets how many steps of the stage are done.
     pub fn set_position(&self, position: u64) {
         if let Some(bar) = &self.bar {
             bar.set_position(position);
@@ -68,10 +68,10 @@ impl Drop for Stage {
     }
 }
 
-/// Error with which standard output last refused a line.
+/// The last error of writing a line to standard output; [`check_printed`] takes it.
 static STDOUT_ERROR: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
-/// Prints a line: what [`say!`](crate::say) calls.
+/// Prints a line to standard output and flushes it: what [`say!`](crate::say) expands to.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
     if let Err(error) =
@@ -81,10 +81,10 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
     }
 }
 
-/// Whether everything was printed so far.
+/// Fails if a line printed since the last call did not reach standard output.
 ///
 /// # Errors
-/// Standard output did not take a line: its reader has gone away, or a disk is full.
+/// Standard output refused a line: its reader has gone away, or a disk is full.
 pub fn check_printed() -> anyhow::Result<()> {
     match STDOUT_ERROR.lock().expect("nobody panics with it").take() {
         Some(error) => Err(error).context("cannot print: standard output"),
@@ -92,8 +92,9 @@ pub fn check_printed() -> anyhow::Result<()> {
     }
 }
 
-/// Prints a line. Where that fails the work continues, since it may fly something;
-/// [`check_printed`](crate::progress::check_printed) reports at its end.
+/// Prints a line to standard output. If that fails the command goes on, since it may control a
+/// flight; [`check_printed`](crate::progress::check_printed) reports the error at the command's
+/// end.
 #[macro_export]
 macro_rules! say {
     () => { $crate::progress::print_line(format_args!("")) };

@@ -1,11 +1,11 @@
-//! What a user gave, as an error may show it: short, on one line, and without codes that a terminal
-//! obeys.
+//! Quotes text of a user or a file for an error message: short, on one line, and with its control
+//! characters escaped, which a terminal would obey.
 
 use std::path::Path;
 
-/// Longest quotation, characters.
+/// Longest text that [`quoted`] returns, characters.
 pub const MAX_QUOTE_CHARS: usize = 200;
-/// Longest line of an error, characters: the words around two quotations.
+/// Longest line of an error message, characters: two quotations and the words around them.
 const MAX_ERROR_CHARS: usize = 600;
 
 /// Whether a character changes how a terminal shows the text around it.
@@ -14,14 +14,14 @@ fn is_control_code(c: char) -> bool {
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
 }
 
-/// The text with its codes escaped; where it is longer than [`MAX_QUOTE_CHARS`] characters, its
-/// beginning and its end.
+/// The text with its control characters escaped; one longer than [`MAX_QUOTE_CHARS`] characters is
+/// cut to its beginning, `…` and its end.
 pub fn quoted(text: &str) -> String {
-    // No more than could be shown is checked, from either end.
+    // The text is cut before escaping too, so that any length costs bounded work.
     shortened(&escaped(&shortened(text, 2 * MAX_QUOTE_CHARS)), MAX_QUOTE_CHARS)
 }
 
-/// As `quoted`, for a path.
+/// As [`quoted`], for a path; bytes that are not UTF-8 become `�`.
 pub fn quoted_path(path: &Path) -> String {
     quoted(&path.to_string_lossy())
 }
@@ -38,7 +38,7 @@ fn escaped(text: &str) -> String {
     out
 }
 
-/// Beginning and end of a text that is longer than `most` characters.
+/// The text; if longer than `most` characters its beginning, `…` and its end, `most` in all.
 fn shortened(text: &str, most: usize) -> String {
     if text.len() <= most || text.chars().count() <= most {
         return text.to_owned();
@@ -48,15 +48,15 @@ fn shortened(text: &str, most: usize) -> String {
     begin + "…" + &end.iter().rev().collect::<String>()
 }
 
-/// A whole message as it is printed: nothing in it is a code but its ends of line, and no line is
-/// endless.
+/// A whole error message as it is printed: line ends stay, all other control characters are
+/// escaped, and each line is cut to 600 characters.
 pub fn quote_message(text: &str) -> String {
     let lines: Vec<String> =
         text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
     lines.join("\n")
 }
 
-/// A message about the command line, with what stands in it of these arguments quoted.
+/// An error message about the command line; each of the arguments that appears in it is quoted.
 pub fn about_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
     let mut text = text.to_owned();
     for argument in arguments {

@@ -1,5 +1,5 @@
-//! `result.json` and `timing.json`: what a command found, and what the clock said. Units are in the
-//! keys.
+//! Structures of `result.json` (what a command found) and `timing.json` (how long it took). Units
+//! are in the keys.
 //!
 //! `result.json` is the same for the same scenario and seed, whatever the machine or the build;
 //! nothing timed goes in it.
@@ -17,19 +17,20 @@ pub struct MissionResult {
     pub scenario: String,
     /// The seed used.
     pub seed: u64,
-    /// Whether every vehicle that no fault took out did its task and landed clean.
+    /// Whether nothing touched or came too near, every goal (or vehicle) was served, and every
+    /// vehicle did its task and landed, except those that a fault disabled.
     pub complete: bool,
     /// One entry per vehicle.
     pub vehicles: Vec<VehicleResult>,
     /// The swarm as a whole.
     pub totals: Totals,
-    /// Least distances that were kept, or not.
+    /// Smallest distances, and counts of contacts, violations and deadlocks.
     pub safety: Safety,
-    /// The roadmap planned on.
+    /// Size of the roadmap that was planned on.
     pub roadmap: RoadmapSize,
-    /// Goals and vehicles that the assignment could not serve.
+    /// Goals without a vehicle, and vehicles without a goal.
     pub left: Left,
-    /// Coverage of the area, in a coverage mission.
+    /// Results of the coverage; `None` in a mission with goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageResult>,
 }
@@ -37,7 +38,7 @@ pub struct MissionResult {
 /// Coverage of an area.
 #[derive(Clone, Debug, Serialize)]
 pub struct CoverageResult {
-    /// Share of the area that pictures show.
+    /// Share of the area that pictures show, 0 to 1.
     pub covered_share: f64,
     /// Waypoints of all routes.
     pub waypoints: u32,
@@ -47,45 +48,45 @@ pub struct CoverageResult {
     pub lane_m: f64,
     /// Greatest distance from one waypoint to the next, metres.
     pub waypoint_m: f64,
-    /// Direction of the lanes, degrees from east to the left.
+    /// Direction of the lanes, degrees counter-clockwise from east.
     pub angle_deg: f64,
-    /// The greatest cost, seconds.
+    /// Greatest cost of any vehicle's route, seconds.
     pub max_cost_s: f64,
-    /// Mean of the costs, seconds.
+    /// Mean cost of the vehicles' routes, seconds.
     pub mean_cost_s: f64,
-    /// Standard deviation of the costs, seconds.
+    /// Sample standard deviation of the costs of the vehicles' routes, seconds.
     pub sd_cost_s: f64,
-    /// The greatest cost, metres.
+    /// Greatest cost of any vehicle's route, metres.
     pub max_cost_m: f64,
-    /// No division can cost less, seconds.
+    /// Lower bound of `max_cost_s` over all divisions of the area, seconds.
     pub lower_bound_s: f64,
-    /// Excess of the greatest cost over that, as a share.
+    /// `max_cost_s / lower_bound_s - 1`.
     pub gap: f64,
     /// Pictures.
     pub photos: u64,
-    /// Waypoints photographed more than once.
+    /// Number of waypoints photographed more than once.
     pub twice: u64,
-    /// Waypoints photographed by nobody.
+    /// Number of waypoints that no vehicle photographed.
     pub left: u64,
-    /// Heights above the ground, where there is terrain.
+    /// Heights above the ground; `None` over level ground.
     #[serde(flatten)]
     pub terrain: Option<TerrainResult>,
     /// Route of each vehicle that flies.
     pub routes: Vec<RouteResult>,
 }
 
-/// How lanes lie above terrain, as the checker found it.
+/// Heights and slopes of the lanes above terrain, as `coverage::check` found them.
 #[derive(Clone, Debug, Serialize)]
 pub struct TerrainResult {
-    /// The least height above the ground of any lane or way between, metres.
+    /// Least height above the ground of any lane or leg between lanes, metres.
     pub ground_least_m: f64,
-    /// The greatest, metres.
+    /// Greatest height above the ground of any of them, metres.
     pub ground_most_m: f64,
-    /// The steepest leg among them, metres for each metre over ground.
+    /// Slope of the steepest leg among them, metres of height a metre over ground.
     pub steepest: f64,
-    /// Legs that come too near to the ground.
+    /// Number of legs that come too near to the ground.
     pub too_low: u64,
-    /// Legs steeper than their vehicle flies.
+    /// Number of legs that are steeper than their vehicle flies.
     pub too_steep: u64,
 }
 
@@ -98,13 +99,13 @@ pub struct RouteResult {
     pub first: u32,
     /// Highest number of the route's waypoints.
     pub last: u32,
-    /// Whether it is flown from the last to the first.
+    /// Whether the route's waypoints are flown from the highest number to the lowest.
     pub backward: bool,
-    /// Height of its transit, metres.
+    /// Height of the vehicle's transit layer, metres.
     pub layer_m: f64,
-    /// When it leaves its pad, seconds.
+    /// When the vehicle leaves its pad, seconds.
     pub depart_s: f64,
-    /// C_k, seconds: of all sorties and the swaps between them.
+    /// Cost C_k of the route, seconds: all sorties and the battery swaps between them.
     pub cost_s: f64,
     /// Cost of the route, metres.
     pub cost_m: f64,
@@ -119,27 +120,27 @@ pub struct SortieResult {
     pub first: u32,
     /// Highest number of the sortie's waypoints.
     pub last: u32,
-    /// When its round begins, seconds.
+    /// When the fleet's round of sorties begins to which this one belongs, seconds.
     pub begin_s: f64,
-    /// When it leaves its pad after that, seconds.
+    /// When the vehicle leaves its pad, seconds after `begin_s`.
     pub depart_s: f64,
-    /// C_k of it, seconds.
+    /// Cost C_k of the sortie, seconds.
     pub cost_s: f64,
     /// Cost of the sortie, metres.
     pub cost_m: f64,
-    /// Time from pad to pad, down to the lanes and up again too, seconds.
+    /// Time from pad to pad, with the descent to the lanes and the climb from them, seconds.
     pub flown_s: f64,
 }
 
-/// Goals and vehicles that the assignment could not serve: more of one than of the other, or no
-/// path between them.
+/// Goals without a vehicle and vehicles without a goal: there are more of one kind than of the
+/// other, or the roadmap has no path between them.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Left {
     /// Goals, by index.
     pub goals: Vec<u16>,
-    /// Vehicles, by id; they stay on their pads.
+    /// Vehicles, by id: these stay on their pads.
     pub vehicles: Vec<u8>,
-    /// A line for each: where it is, why it is left, and what would help.
+    /// One line each: where the goal or vehicle is, why it is left, and what would help.
     pub reasons: Vec<String>,
 }
 
@@ -148,20 +149,20 @@ pub struct Left {
 pub struct VehicleResult {
     /// MAVLink system id.
     pub id: u8,
-    /// Index of its goal, if it got one.
+    /// Index of the vehicle's goal; `None` if it has none.
     pub goal: Option<u16>,
-    /// Whether it came to its goal.
+    /// Whether the vehicle came to its goal, by its true position.
     pub reached: bool,
-    /// Whether it stands on the ground, disarmed, after its flight.
+    /// Whether the vehicle stands on the ground, disarmed, after its flight.
     pub landed: bool,
-    /// Length of its path, metres.
+    /// Length of the vehicle's planned path, metres.
     pub path_m: f64,
-    /// Way flown, metres.
+    /// Length of the track that the vehicle flew, metres.
     pub flown_m: f64,
     /// Time from take-off to landing, seconds.
     pub flight_time_s: f64,
-    /// How it ended: a state of the companion's mission, and the text of the row that led there
-    /// where it is a warning.
+    /// How the flight ended: the last state of the companion's mission, and, if a warning row of
+    /// the mission table led there, that row's text.
     pub end: String,
 }
 
@@ -175,57 +176,58 @@ pub struct Totals {
     pub makespan_s: f64,
 }
 
-/// Distances kept.
+/// Smallest distances in the flight, and how often a limit was broken.
 #[derive(Clone, Debug, Serialize)]
 pub struct Safety {
-    /// Times a body touched an obstacle; the floor while taking off or landing is none.
+    /// Number of times a vehicle's body touched an obstacle, the floor in a take-off or landing not
+    /// counted.
     pub wall_contacts: u32,
     /// Smallest distance from a vehicle's centre to an obstacle between take-off and landing,
     /// metres.
     pub min_clearance_m: Option<f64>,
-    /// Smallest distance between two centres, one of them flying, metres.
+    /// Smallest distance between the centres of two vehicles, at least one of them flying, metres.
     pub min_separation_m: Option<f64>,
     /// Safety distance of the scenario, metres.
     pub safety_distance_m: f64,
-    /// Times a pair came closer than that.
+    /// Number of times a pair came closer than the safety distance.
     pub violations: u32,
-    /// Times a flying vehicle made no progress for 20 s though a way was left.
+    /// Number of times a flying vehicle made no progress for 20 s with a part of its path left.
     pub deadlocks: u32,
 }
 
-/// The roadmap planned on.
+/// Size of the roadmap that was planned on.
 #[derive(Clone, Debug, Serialize)]
 pub struct RoadmapSize {
-    /// Nodes, terminals among them.
+    /// Number of nodes, starts and goals included.
     pub nodes: usize,
     /// Edges, each counted once.
     pub edges: usize,
-    /// Length of the roadmap file.
+    /// Length of the roadmap file, bytes.
     pub bytes: usize,
 }
 
-/// `timing.json`, seconds of this machine's clock.
+/// `timing.json`: seconds of this machine's clock, `simulated_s` excepted.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Timing {
-    /// Reading or making the map.
+    /// Reading the map file, or making the built-in map.
     pub map_s: f64,
-    /// Starts and goals checked; the roadmap: nodes, edges and their clearances, file.
+    /// Checking starts and goals; making the roadmap: nodes, edges, clearances, file.
     pub roadmap_s: f64,
     /// Time of each part of the roadmap's construction.
     pub roadmap_parts: BuildTimes,
-    /// The shortest paths that give what each goal would cost each vehicle.
+    /// Searching the shortest paths that give the cost of each goal for each vehicle.
     pub search_s: f64,
-    /// Which vehicle flies to which goal.
+    /// Assigning goals to vehicles.
     pub assignment_s: f64,
     /// The whole plan: search, assignment, schedule.
     pub plan_s: f64,
-    /// Time that passed in the simulation.
+    /// Simulated time, seconds.
     pub simulated_s: f64,
     /// The whole command.
     pub wall_s: f64,
 }
 
-/// Rounds to a tenth of a millimetre (or of a millisecond): what `result.json` states, it means.
+/// Rounds to four decimals, a tenth of a millimetre or millisecond, for `result.json`.
 pub fn rounded(value: f32) -> f64 {
     (f64::from(value) * 1e4).round() / 1e4
 }

@@ -1,8 +1,8 @@
 //! Building a roadmap on the desk: planner-core's PRM on all cores, every edge with its clearance,
 //! encoded as the file that goes on the board.
 //!
-//! Edges come in the same order whatever the number of threads, because pieces of work are joined
-//! in their order.
+//! Edges come in the same order on any number of threads: the results of the parallel jobs are
+//! joined in the order of the nodes.
 
 pub mod cap;
 pub mod passages;
@@ -25,14 +25,14 @@ use rayon::prelude::*;
 use crate::capacity::{BoardCapacity, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
 use crate::map::{BoxTree, VoxelMap};
 
-/// Greatest clearance stored with an edge, metres: no vehicle of ours is any wider.
+/// Greatest clearance stored with an edge, metres: enough for our largest vehicle.
 pub const MAX_STORED_CLEARANCE_M: f32 = 6.0;
-/// Nodes whose edges are one job of a thread: a fifth of a millisecond.
+/// Nodes whose edges one parallel job finds: about a fifth of a millisecond of work.
 const NODES_PER_JOB: usize = 32;
-/// Numbers that a file stores for each node beside its place: distances to the landmarks, height
-/// over the ground.
+/// Numbers that a roadmap file stores for each node beside its position: its distance to each
+/// landmark, and its height above the ground.
 const NODE_COLUMNS: usize = LANDMARKS + 1;
-/// Two clearances that differ by less than this are one, metres: the file keeps millimetres.
+/// Clearances that differ by less than this count as equal, metres: the file keeps millimetres.
 const SAME_CLEARANCE_M: f32 = 2e-4;
 
 /// Nodes and edges, not yet encoded.
@@ -42,29 +42,29 @@ pub struct Roadmap {
     pub nodes: Vec<Point>,
     /// Edges with their clearances.
     pub edges: Vec<Edge>,
-    /// Height of each node over the ground below it, metres; infinite where there is none.
+    /// Height of each node above the ground below it, metres; infinite over no ground.
     pub heights_m: Vec<f32>,
 }
 
-/// How long each part took, seconds. Boxes and nodes are made at the same time.
+/// How long each part of the construction took, seconds. Boxes and nodes are made in parallel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct BuildTimes {
-    /// The tree of boxes over the map, from which distances are read.
+    /// Building the tree of boxes over the map, which gives distances to obstacles.
     pub boxes_s: f64,
-    /// Random free nodes, and their heights over the ground.
+    /// Sampling random free nodes, and measuring their heights above the ground.
     pub nodes_s: f64,
-    /// Which pairs of them are joined, and the clearance of each.
+    /// Finding which pairs of nodes are joined, and the clearance of each edge.
     pub edges_s: f64,
-    /// Nodes of passages that random ones miss.
+    /// Adding nodes in passages that random sampling missed.
     pub passages_s: f64,
-    /// Which of the edges a board gets.
+    /// Choosing the edges that a board has room for.
     pub cap_s: f64,
-    /// The file: ways to the landmarks, rows, CRC-32.
+    /// Encoding the file: distances to the landmarks, adjacency rows, CRC-32.
     pub file_s: f64,
 }
 
-/// Samples and joins: Algorithm 1 of P3D, with the clearance of every edge. The result does not
-/// depend on the number of threads.
+/// Samples nodes and joins them: Algorithm 1 of P3D, with the clearance of every edge. The result
+/// does not depend on the number of threads.
 pub fn build(
     map: &VoxelMap,
     terminals: &[Point],
@@ -91,8 +91,8 @@ pub fn build(
     Ok((Roadmap { nodes, edges, heights_m }, parts))
 }
 
-/// Adds the nodes of passages between starts and goals that random nodes have missed, and joins
-/// them as all others; returns how many there are. Nothing changes where none is missing.
+/// Adds nodes in passages between starts and goals that random sampling missed, joins all nodes
+/// again, and returns how many were added. With 0 the roadmap is unchanged.
 pub fn add_passages(
     map: &VoxelMap,
     roadmap: &mut Roadmap,
@@ -117,19 +117,19 @@ pub fn add_passages(
     Ok(added.len())
 }
 
-/// Height of a node over the ground below it, metres; infinite where there is none.
+/// Height of a node above the ground below it, metres; infinite over no ground.
 fn height_m(map: &VoxelMap, node: &Point) -> f32 {
     map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m)
 }
 
-/// Result of some work, and its time, seconds.
+/// The result of `work`, and the seconds that it took.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let begun = Instant::now();
     let done = work();
     (done, begun.elapsed().as_secs_f64())
 }
 
-/// Terminals and free nodes.
+/// The nodes of a roadmap: the terminals, then `config.nodes` random free ones.
 pub fn sample(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<Vec<Point>> {
     let total = terminals.len() + config.nodes;
     if total > ROADMAP_NODES {
@@ -158,9 +158,10 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     })
 }
 
-/// The edges, each with its distance to the nearest obstacle, at most [`MAX_STORED_CLEARANCE_M`].
-/// `tree` is over `grid`: it gives the distances, and with them which segments are clear; only an
-/// edge that keeps almost exactly the clearance is checked by cells.
+/// The edges of [`prm::connect`], each with its distance to the nearest obstacle, at most
+/// [`MAX_STORED_CLEARANCE_M`]. `tree` is built over `grid`: its distances also decide which
+/// segments are clear; only a segment within rounding of the required clearance is checked cell by
+/// cell.
 pub fn join<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     tree: &BoxTree,
@@ -169,7 +170,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
     workspace: &mut Workspace<NODES, CUBES>,
 ) -> Result<Vec<Edge>, PrmError> {
     workspace.build_index(nodes, config)?;
-    // No edge is farther from obstacles than its ends; most are just as far as the nearer of them.
+    // The clearance of an edge is at most that of either end, and mostly equal to the smaller one.
     let around: Vec<f32> = nodes
         .par_iter()
         .map(|node| tree.clearance_m(node, node, MAX_STORED_CLEARANCE_M, 0.0))
@@ -204,7 +205,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
     })
 }
 
-/// Results of `work` for all nodes, piece by piece on all threads, in the order of the pieces.
+/// Runs `work` on ranges of nodes on all threads, and joins the results in the order of the ranges.
 fn map_nodes_in_parallel<T: Copy + Send>(
     nodes: usize,
     work: impl Fn(Range<usize>, &mut Vec<T>) -> Result<(), PrmError> + Sync,
@@ -220,15 +221,15 @@ fn map_nodes_in_parallel<T: Copy + Send>(
     Ok(pieces.concat())
 }
 
-/// Greatest difference of distances from cells and from boxes, metres, many times over: both are
-/// rounded as coordinates are.
+/// Bound on the difference between a distance computed from cells and one from boxes, metres, with
+/// a wide margin: both are rounded as coordinates are.
 fn rounding_m(shape: &GridShape) -> f32 {
     let longest = shape.dims.into_iter().max().unwrap_or(0) as f32;
     (1e-3 + longest * 16.0 * f32::EPSILON) * shape.resolution_m
 }
 
 impl Roadmap {
-    /// The nodes with as many of the edges as a board holds: [`cap::limit_edges`] chooses them.
+    /// The roadmap with at most as many edges as the board holds, chosen by [`cap::limit_edges`].
     ///
     /// # Errors
     /// It has more nodes than the board holds, or needs more edges to stay connected.
@@ -251,7 +252,7 @@ impl Roadmap {
     }
 }
 
-/// The header of the file of a roadmap that was built like this.
+/// The header of the file of a roadmap that was built with `config`.
 pub fn header(config: &Config, origin: Geodetic, starts: u16, goals: u16) -> RoadmapHeader {
     RoadmapHeader {
         origin,

@@ -1,11 +1,11 @@
-//! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what
+//! Explains what a mission is short of: goals without a vehicle, vehicles without a goal, and what
 //! would help.
 //!
-//! Whether a way is missing in the roadmap or in the building is read from the map itself: the
-//! widest way from a goal to a start, over the centres of its cells, by a flood that always
-//! continues from the widest cell it has reached. Its width is the distance to the nearest obstacle
-//! at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood of each
-//! near a wall; only missions that fall short pay it.
+//! Whether the roadmap or the building lacks a path is read from the map itself: the widest path
+//! from a start to a goal over the centres of the cells, found by a flood that always continues
+//! from the widest cell it has reached. The width of a path is the distance to the nearest obstacle
+//! at its narrowest cell. Cost: all cells once a vehicle, and a search of the neighbourhood of each
+//! cell near a wall; only missions that fall short pay it.
 
 use std::collections::BTreeMap;
 
@@ -16,15 +16,15 @@ use planner_core::segment::point_clearance;
 use crate::map::VoxelMap;
 use crate::mission::{Mission, SwarmPlan};
 
-/// Two widths that differ by less than this are the same, metres.
+/// Step in which path widths are measured, metres.
 const SAME_WIDTH_M: f32 = 0.05;
-/// Most cells of a grid that is flooded: the list of cells takes 4 bytes each.
+/// Largest map that is flooded, cells: the queues take up to 12 bytes a cell.
 const MAX_FLOODED_CELLS: usize = 1 << 25;
-/// Most lines about goals; further goals are counted.
+/// Most goals that get a line of their own; `and N more` counts the rest.
 const MAX_GOAL_LINES: usize = 8;
 
-/// One line for each goal that is left and each vehicle without one, with its place and what would
-/// help.
+/// One line for each goal without a vehicle and each vehicle without a goal: its position, the
+/// reason and what would help.
 pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     let left = mission.unserved(plan);
     let all = left.goals.len() + left.vehicles.len();
@@ -37,7 +37,7 @@ pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
     }
-    // Where goals are left, the remedy stands with them.
+    // A vehicle's line names a remedy only if no goal's line has named it.
     let asks = left.goals.is_empty();
     for &id in left.vehicles.iter().take(MAX_GOAL_LINES.max(lines.len()) - lines.len()) {
         lines.push(vehicle_line(&mut asked, id, asks));
@@ -48,7 +48,7 @@ pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     lines
 }
 
-/// Findings so far.
+/// The mission, and what was found about it so far.
 struct ShortageFindings<'a> {
     mission: &'a Mission,
     reach: Reachability,
@@ -109,13 +109,13 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String 
     format!("vehicle {id} at [{}, {}, {}]{place}: {why}", at.x, at.y, at.z)
 }
 
-/// The vehicle that fits through most.
+/// The vehicle with the smallest radius: it fits through the most passages.
 fn smallest_vehicle(mission: &Mission) -> usize {
     let radius = |i: &usize| mission.scenario.vehicles[*i].radius_m;
     (0..mission.tasks.len()).min_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default()
 }
 
-/// Remedy that would bring this vehicle to this goal.
+/// Text: what would give this vehicle a path to this goal, or that nothing would.
 fn what_helps(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
@@ -157,9 +157,9 @@ fn what_helps(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> 
     }
 }
 
-/// Which goals each vehicle's start is joined to by edges that are wide enough for it.
+/// Which goals are connected to each vehicle's start by edges that are wide enough for it.
 struct Reachability {
-    /// Whether each vehicle is joined to each goal.
+    /// Whether each vehicle's start is connected to each goal, by their indices.
     joined: Vec<Vec<bool>>,
 }
 
@@ -180,7 +180,7 @@ impl Reachability {
     }
 }
 
-/// The nodes that edges of this clearance join to a node.
+/// Marks the nodes that edges of at least this clearance connect to `from`.
 fn connected_component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> Vec<bool> {
     let mut seen = vec![false; view.node_count()];
     let mut open = vec![from as u16];
@@ -195,9 +195,10 @@ fn connected_component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> 
     seen
 }
 
-/// Distance to the nearest obstacle at the narrowest cell of the widest way to each goal, metres,
-/// at most `most_m` rounded up to a step; 0 where there is no way. `None` where the map is too
-/// large to be asked. `at_least_m` is a cheap bound.
+/// Clearance of the widest path from `from` to each goal, metres: the distance to the nearest
+/// obstacle at its narrowest cell, capped at `most_m` rounded up to a step; 0 where no path exists.
+/// `None` if the map is too large to be flooded. `at_least_m` is a cheap lower bound of a point's
+/// clearance.
 fn widest_path_clearances_m(
     map: &VoxelMap,
     at_least_m: impl Fn(&Point) -> f32,
@@ -219,8 +220,8 @@ fn widest_path_clearances_m(
         }
         ((point_clearance(&grid, place, most_m) / SAME_WIDTH_M + 1e-3) as usize).min(steps)
     };
-    // A start or goal may be nearer to an obstacle than the centre of its cell, and above all to
-    // the ground.
+    // A start or goal may be nearer to an obstacle than the centre of its cell, above all to the
+    // ground, so its own clearance counts too.
     let (at_start, at_goals) = (steps_at(from), goals.iter().map(steps_at).collect::<Vec<_>>());
     let from = shape.cell_of(from)?;
     let goals: Vec<_> = goals.iter().map(|goal| shape.cell_of(goal)).collect();
@@ -258,7 +259,7 @@ fn widest_path_clearances_m(
                     continue;
                 }
                 seen[word] |= mask;
-                // Never wider than what led there.
+                // The width of a path is that of its narrowest cell so far.
                 open[step(place).min(width)].push(place);
             }
         }

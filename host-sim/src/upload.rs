@@ -1,8 +1,8 @@
-//! A MAVLink FTP client: uploads a file to a companion and compares CRCs.
+//! A MAVLink FTP client: uploads a file to a companion and compares the CRC-32 of both sides.
 //!
-//! Source: MAVLink guide, "File Transfer Protocol". Several pieces are under way at once; what is
-//! not answered is sent again with the same sequence number, as often as this link bears
-//! ([`retransmission`]).
+//! Source: MAVLink guide, "File Transfer Protocol". Several WRITE requests are under way at once. A
+//! request without an answer is sent again with the same sequence number, after a timeout and in a
+//! number that fit the link ([`retransmission`]).
 
 mod retransmission;
 
@@ -19,9 +19,9 @@ use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 use self::retransmission::Retransmission;
 use crate::link::Link;
 
-/// System id of the ground station, unless another one is chosen.
+/// MAVLink system id of the client, unless [`FtpClient::from_ground_station`] sets another one.
 const DEFAULT_SYSTEM_ID: u8 = 255;
-/// Component id of the ground station.
+/// MAVLink component id of the client: MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
 /// Longest wait for an answer: the companion may have to erase its flash first, eight sectors of
 /// two seconds each.
@@ -35,7 +35,7 @@ const WRITE: u8 = 7;
 const CRC32: u8 = 14;
 const ACK: u8 = 128;
 
-/// A client on a link.
+/// An FTP client on a link to a companion.
 pub struct FtpClient {
     link: Box<dyn Link>,
     framer: Framer,
@@ -49,7 +49,7 @@ pub struct FtpClient {
     retransmission: Retransmission,
 }
 
-/// A piece that is not answered yet.
+/// A WRITE request that is not answered yet.
 struct PendingPiece {
     request: [u8; PAYLOAD_LEN],
     length: usize,
@@ -66,11 +66,11 @@ struct Answer {
 }
 
 impl FtpClient {
-    /// A client that talks to the companion of one vehicle, or of the first it hears.
+    /// A client for the companion of the vehicle `system`; with `None` of the first one heard.
     pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
         let now = link.now();
-        // The number is not that of a client before us: a server recognises repeated requests by
-        // it.
+        // Sequence numbers begin at the time of day, to differ from those of a client before: a
+        // server takes an equal number for a repeated request.
         let sequence = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| (since.as_millis() % 65_536) as u16);
@@ -88,7 +88,7 @@ impl FtpClient {
         }
     }
 
-    /// The client with another system id than 255.
+    /// The client with `own_system` as its MAVLink system id instead of 255.
     #[must_use]
     pub fn from_ground_station(self, own_system: u8) -> Self {
         Self { own_system, ..self }
@@ -103,8 +103,8 @@ impl FtpClient {
         Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frames }
     }
 
-    /// The next frame from a companion, if there is one; beats once a second, so that autopilots
-    /// pass things on to us.
+    /// The frames that have arrived from the companion; rests a moment if there were no bytes. Also
+    /// sends a HEARTBEAT each second, so that autopilots forward messages to this client.
     fn receive_frames(&mut self) -> anyhow::Result<Vec<Frame>> {
         if self.link.now() >= self.beat_at {
             self.beat_at += HEARTBEAT_EVERY;
@@ -134,10 +134,10 @@ impl FtpClient {
         Ok(frames)
     }
 
-    /// Waits for a companion; its system id.
+    /// Waits up to 30 s for a frame of a companion; returns its system id.
     ///
     /// # Errors
-    /// None is heard.
+    /// No companion is heard.
     pub fn wait_for_companion(&mut self) -> anyhow::Result<u8> {
         let began = self.link.now();
         while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
@@ -189,7 +189,7 @@ impl FtpClient {
         Ok(for_us.map(|(p, _)| read(p)).collect())
     }
 
-    /// Repeats a request until it is answered.
+    /// Sends a request, again and again until it is answered; returns the answer if it is an ACK.
     fn request_until_answered(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
         let request = self.request_payload(opcode, 0, data);
         let began = self.link.now();
@@ -212,10 +212,10 @@ impl FtpClient {
         bail!("the companion does not answer")
     }
 
-    /// Uploads a file; `progress` gets the number of bytes that have arrived.
+    /// Uploads a file; calls `progress` with the number of bytes that were acknowledged so far.
     ///
     /// # Errors
-    /// The companion refuses it, does not answer, or got something else.
+    /// The companion refuses the file, does not answer, or has other bytes in the end.
     pub fn upload(
         &mut self,
         file: File,
@@ -227,7 +227,7 @@ impl FtpClient {
             .request_until_answered(CREATE, file.name().as_bytes())
             .context("cannot begin")?
             .session;
-        // The time for erasing its flash says nothing about the link.
+        // Erasing the companion's flash took time that says nothing about the link's round trips.
         self.retransmission = Retransmission::new(self.link.now());
         let mut pieces = bytes.chunks(MAX_DATA).enumerate();
         let mut under_way: BTreeMap<u16, PendingPiece> = BTreeMap::new();
@@ -284,10 +284,10 @@ impl FtpClient {
         Ok(())
     }
 
-    /// The CRC-32 that the companion makes of a file it keeps: [`crc32`] of the same bytes.
+    /// The CRC-32 of a file that the companion stores, computed there: [`crc32`] of the same bytes.
     ///
     /// # Errors
-    /// There is no such file, or no answer.
+    /// The companion has no such file, or does not answer.
     pub fn remote_crc(&mut self, file: File) -> anyhow::Result<u32> {
         let answer = self.request_until_answered(CRC32, file.name().as_bytes())?;
         let sum = answer.data.first_chunk().context("no sum in the answer")?;
@@ -295,7 +295,7 @@ impl FtpClient {
     }
 }
 
-/// FTP's CRC-32: that of zip, but begun at 0 and not inverted.
+/// The CRC-32 of MAVLink FTP: the polynomial of zip, but begun at 0 and not inverted.
 pub fn crc32(bytes: &[u8]) -> u32 {
     const FTP: crc::Algorithm<u32> = crc::Algorithm {
         init: 0,

@@ -1,31 +1,31 @@
-//! Random coverage scenarios, as text: what a user would write.
+//! Random coverage scenarios as TOML text, as a user would write them.
 
 use rand_core::Rng;
 
-/// A corner, metres.
+/// A corner of a polygon, east and north in metres.
 type Corner = [f64; 2];
 
-/// What random areas have.
+/// Which shape random areas have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Convex, without holes and zones.
+    /// Convex, without holes and no-fly zones.
     Convex,
-    /// Concave, with up to three holes and up to three no-fly zones that may cut the border and
+    /// Concave, with up to three holes and up to three no-fly zones, which may cut the border and
     /// each other.
     Any,
 }
 
-/// A number from 0 to below 1.
+/// A uniformly distributed random number from 0 to below 1.
 pub fn unit(random: &mut impl Rng) -> f64 {
     f64::from(random.next_u32()) / (f64::from(u32::MAX) + 1.0)
 }
 
-/// A number between two, drawn evenly.
+/// A uniformly distributed random number from `low` to below `high`.
 pub fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * unit(random)
 }
 
-/// A polygon that is seen whole from its middle.
+/// A star-shaped polygon: the segment from `middle` to any of its points lies inside it.
 fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> Vec<Corner> {
     let mut angles: Vec<f64> =
         (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
@@ -38,7 +38,7 @@ fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> V
     angles.into_iter().map(corner).collect()
 }
 
-/// The convex hull of random places.
+/// The corners of a convex polygon on a random ellipse around the origin, turned by a random angle.
 fn convex(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Corner> {
     let mut angles: Vec<f64> =
         (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
@@ -59,8 +59,8 @@ fn list(rings: &[Vec<Corner>]) -> String {
     rings.iter().map(ring).collect::<Vec<_>>().join(", ")
 }
 
-/// The same to be flown: pictures overlap enough for vehicles that stray, and autopilots, wind,
-/// estimates and radio vary.
+/// A [`scenario`] that can be flown: pictures overlap enough for the deviations of vehicles, and
+/// autopilots, gusts, estimates and radio loss vary.
 pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = scenario(random, shape, vehicles);
     let overlaps = text.lines().filter(|line| line.starts_with("overlap_"));
@@ -92,8 +92,8 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     )
 }
 
-/// The same, as far and as fast as surveys are flown: up to 15 m/s and 120 m, and in places wide
-/// apart.
+/// As [`flown`], at heights and speeds of real surveys: up to 15 m/s and 120 m, and in some
+/// scenarios with a wide separation.
 pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = flown(random, shape, vehicles);
     let drawn = |line: &str| match line.split(" = ").next() {
@@ -109,7 +109,8 @@ pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     text.lines().map(drawn).collect()
 }
 
-/// The same with so many lanes that paths do not hold them: flown in stretches.
+/// As [`fast`], with more lanes than a vehicle's path has room for, so that it is flown in
+/// stretches.
 pub fn large(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = fast(random, shape, vehicles);
     let drawn = |line: &str| match line.split(" = ").next() {
@@ -121,8 +122,8 @@ pub fn large(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     text.lines().map(drawn).collect()
 }
 
-/// A random convex area for so many vehicles, of which the radio loses a share of messages: minutes
-/// of work for each.
+/// A random convex area with minutes of work for each of so many vehicles; their radio loses the
+/// share `loss` of messages.
 pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     let mut text = flown(random, Shape::Convex, vehicles);
     let keep = |line: &&str| !line.starts_with("radio_loss") && !line.starts_with("cruise_mps");
@@ -132,14 +133,14 @@ pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
         &format!("[mission]\ncruise_mps = {:.1}\n", between(random, 3.0, 6.0)),
     );
     text = text.replace("time_limit_s = 7200.0", "time_limit_s = 3600.0");
-    // A wider separation takes worse estimates.
+    // With "recorded" estimates the separation is random: at least 3.6 m, as their errors require.
     let separation = format!("separation_m = {:.1}", between(random, 3.6, 8.0));
     text = text.replace("separation_m = 3.6", &separation);
     text + &format!("radio_loss = {loss}\n")
 }
 
-/// The same without a camera: lanes as wide as a picture, and pictures that overlap along them,
-/// little or not at all.
+/// The scenario `text` without a camera: lanes as wide as a picture, and pictures that overlap
+/// along the lanes little or not at all.
 pub fn without_overlap(random: &mut impl Rng, text: &str) -> String {
     let lane_m = between(random, 4.0, 20.0);
     let share = if random.next_u32().is_multiple_of(2) { 1.0 } else { between(random, 0.4, 1.0) };
@@ -149,8 +150,8 @@ pub fn without_overlap(random: &mut impl Rng, text: &str) -> String {
     rest.replacen("height_m", &spacing, 1)
 }
 
-/// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a
-/// hole outside.
+/// A random coverage scenario with so many vehicles. Some cannot be planned: corners may lie on one
+/// line, or a hole outside the area.
 pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let radius = between(random, 40.0, 250.0);
     let count = 3 + (random.next_u32() % 20) as usize;

@@ -1,4 +1,4 @@
-//! Boards in QEMU: the built firmware, and what it is run with.
+//! Runs built firmware on boards emulated by QEMU.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -13,15 +13,16 @@ use planner_core::voxel::VoxelGrid;
 
 use crate::{Guard, free_port, workspace};
 
-/// Where bank 2 of the emulated flash lies.
+/// Address of bank 2 of the emulated flash.
 const BANK2: u32 = 0x6000_0000;
-/// A loaded machine starts nothing at once.
+/// Longest wait until QEMU listens: on a loaded machine it starts late.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Where a map for measurements lies.
+/// Address at which the measuring programs expect a map.
 const MAP: u32 = 0x6080_0000;
 
-/// A program for the board `qemu`, from the directory that `FLOCKMATE_FIRMWARE` names, as seen from
-/// the checkout; `None` with a line that says what is skipped.
+/// Path of a program built for the board `qemu`, in the directory that `FLOCKMATE_FIRMWARE` names
+/// relative to the checkout; without that variable `None`, and a printed line that says what is
+/// skipped.
 pub fn program(name: &str) -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("FLOCKMATE_FIRMWARE") else {
         println!(
@@ -32,7 +33,7 @@ pub fn program(name: &str) -> Option<PathBuf> {
     Some(workspace().join(folder).join(name))
 }
 
-/// QEMU with a program on the board.
+/// A command that runs a program on QEMU's board.
 fn qemu(program: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
     command
@@ -43,12 +44,12 @@ fn qemu(program: &Path) -> Command {
     command
 }
 
-/// QEMU's option that puts a file into memory at every reset.
+/// QEMU's option that loads a file to an address at every reset.
 fn loader(file: &Path, at: u32) -> String {
     format!("loader,file={},addr={at:#x},force-raw=on", file.display())
 }
 
-/// A map as `measure` and `calls` find it.
+/// The bytes of a map as the programs `measure` and `calls` read it from memory.
 pub fn map_image(grid: &VoxelGrid<'_>) -> Vec<u8> {
     let shape = grid.shape();
     let dims = shape.dims.iter().flat_map(|d| d.to_le_bytes());
@@ -61,10 +62,10 @@ pub fn map_image(grid: &VoxelGrid<'_>) -> Vec<u8> {
         .collect()
 }
 
-/// What `measure` or `calls` says of a roadmap file and a map, line by line.
+/// Runs `measure` or `calls` on a roadmap file and a map; returns the lines that it prints.
 ///
 /// # Panics
-/// It does not run to its end.
+/// The program does not run to its end.
 pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a temporary directory");
     let file = |name: &str, bytes: &[u8]| {
@@ -73,7 +74,7 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
         file
     };
     let (roadmap, map) = (file("roadmap.bin", roadmap), file("map.bin", map));
-    // An instruction takes a nanosecond of the board's time.
+    // `-icount shift=0`: an instruction takes one nanosecond of the board's time.
     let out = qemu(program)
         .args([
             "-monitor",
@@ -91,7 +92,7 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// A board that runs by the wall clock, and its ports: to the autopilot, to the radio.
+/// Starts a board that runs by the wall clock; returns its ports: to the autopilot, to the radio.
 ///
 /// # Panics
 /// QEMU does not start.
@@ -111,7 +112,7 @@ pub fn by_the_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
     }
     let board = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
     let urls = ports.map(|port| LinkUrl::Tcp(format!("127.0.0.1:{port}")));
-    // It listens as soon as it runs.
+    // A connection succeeds as soon as QEMU listens.
     let began = Instant::now();
     while urls[1].open().is_err() {
         assert!(began.elapsed() < PATIENCE, "QEMU does not listen");
@@ -120,7 +121,7 @@ pub fn by_the_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
     (board, urls)
 }
 
-/// Every vehicle of a mission has a board in lock step from now on, which logs to `folder`.
+/// Gives every vehicle of a mission a board in lock step, which logs to a file in `folder`.
 pub fn put_on_boards(mission: &mut Mission, program: &Path, folder: &Path) {
     for vehicle in &mut mission.scenario.vehicles {
         let log = folder.join(format!("board-{}.defmt", vehicle.id));
@@ -128,8 +129,8 @@ pub fn put_on_boards(mission: &mut Mission, program: &Path, folder: &Path) {
     }
 }
 
-/// All of a flight that anybody can see: its result, what was said and when, and where everybody
-/// was.
+/// The text of all that can be observed of a flight: its result, its log with times, and the tracks
+/// of all vehicles.
 ///
 /// # Panics
 /// The result cannot be written.

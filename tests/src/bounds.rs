@@ -1,5 +1,5 @@
-//! What bounds the work of every public call of planner-core and companion, and what an emulated
-//! board counted.
+//! The bound on the work of every public call of planner-core and companion, beside the
+//! instructions that an emulated board counted.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -15,12 +15,12 @@ use host_sim::scenario;
 
 use crate::{board, workspace};
 
-/// Where the table of worst cases is, seen from the checkout.
+/// Path of the page with the table of worst cases, relative to the checkout.
 pub const PAGE: &str = "docs/worst-case.md";
 
-/// What the board's program `calls` calls each call, and what bounds its work: n nodes, h
-/// half-edges, w = 64 waypoints, g = 128 gates, v = 32 vehicles, p = 2048 pieces of flights, d
-/// metres of segment, c cells of a map.
+/// Each call by its name in the board's program `calls`, and the bound on its work: n nodes, h
+/// half-edges, w = 64 waypoints, g = 128 gates, v = 32 vehicles, p = 2048 timed segments of
+/// flights, d metres of segment, c cells of a map.
 pub const BOUNDS: &[(&str, &str)] = &[
     ("frames::enu_to_geodetic", "constant: 5 rounds"),
     ("frames::geodetic_to_enu", "constant"),
@@ -174,16 +174,16 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("Companion::handle_flash", "1 kB"),
 ];
 
-/// What a call was seen to take.
+/// What one call took at most.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// The most instructions.
+    /// Greatest number of instructions counted.
     pub instructions: u64,
-    /// Bytes of state or workspace.
+    /// Bytes of state or workspace that the call was lent.
     pub bytes: u64,
 }
 
-/// Makes calls on the desk.
+/// Makes the calls on the desk without counting their instructions.
 struct Uncounted;
 
 impl Meter for Uncounted {
@@ -192,12 +192,12 @@ impl Meter for Uncounted {
     }
 }
 
-/// Runs the board's program `calls` on the demo's roadmap and a map of the building; what it
-/// counted, by name.
+/// Runs the board's program `calls` on the demo's roadmap and a map of the building; returns what
+/// it counted, by the calls' names.
 ///
 /// # Errors
-/// The demo cannot be prepared, the program says something else, or its coverage plans are not the
-/// desk's, bit by bit.
+/// The demo cannot be prepared, the program prints something else, or its coverage plans differ in
+/// any bit from those computed on the desk.
 pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
@@ -226,10 +226,10 @@ fn seen(line: &str) -> Result<(String, Seen)> {
     Ok((word()?.to_owned(), Seen { instructions, bytes }))
 }
 
-/// The page before its table, the table, and what is behind it.
+/// The text of the page before its table, the table, and the text behind it.
 ///
 /// # Errors
-/// The page has lost the lines around the table.
+/// A marker line around the table is missing from the page.
 pub fn parts(page: &str) -> Result<[&str; 3]> {
     const BEFORE: &str = "<!-- written by `cargo xtask bench --only worst-case` -->\n";
     const BEHIND: &str = "<!-- end -->";
@@ -238,7 +238,7 @@ pub fn parts(page: &str) -> Result<[&str; 3]> {
     Ok([&page[..from], &page[from..from + len], &page[from + len..]])
 }
 
-/// The table of what was counted.
+/// The table of all calls: bound, instructions counted and bytes lent, as Markdown.
 ///
 /// # Errors
 /// A call of [`BOUNDS`] was not counted.
@@ -257,7 +257,7 @@ pub fn table(calls: &HashMap<String, Seen>) -> Result<String> {
     Ok(table)
 }
 
-/// A count as the table prints it: two digits, rounded up.
+/// A count as the table prints it: two significant digits, rounded up.
 pub fn rounded(count: u64) -> String {
     let mut unit = 1;
     while count / unit > 99 {
@@ -274,7 +274,7 @@ pub fn rounded(count: u64) -> String {
     }
 }
 
-/// What [`rounded`] printed, as a number again.
+/// The number that [`rounded`] printed as `text`; `None` if it did not.
 pub fn parsed(text: &str) -> Option<f64> {
     let (number, unit) = text.split_once(' ').unwrap_or((text, ""));
     let unit = match unit {

@@ -1,5 +1,5 @@
-//! The largest costs of the methods that divide an area, on random convex areas for 2 to 10
-//! vehicles.
+//! Compares the greatest costs of the methods that divide an area, on random convex areas for 2 to
+//! 10 vehicles.
 
 use std::ops::Range;
 
@@ -12,29 +12,29 @@ use rayon::prelude::*;
 
 use crate::areas::{self, Shape};
 
-/// A cost is greater than another one if it is so by more than rounding.
+/// Ratio of two costs above which one counts as greater: more than rounding.
 const ROUNDING: f32 = 1.0001;
 
-/// What came of all areas.
+/// Comparison of the methods over all areas.
 #[derive(Clone, Copy, Debug)]
 pub struct Costs {
-    /// Areas that all methods planned.
+    /// Number of areas that all methods planned.
     pub areas: usize,
-    /// Areas where POWELL-BINPAT costs more than BINPAT.
+    /// Number of areas where POWELL-BINPAT costs more than BINPAT.
     pub powell_over_binpat: usize,
-    /// Areas where it costs more than SIMPLE-BINPAT.
+    /// Number of areas where POWELL-BINPAT costs more than SIMPLE-BINPAT.
     pub powell_over_simple: usize,
-    /// Areas where any of them costs less than `exact`.
+    /// Number of plans by SIMPLE-BINPAT, BINPAT or POWELL-BINPAT that cost less than `exact`.
     pub below_exact: usize,
-    /// Medians of what SIMPLE-BINPAT, BINPAT and POWELL-BINPAT cost more than `exact`, percent.
+    /// Median excess of SIMPLE-BINPAT, BINPAT and POWELL-BINPAT over `exact`, percent of the cost.
     pub gaps: [f32; 3],
 }
 
 impl Costs {
-    /// Plans the areas of these seeds by every method.
+    /// Plans one random area for each of these seeds by every method.
     ///
     /// # Panics
-    /// A cost is below the bound of all divisions, or no area could be planned.
+    /// A cost is below the lower bound of all divisions, or no area could be planned.
     pub fn of(seeds: Range<u64>) -> Self {
         let mut all: Vec<[f32; 4]> = seeds.into_par_iter().filter_map(costs).collect();
         assert!(!all.is_empty(), "no area could be planned");
@@ -51,7 +51,8 @@ impl Costs {
     }
 }
 
-/// Those of SIMPLE-BINPAT, BINPAT, POWELL-BINPAT and `exact` on one area, seconds.
+/// Greatest costs of SIMPLE-BINPAT, BINPAT, POWELL-BINPAT and `exact` on one area, seconds; `None`
+/// if a method cannot plan it.
 fn costs(seed: u64) -> Option<[f32; 4]> {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);

@@ -1,4 +1,4 @@
-//! Coverage missions flown, and judged by where their pictures were truly taken.
+//! Flies coverage missions, and judges them by where their pictures were truly taken.
 
 use std::fmt::Write as _;
 
@@ -11,8 +11,8 @@ use host_sim::result::MissionResult;
 use host_sim::swarm::Flight;
 use host_sim::{scenario, swarm};
 
-/// Reason why a vehicle that was not struck lands short of its part: the rule for those that no
-/// majority hears, or the lost one hovers where it was to fly.
+/// Log texts that explain why a vehicle without a fault lands before its part is done: it was not
+/// heard by a majority, or a failed vehicle hovers on its path.
 pub const EXPLAINED: [&str; 10] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
@@ -26,11 +26,11 @@ pub const EXPLAINED: [&str; 10] = [
     "Start barred for 3 min: others take its part",
 ];
 
-/// Reason why a vehicle lands beside its pad: another one may lie there, or come down.
+/// Log text of a vehicle that lands beside its pad, since another one may lie or come down there.
 pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
 
-/// When the last of the other vehicles began to land, or to fly home, by [`lines`]: nobody takes
-/// over what this vehicle leaves later.
+/// When the last of the other vehicles began to land or to fly home, seconds, by [`lines`]: nobody
+/// is left to take over what `vehicle` leaves after that.
 pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     let mut ended: Vec<(&str, f64)> = Vec::new();
     for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home"))
@@ -46,7 +46,7 @@ pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     ended.iter().fold(0.0, |last, (_, at_s)| last.max(*at_s))
 }
 
-/// Whether this vehicle itself said why it lands short of its part, by [`lines`].
+/// Whether `vehicle` itself logged one of `reasons`, in a log by [`lines`].
 pub fn says(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
     let own = format!(" Some({vehicle}) ");
     log.lines()
@@ -54,7 +54,7 @@ pub fn says(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
         .any(|line| reasons.iter().any(|row| line.contains(row)))
 }
 
-/// Flies a coverage mission: its result with what its pictures show, and what was said.
+/// Flies a coverage mission; returns its result, with what its pictures show, and its event log.
 ///
 /// # Errors
 /// Reason why it cannot be planned, flown or judged.
@@ -62,7 +62,7 @@ pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)>
     fly_on(mission, &mut Vec::new())
 }
 
-/// The same, judged by the pictures of flights before too; those of this one are added to them.
+/// As [`fly`], judged by `pictures` of earlier flights too, to which it adds this flight's.
 ///
 /// # Errors
 /// As [`fly`].
@@ -74,7 +74,7 @@ pub fn fly_on(
     Ok((flight.result, flight.log))
 }
 
-/// The same, with all that was recorded.
+/// As [`fly_on`], but returns all that the flight recorded.
 ///
 /// # Errors
 /// As [`fly`].
@@ -89,10 +89,10 @@ pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Res
     Ok(flight)
 }
 
-/// The same from a scenario's text: its result, and what was said that matters.
+/// As [`fly`], from a scenario's text; returns the result and the log by [`lines`].
 ///
 /// # Errors
-/// Reason why it is not flown.
+/// Why the mission is not flown.
 pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
@@ -101,7 +101,7 @@ pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
     Ok((result, lines(&log)))
 }
 
-/// What was said that matters.
+/// The log as text, `time vehicle text` a line: events with a reason (`:`) and errors only.
 pub fn lines(log: &[Event]) -> String {
     let mut lines = String::new();
     for event in log.iter().filter(|event| event.text.contains(':') || event.level == Level::Error)
@@ -111,7 +111,7 @@ pub fn lines(log: &[Event]) -> String {
     lines
 }
 
-/// What is wrong with a flight.
+/// Text of the result if the flight was unsafe or is not complete; `None` if it was clean.
 pub fn faults(result: &MissionResult) -> Option<String> {
     let safety = &result.safety;
     let clean = (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);

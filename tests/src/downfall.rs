@@ -1,4 +1,5 @@
-//! What goes wrong inside a board, done to it by its debug probe while it stands still.
+//! Makes a board fail from inside: its debug probe changes memory and calls code while it stands
+//! still.
 
 use std::path::Path;
 use std::time::Duration;
@@ -6,59 +7,58 @@ use std::time::Duration;
 use host_sim::boards::EmulatedBoard;
 use object::{Object, ObjectSymbol, Symbol};
 
-/// An address of no memory.
+/// An address without memory: to run there is a fault.
 const NOWHERE: u32 = 0xF000_0000;
-/// The far end of the stack, which nothing reaches; code is put a little above it.
+/// Lowest address of the stack, which no stack use reaches; code is put a little above it.
 const STACK_END: u32 = 0x2008_A000;
 const SPARE: u32 = STACK_END + 0x100;
-/// Less than an interrupt takes of a stack.
+/// Bytes left on the stack: less than an interrupt pushes.
 const STACK_LEFT: u32 = 8;
-/// End of the name of a function of `core` that does nothing but panic, at the place that it is
-/// given.
+/// End of the name of a function of `core` that only panics, at the location that it gets.
 const PANICS: &str = "panic_const_div_by_zero";
-/// That place.
+/// File name in that location, which the panic message shows.
 const PLACE: &[u8] = b"downfall.rs";
 const LINE: u32 = 7;
-/// End of the name of the function that makes a plan on a board.
+/// End of the name of the firmware's function that computes a plan.
 const PLANS: &str = "Planner4plan";
-/// An instruction that there is not.
+/// An opcode that is an undefined instruction: it raises a fault.
 const UNDEFINED: u16 = 0xDE00;
-/// A board that goes nowhere computes for a second of its time until its watchdog resets it.
+/// Longest wait for an answer: a hung board computes on until its watchdog resets it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// `cpsid i`, then a branch to itself.
+/// Machine code of an endless loop without interrupts: `cpsid i`, then a branch to itself.
 const SPIN: &[u16] = &[0xB672, 0xE7FE];
-/// `mov sp, r0`, then `push {r0-r7, lr}`.
+/// Machine code of a stack overflow: `mov sp, r0`, then `push {r0-r7, lr}`.
 const PUSH: &[u16] = &[0x4685, 0xB5FF];
-/// 0x05FA_0004 (SYSRESETREQ) into AIRCR at 0xE000_ED0C, then a branch to itself: `movw`, `movt` of
-/// `r1` and `r0`, `str r0, [r1]`.
+/// Machine code of a reset: writes 0x05FA_0004 (SYSRESETREQ) to AIRCR at 0xE000_ED0C, then a branch
+/// to itself: `movw`, `movt` of `r1` and `r0`, `str r0, [r1]`.
 const RESET: &[u16] =
     &[0xF64E, 0x510C, 0xF2CE, 0x0100, 0xF240, 0x0004, 0xF2C0, 0x50FA, 0x6008, 0xE7FE];
-/// `subs r0, #1`, back while it is not zero, and return: two instructions each time.
+/// Machine code of a delay loop of `r0` rounds: `subs r0, #1`, `bne` back, then return.
 const COUNT: &[u16] = &[0x3801, 0xD1FD, 0x4770];
-/// How long each time takes, at 2 ns an instruction.
+/// Duration of one round of [`COUNT`], nanoseconds: two instructions of 2 ns.
 const COUNT_NS: u64 = 4;
 
-/// What brings a board down.
+/// How a board is made to fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Downfall {
-    /// Somebody presses reset.
+    /// A reset by software, as by the reset key.
     Reset,
-    /// The processor runs where nothing is.
+    /// A fault: a jump to an address without memory.
     Fault,
-    /// The program finds itself wrong.
+    /// A Rust panic.
     Panic,
-    /// The program goes nowhere, and hears no interrupt.
+    /// An endless loop with interrupts disabled; the watchdog ends it.
     Hang,
-    /// The stack is as full as can be: what comes next reaches into the guard below it.
+    /// A push onto a full stack, which reaches into the guard region below it.
     Overflow,
 }
 
 impl Downfall {
-    /// All there are.
+    /// Every kind of failure.
     pub const ALL: [Self; 5] = [Self::Reset, Self::Fault, Self::Panic, Self::Hang, Self::Overflow];
 
-    /// How what the next start says of it begins.
+    /// How the board's message about this failure begins after its restart.
     pub fn said(self) -> &'static str {
         match self {
             Self::Reset | Self::Hang => "Restarted: watchdog, reset key or brown-out",
@@ -68,16 +68,16 @@ impl Downfall {
         }
     }
 
-    /// How long the board is busy with it before it starts again.
+    /// How long the board stands in this failure before it restarts.
     pub fn lasts(self) -> Duration {
         Duration::from_secs(u64::from(self == Self::Hang))
     }
 
-    /// Brings a board with this program down: it has started again when this returns, and its flash
-    /// keeps what it holds, torn words too.
+    /// Makes a board that runs this program fail. When this returns the board has restarted; its
+    /// flash keeps its content, torn words too.
     ///
     /// # Panics
-    /// It does not start again by itself. The program has no function that panics by itself.
+    /// The board does not restart by itself, or the program has no function that only panics.
     pub fn befall(self, board: &mut EmulatedBoard, program: &Path) {
         let (address, argument) = match self {
             Self::Reset => (put(board, RESET), 0),
@@ -91,52 +91,52 @@ impl Downfall {
     }
 }
 
-/// Presses reset.
+/// Resets a board as by its reset key.
 ///
 /// # Panics
-/// It does not start again.
+/// The board does not restart.
 pub fn reset(board: &mut EmulatedBoard) {
-    // Nothing is called in the program.
+    // No function of the program is needed for a reset.
     Downfall::Reset.befall(board, Path::new(""));
 }
 
-/// Nothing else runs on the board for so long.
+/// Keeps the board busy for `time`, so that none of its tasks runs.
 ///
 /// # Panics
-/// The board is gone.
+/// The board does not answer any more.
 pub fn block(board: &mut EmulatedBoard, time: Duration) {
     let count = put(board, COUNT);
     let times = time.as_nanos() as u64 / COUNT_NS;
     board.call_function(count, times as u32, PATIENCE).expect("a board");
 }
 
-/// Has a board's planner fault whenever it plans, until the next start.
+/// Makes a board's planner raise a fault whenever it plans, until the next restart.
 ///
 /// # Panics
-/// The program has no planner.
+/// The program has no function that computes a plan.
 pub fn break_planner(board: &mut EmulatedBoard, program: &Path) {
     board.write_memory(function(program, PLANS), &UNDEFINED.to_le_bytes()).expect("a board");
 }
 
-/// Has a board's planner take so much longer, until the next start: where it begins, a branch leads
-/// to code that counts.
+/// Makes a board's planner take `time` longer for each plan, until the next restart: its first
+/// instructions are replaced by a branch to a delay loop.
 ///
 /// # Panics
-/// The program has no planner.
+/// The program has no function that computes a plan.
 pub fn slow_planner(board: &mut EmulatedBoard, program: &Path, time: Duration) {
     let plans = function(program, PLANS);
     let begins = board.read_memory(plans, 16).expect("a board");
     let halves: Vec<u16> =
         begins.chunks(2).map(|half| u16::from_le_bytes([half[0], half[1]])).collect();
-    // `ldr.w pc, [pc]` and the address after it: eight bytes, or ten where a half word fills up.
+    // `ldr.w pc, [pc]` and the address after it: eight bytes, or ten with a `nop` to align them.
     let (fills, mut moved) = (usize::from(!plans.is_multiple_of(4)), 0);
     while moved < 4 + fills {
         moved += if halves[moved] >= 0xE800 { 2 } else { 1 };
     }
     let far = |address: u32| [0xF8DF, 0xF000, address as u16, (address >> 16) as u16];
     let times = (time.as_nanos() as u64 / COUNT_NS) as u32;
-    // `push {r0}`, `ldr r0` of the word that is jumped over, `subs`, `bne`, `pop {r0}`, what the
-    // branch took the place of, and back.
+    // `push {r0}`, `ldr r0` of the word that is jumped over, `subs`, `bne`, `pop {r0}`, the
+    // instructions that the branch has replaced, and the branch back.
     let mut code = vec![0xB401, 0x4801, 0xE002, 0xBF00, times as u16, (times >> 16) as u16];
     code.extend([0x3801, 0xD1FD, 0xBC01]);
     code.extend(&halves[..moved]);
@@ -150,13 +150,13 @@ pub fn slow_planner(board: &mut EmulatedBoard, program: &Path, time: Duration) {
     board.write_memory(plans, &bytes(&branch)).expect("a board");
 }
 
-/// Puts code where nothing uses the memory, and returns where.
+/// Writes code to memory that nothing uses; returns its address.
 fn put(board: &mut EmulatedBoard, code: &[u16]) -> u32 {
     board.write_memory(SPARE, &bytes(code)).expect("a board");
     SPARE
 }
 
-/// Puts a `core::panic::Location` there, and returns where: file, its length, line, column.
+/// Writes a `core::panic::Location` (file, its length, line, column) there; returns its address.
 fn location(board: &mut EmulatedBoard) -> u32 {
     let words = [SPARE + 16, PLACE.len() as u32, LINE, 1];
     let bytes: Vec<u8> =
@@ -169,11 +169,12 @@ fn bytes(code: &[u16]) -> Vec<u8> {
     code.iter().flat_map(|half| half.to_le_bytes()).collect()
 }
 
-/// The address of the function whose name contains this.
+/// Address of the program's function whose name ends in `part`.
 fn function(program: &Path, part: &str) -> u32 {
     let bytes = std::fs::read(program).expect("it was started");
     let elf = object::File::parse(&*bytes).expect("a program");
-    // Closures of a function, and what is made for them, have its name in theirs.
+    // Symbols of closures and of generic instances contain their function's name, but do not end in
+    // it.
     let ends = |name: &str| name.split(".llvm").next().is_some_and(|name| name.ends_with(part));
     let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(ends);
     let symbol = elf

@@ -1,9 +1,9 @@
-//! Vehicles that fail where their radio no longer reaches the others.
+//! Vehicles that fail just where their radio no longer reaches the others.
 //!
-//! A flight of the demo with a short radio range, drawn by its seed, is flown once without a fault.
-//! Of that flight every moment is a candidate at which a vehicle on its path leaves the range of
-//! all others. Near one of them, from 3 s before to 12 s after, a fault strikes it, and the flight
-//! is flown again. Judged by the truth.
+//! A flight of the demo with a random short radio range is flown once without a fault. Each moment
+//! of it at which a vehicle on its path leaves the range of all others is a candidate. Near one of
+//! these, from 3 s before to 12 s after, a random fault strikes that vehicle, and the flight is
+//! flown again. The referee, who sees the true motion, judges it.
 
 use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
@@ -14,9 +14,10 @@ use crate::swarms::Random;
 use crate::vehicle::ahead;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
-/// All is over by then, seconds.
+/// Time limit of a flight, seconds: every flight has ended by then.
 const TIME_LIMIT_S: f32 = 600.0;
-/// The lines of a fault beside `at_s` and `vehicle`; AHEAD stands for a place on its path.
+/// TOML lines of each fault beside `at_s` and `vehicle`; AHEAD becomes a point on the vehicle's
+/// path.
 pub const SCRIPTS: [&str; 9] = [
     "kind = 'pilot-takeover'",
     "kind = 'pilot-takeover'\nduration_s = 30",
@@ -32,39 +33,39 @@ pub const SCRIPTS: [&str; 9] = [
 /// A mission with a short radio range, its plan, and when each vehicle leaves the range of all
 /// others.
 pub struct Edge {
-    /// How far the radio reaches, metres.
+    /// Radio range of the mission, metres.
     pub range_m: f32,
     mission: Mission,
     plan: Box<SwarmPlan>,
-    /// When, seconds, and the index of the vehicle.
+    /// Each time, seconds, at which a vehicle leaves the range of all others, and its index.
     leaves: Vec<(f32, usize)>,
     rng: Random,
 }
 
-/// What came of one flight.
+/// What happened in one flight with a fault.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// What struck whom, and when.
+    /// Text: the radio range, the struck vehicle, when, and by which fault.
     pub what: String,
-    /// What the companions and the referee said, in order.
+    /// The log of companions, faults and referee, in order.
     pub log: Vec<String>,
-    /// What must not be: contacts of vehicles, and vehicles too near of which none was struck.
+    /// Log lines of what must not happen: contacts, and pairs too near of which neither was struck.
     pub wrong: Vec<String>,
-    /// Others nearer than the safety distance to the vehicle struck.
+    /// Log lines of vehicles nearer than the safety distance to the struck one, or hit by it.
     pub near_struck: Vec<String>,
-    /// Vehicles that nothing struck and that had not landed in the end.
+    /// Vehicles without a fault that had not landed at the end.
     pub aloft: Vec<String>,
-    /// Vehicles that stood for 20 s, as the referee counts them.
+    /// Number of deadlocks that the referee counted (no progress for 20 s).
     pub deadlocks: u32,
-    /// Vehicles that landed at their goals.
+    /// Number of vehicles that landed at their goals.
     pub arrived: usize,
 }
 
 impl Edge {
-    /// The mission of a seed, flown once without a fault.
+    /// Draws the mission of a seed, and flies it once without a fault.
     ///
     /// # Errors
-    /// It cannot be planned or flown.
+    /// The mission cannot be planned or flown.
     pub fn new(seed: u64) -> anyhow::Result<Self> {
         let mut rng = Random::new(seed);
         let mut scenario = scenario::parse(DEMO, "demo.toml")?;
@@ -78,15 +79,15 @@ impl Edge {
         Ok(Self { range_m, mission, plan, leaves, rng })
     }
 
-    /// From now on everybody hears everybody: what the failures alone do.
+    /// From now on every vehicle hears every other one: only the faults are left to matter.
     pub fn hear_all(&mut self) {
         self.mission.scenario.simulation.radio_range_m = 500.0;
     }
 
-    /// The next flight with a fault; none where nobody leaves the range of the others.
+    /// Flies the mission with a random fault; `None` if no vehicle leaves the range of the others.
     ///
     /// # Errors
-    /// It cannot be flown.
+    /// The mission cannot be flown.
     pub fn strike(&mut self) -> anyhow::Result<Option<Outcome>> {
         if self.leaves.is_empty() {
             return Ok(None);
@@ -109,7 +110,7 @@ impl Edge {
     }
 }
 
-/// When each vehicle leaves the range of all others, in the air.
+/// Each time at which a vehicle that moves leaves the range of all others, and its index.
 fn leaves(flight: &Flight, range_m: f32) -> Vec<(f32, usize)> {
     let tracks = &flight.tracks;
     let mut leaves = Vec::new();

@@ -1,4 +1,4 @@
-//! Random hills as height maps, and areas above them.
+//! Random hills as height maps, and coverage scenarios above them.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -7,10 +7,10 @@ use rand_core::Rng;
 
 use crate::areas;
 
-/// Half the side of a random map, metres.
+/// Half the side of a height map, metres.
 const HALF_M: f64 = 600.0;
 
-/// Hills, and noise from cell to cell.
+/// A square height map of random hills and noise, centred on the origin.
 pub struct Hills {
     cell_m: f64,
     side: usize,
@@ -18,7 +18,7 @@ pub struct Hills {
 }
 
 impl Hills {
-    /// Hills up to so high, and hollows not so deep, metres.
+    /// Hills of up to 0.7 and hollows of up to 0.3 of `most_m`, metres, on a tilted plane.
     pub fn new(random: &mut impl Rng, most_m: f64) -> Self {
         let cell_m = 2.0 + (18.0 * areas::unit(random)).round();
         let side = (2.0 * HALF_M / cell_m).ceil() as usize;
@@ -33,7 +33,7 @@ impl Hills {
             })
             .collect();
         let tilt = [0, 1].map(|_| 0.2 * (areas::unit(random) - 0.5));
-        // Level, trees here and there, or all rough.
+        // No noise, trees here and there, or every cell rough: share of cells and height, metres.
         let (share, rough) = [(0.0, 0.0), (0.02, 15.0), (1.0, 2.0)][random.next_u32() as usize % 3];
         let mut heights_m = Vec::with_capacity(side * side);
         for row in 0..side {
@@ -52,13 +52,13 @@ impl Hills {
         Self { cell_m, side, heights_m }
     }
 
-    /// The height at a place, metres.
+    /// Height at a place, metres above sea level.
     pub fn at(&self, x: f64, y: f64) -> f64 {
         let [column, row] = [x, y].map(|at| ((at + HALF_M) / self.cell_m) as usize);
         self.heights_m[row * self.side + column]
     }
 
-    /// As a file.
+    /// The height map as an ESRI ASCII grid.
     pub fn asc(&self) -> String {
         let mut text = format!(
             "ncols {0}\nnrows {0}\nxllcorner {1}\nyllcorner {1}\ncellsize {2}\n",
@@ -73,7 +73,8 @@ impl Hills {
         text
     }
 
-    /// A scenario with these hills under its area, written to a file, and its vehicles on them.
+    /// The scenario `text` with these hills, written to `path`, as its terrain, and its vehicles on
+    /// them.
     pub fn under(&self, text: &str, path: &Path, tolerance_m: f64) -> String {
         std::fs::write(path, self.asc()).expect("there is room");
         let terrain = format!(

@@ -1,9 +1,9 @@
-//! Forged frames, given to a companion in flight: right checksums, any sender but a ground station,
+//! Gives forged frames to a companion in flight: right checksums, any sender but a ground station,
 //! the autopilot's own ids among them, fields random and at their bounds.
 //!
-//! What must hold: no panic; every setpoint finite, inside the fence and near the last one; nothing
-//! armed without a start; the pilot's mode left alone; answers bounded. One target ([`attack`])
-//! serves the fuzzer and the bench.
+//! What must hold: no panic; every setpoint finite, inside the fence and near the last one; no
+//! arming without a start; the pilot's mode left alone; a bounded number of answers. One target
+//! ([`attack`]) serves the fuzzer and the bench.
 
 use core::ops::Range;
 
@@ -33,9 +33,10 @@ const ID: u8 = 42;
 const NEIGHBOUR: u8 = 77;
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
 const STEP: Duration = Duration::from_millis(25);
-/// More than this in a second of simulated time is no bounded answer, frames to each link.
+/// Most frames that a companion may send in a second of simulated time, to the autopilot and by
+/// radio.
 const ANSWERS_MOST: [u32; 2] = [200, 60];
-/// Messages that a companion reads, and one that it does not.
+/// Ids of the messages that a companion reads, and of one that it does not.
 const READ: [u32; 20] = [
     0,
     1,
@@ -58,30 +59,30 @@ const READ: [u32; 20] = [
     253,
     TUNNEL_DATA::ID,
 ];
-/// Speed of a setpoint, m/s.
+/// Speed limit of setpoints, m/s.
 const SPEED_MPS: f32 = 2.2;
 
 type Victim = Companion<4, 16, 8>;
 
-/// What an attack came to.
+/// What an attack found.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Forged frames given.
+    /// Number of forged frames given to the companion.
     pub frames: u64,
-    /// Setpoints sent meanwhile.
+    /// Statistics of the setpoints sent during the attack.
     pub setpoints: SetpointStats,
     /// Most frames sent in a second, to the autopilot and by radio.
     pub most_sent: [u32; 2],
-    /// Rules that were broken.
+    /// Rules that the companion broke: time, state and what it did.
     pub broken: Vec<String>,
-    /// Setpoints that were not fit to be flown.
+    /// Setpoints that were not fit to be flown: time and why.
     pub unfit: Vec<String>,
-    /// How often each state was seen at the end of a step, by its number.
+    /// Number of steps that ended in each state, by the state's number.
     pub states: Vec<u64>,
 }
 
 impl Report {
-    /// Takes another in.
+    /// Adds the findings of another attack.
     pub fn merge(&mut self, other: Self) {
         self.frames += other.frames;
         self.setpoints.merge(&other.setpoints);
@@ -95,7 +96,7 @@ impl Report {
     }
 }
 
-/// A companion with its autopilot, at some time of its mission.
+/// A companion under attack with its simulated autopilot, at some time of its mission.
 #[derive(Clone, Debug)]
 pub struct Flight {
     companion: Victim,
@@ -110,7 +111,8 @@ pub struct Flight {
     sent: [u32; 2],
     second_at: Instant,
     report: Report,
-    /// It photographs an area: the vehicles agree on what a lost one leaves.
+    /// Whether the vehicle photographs an area, so that the fleet divides the work of a lost
+    /// vehicle.
     over_area: bool,
 }
 
@@ -132,11 +134,11 @@ fn plan(over_area: bool) -> Plan16 {
 
 type Plan16 = planner_core::flight::VehiclePlan<16, 8>;
 
-/// Phases of a mission in which it is attacked.
+/// Number of phases of a mission in which the companion is attacked.
 pub const PHASES: usize = 8;
 
 impl Flight {
-    /// On its pad.
+    /// A vehicle on its pad, just switched on.
     fn new(kind: AutopilotKind, over_area: bool) -> Self {
         let start = Point::new(8.0, 12.0, 3.0);
         let mut config: Config<4> = Config::new(ID, start, ORIGIN);
@@ -173,8 +175,8 @@ impl Flight {
         }
     }
 
-    /// One that has come to the phase of this number without an attack; from [`PHASES`] on the same
-    /// over an area.
+    /// A flight brought to this phase without an attack; phases from [`PHASES`] on are the same
+    /// ones over an area.
     pub fn at_phase(phase: usize) -> Self {
         let kind =
             if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
@@ -220,7 +222,7 @@ impl Flight {
         self.drain();
     }
 
-    /// 25 ms of flight, with what `attack` gives.
+    /// One step of 25 ms, in which `attack` may give the companion frames.
     fn step(&mut self, attack: impl FnOnce(&mut Self)) {
         self.now = self.now + STEP;
         if self.now - self.second_at >= Duration::from_secs(1) {
@@ -249,7 +251,8 @@ impl Flight {
         self.report.states[state] += 1;
     }
 
-    /// An honest neighbour on its pad, five times a second.
+    /// An honest neighbour that stands on its pad reports its intent and position, five times a
+    /// second.
     fn neighbour(&mut self) {
         if !(self.now.as_micros() / 25_000).is_multiple_of(8) {
             return;
@@ -324,7 +327,7 @@ impl Flight {
         }
     }
 
-    /// Judges a frame to the autopilot.
+    /// Checks a frame to the autopilot against the rules.
     fn look_at(&mut self, bytes: &[u8]) {
         let mut input = bytes;
         let Some(frame) = self.framers[0].next(self.now, &mut input) else { return };
@@ -348,7 +351,7 @@ impl Flight {
             }
         }
         if let Some(mut data) = frame.decode::<SET_POSITION_TARGET_LOCAL_NED_DATA>() {
-            // In the frame that the companion believes in: a forged origin is not the autopilot's.
+            // The origin that the companion believes counts: a forged one is not the autopilot's.
             self.check.rounded_m = rounding_m(&data);
             if let Some(origin) = self.companion.telemetry().ekf_origin {
                 let ned = nalgebra::Vector3::new(data.x, data.y, data.z).cast::<f64>();
@@ -362,8 +365,7 @@ impl Flight {
             if self.autopilot.mode != self.autopilot.kind.setpoint_mode() {
                 self.check.restart();
             }
-            // In a mode that is none of setpoints, as far as was reported, they go with the
-            // vehicle.
+            // While the autopilot's reported mode takes no setpoints, setpoints follow the vehicle.
             let telemetry = self.companion.telemetry();
             self.check.follows =
                 telemetry.custom_mode != telemetry.kind.unwrap_or_default().setpoint_mode();
@@ -372,8 +374,8 @@ impl Flight {
         }
     }
 
-    /// Gives forged frames until the entropy or the number is spent. An attack has a theme: some of
-    /// the links, some of the messages, few or many frames a step; one that forges everything at
+    /// Gives forged frames until the entropy or the number is spent. Each attack has a theme: some
+    /// of the links, some of the messages, few or many frames a step. One that forges everything at
     /// once soon ends every mission.
     pub fn attacked(mut self, entropy: &mut impl Entropy, frames: usize) -> Report {
         let mut left = frames;
@@ -414,17 +416,18 @@ fn intent() -> Intent {
     }
 }
 
-/// Frames of one attack.
+/// Number of forged frames of one attack.
 const EACH: u64 = 10_000;
-/// Of what went wrong so much is kept.
+/// Most findings that are kept, of each kind.
 const KEPT: usize = 40;
 
-/// Gives at least `frames` forged frames, in attacks seeded from `seed` on.
+/// Gives at least `frames` forged frames to flights with a goal, in attacks with seeds from `seed`
+/// on.
 pub fn attacks(seed: u64, frames: u64) -> Report {
     attacks_in(0..PHASES, seed, frames)
 }
 
-/// The same on vehicles that photograph an area, rosters of the other one among the frames.
+/// As [`attacks`], to vehicles that photograph an area, with roster reports among the frames.
 pub fn attacks_over_area(seed: u64, frames: u64) -> Report {
     attacks_in(PHASES..2 * PHASES, seed, frames)
 }
@@ -450,10 +453,10 @@ fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> Report {
     (seed..seed + frames.div_ceil(EACH)).into_par_iter().map(attack).reduce(Report::default, both)
 }
 
-/// The fuzzer's target: the first byte chooses the phase, the rest are frames.
+/// The fuzzer's target: the first byte of `data` chooses the phase, the rest are forged frames.
 ///
 /// # Panics
-/// A rule is broken.
+/// The companion breaks a rule.
 pub fn attack(data: &[u8]) {
     use std::sync::OnceLock;
     static PHASES_REACHED: OnceLock<Vec<Flight>> = OnceLock::new();

@@ -1,4 +1,4 @@
-//! Helpers shared by the cross-crate tests.
+//! Helpers of the tests across crates, and of the benches.
 
 pub mod areas;
 pub mod board;
@@ -26,7 +26,8 @@ use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// A file of the shared real data, or `None` with a line that says what is skipped.
+/// Path of a file of the shared real data; `None`, with a printed line that says what is skipped,
+/// if it is absent.
 pub fn shared_data(name: &str) -> Option<PathBuf> {
     let path = workspace().join("../shared/data").join(name);
     if path.exists() {
@@ -36,12 +37,12 @@ pub fn shared_data(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// Root of the checkout.
+/// Root directory of the checkout.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// How a program is built.
+/// Cargo profile in which a program is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {
     /// `cargo build`
@@ -50,8 +51,8 @@ pub enum Profile {
     Release,
 }
 
-/// The Python with pymavlink and mavsdk that `FLOCKMATE_PYTHON` names, or `None` with a line that
-/// says what is skipped.
+/// The Python with pymavlink and mavsdk that `FLOCKMATE_PYTHON` names; `None`, with a printed line
+/// that says what is skipped, if the variable is not set.
 pub fn python() -> Option<String> {
     let python = std::env::var("FLOCKMATE_PYTHON").ok();
     if python.is_none() {
@@ -62,7 +63,7 @@ pub fn python() -> Option<String> {
     python
 }
 
-/// Builds `host-sim` and returns where it is: cargo gives another package's binaries to no test.
+/// Builds `host-sim` and returns its path: cargo gives tests no path to another package's binaries.
 pub fn host_sim(profile: Profile) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
     build.current_dir(workspace()).args([
@@ -84,11 +85,11 @@ pub fn host_sim(profile: Profile) -> PathBuf {
     target.join(if profile == Profile::Release { "release" } else { "debug" }).join("host-sim")
 }
 
-/// A child process that ends with the test, however that ends.
+/// A child process that is killed when this is dropped, also by a test that panics.
 pub struct Guard(pub Child);
 
 impl Guard {
-    /// Waits for the child to end by itself; `None` if it has not within the limit.
+    /// Waits for the child to end by itself; `None` if it has not ended within the limit.
     pub fn wait_for(&mut self, limit: Duration) -> Option<ExitStatus> {
         let began = Instant::now();
         while began.elapsed() < limit {
@@ -103,17 +104,17 @@ impl Guard {
 
 impl Drop for Guard {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // The child may have ended by itself, so errors are ignored.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// Starts a `host-sim` that listens on as many links; it prints the address each got,
+/// Starts a `host-sim` that listens on `links` links; returns the address that it printed for each,
 /// `127.0.0.1:PORT` or a path.
 ///
 /// # Panics
-/// It does not start.
+/// The program does not start, or does not open all links.
 pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
     let mut child = command.stdout(Stdio::piped()).spawn().expect("host-sim starts");
     let lines = BufReader::new(child.stdout.take().expect("stdout is piped")).lines();
@@ -128,10 +129,10 @@ pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
     (guard, addresses)
 }
 
-/// Starts `host-sim autopilot` on these links; it prints the address each got.
+/// Starts `host-sim autopilot` on these links; returns the address of each.
 ///
 /// # Panics
-/// It does not start.
+/// The program does not start.
 pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
     let mut command = Command::new(host_sim(Profile::Debug));
     command.arg("autopilot").args(options);
@@ -141,15 +142,15 @@ pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
     listening(command, listen.len())
 }
 
-/// A port that nobody has now, of TCP and UDP, and that no other test of this process is given. Not
-/// one of those that the system hands out by itself: another process may be handed it before it is
-/// used.
+/// A port that is free now for TCP and UDP, and that no other test of this process gets. It is
+/// outside the system's range of ephemeral ports: from that, another process might get it before it
+/// is used.
 ///
 /// # Panics
-/// There is none.
+/// No port is free.
 pub fn free_port() -> u16 {
     static GIVEN: AtomicU16 = AtomicU16::new(0);
-    // Tests of another checkout begin elsewhere.
+    // The process id chooses the first port, so tests of another checkout begin elsewhere.
     let first = (std::process::id() % 100) as u16 * 100;
     let next = |_| 20_000 + (first + GIVEN.fetch_add(1, Ordering::Relaxed)) % 10_000;
     let free = |port: &u16| {
@@ -159,8 +160,8 @@ pub fn free_port() -> u16 {
     (0..10_000).map(next).find(free).expect("one of so many is free")
 }
 
-/// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first on the path; `None` with a
-/// line that says so.
+/// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first found in `PATH`; `None`,
+/// with a printed line, if there is none.
 pub fn chromium() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("FLOCKMATE_CHROMIUM") {
         return Some(named.into());
@@ -176,7 +177,8 @@ pub fn chromium() -> Option<PathBuf> {
     found
 }
 
-/// A number from the environment, for tests that draw more instances where they are asked to.
+/// A number from the environment variable `name`, by which a test can draw more instances than
+/// usual.
 pub fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
 }

@@ -1,20 +1,20 @@
-//! Recorded MAVLink: `.tlog` files, where big-endian microseconds precede each frame, and plain
-//! streams of frames.
+//! Reads recorded MAVLink: `.tlog` files, where big-endian microseconds precede each frame, and
+//! plain streams of frames.
 
 use std::path::{Path, PathBuf};
 
 use crate::shared_data;
 
-/// One record: when, and the bytes of its frame, as many as its header says.
+/// One record of a log: time, and the bytes of its frame, as many as its header states.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// Microseconds; 0 in a plain stream.
+    /// Time stamp, microseconds; 0 in a plain stream.
     pub at_us: u64,
-    /// The frame; its checksum is not looked at.
+    /// Bytes of the frame; its checksum is not checked.
     pub bytes: Vec<u8>,
 }
 
-/// All logs of the shared data, by name; empty, with a line that says so, where they are absent.
+/// Paths of all logs of the shared data, sorted; empty, with a printed line, if these are absent.
 pub fn all() -> Vec<PathBuf> {
     let Some(folder) = shared_data("mavlink") else { return Vec::new() };
     let entries = std::fs::read_dir(folder).expect("a folder can be read");
@@ -23,7 +23,7 @@ pub fn all() -> Vec<PathBuf> {
     logs
 }
 
-/// The records of a log, up to the first that is not whole.
+/// The records of a log, up to the first incomplete one.
 ///
 /// # Panics
 /// The file cannot be read.
@@ -42,7 +42,7 @@ pub fn read(path: &Path) -> Vec<Recorded> {
     records
 }
 
-/// What the header of a frame says about its length.
+/// Length of a frame by its header, MAVLink 1 or 2; `None` if it does not begin with a start byte.
 fn frame_length(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [0xFE, payload, ..] => Some(8 + usize::from(payload)),

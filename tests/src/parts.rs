@@ -1,12 +1,12 @@
-//! Divisions of numbered waypoints: what the models of fleets have in place of lanes and plans.
+//! Divisions of numbered waypoints: a simple planner for the models of fleets, instead of lanes.
 
 use companion::swarm::fleet::{DivisionInput, Fleet};
 
-/// A waypoint is so long, decimetres.
+/// Length of path for each waypoint, decimetres.
 pub const WAYPOINT_DM: u16 = 100;
 
-/// The part of each vehicle, waypoints in the order in which it flies them, by what `fleet` knows;
-/// and a hash of it.
+/// The waypoints of each of `count` vehicles, in the order of their flight, after the divisions
+/// that `fleet` knows, and a hash of these divisions.
 pub fn parts<const V: usize>(
     whole: &[u32],
     fleet: &Fleet<V>,

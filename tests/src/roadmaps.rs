@@ -1,8 +1,8 @@
-//! Roadmap files whose CRC is right and whose contents are not: refused, or every search on them is
-//! right and ends within its bound.
+//! Forged roadmap files with a right CRC and wrong contents: each must be refused, or every search
+//! on it must be right and end within its bound.
 //!
 //! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must
-//! find comes from Dijkstra 1959 in f64. A search may ask about each half-edge once.
+//! find is computed by Dijkstra 1959 in f64. A search may read each half-edge once.
 
 use std::cell::Cell;
 use std::cmp::Reverse;
@@ -27,7 +27,7 @@ use planner_core::search::{
 use crate::hostile::{Bytes, Entropy};
 use crate::meeting::dice::Dice;
 
-/// Most nodes of a file: 300, and some room.
+/// Most nodes of a file: 300, with some room.
 const NODES: usize = 512;
 const HEADER: RoadmapHeader = RoadmapHeader {
     origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
@@ -44,24 +44,24 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     cruise_mps: 2.0,
     vertical_mps: 1.0,
 };
-/// Clearance of vehicles that some edges are too narrow for, metres.
+/// Required clearance of a wide vehicle, for which some edges are too narrow, metres.
 const WIDE_M: f32 = 1.5;
-/// Bytes of a word, of a node, of a node's ways to the landmarks.
+/// Bytes of a word, of a node, and of a node's distances to the landmarks.
 const WORD: usize = 4;
 const NODE: usize = 12;
 const WAYS: usize = WORD * LANDMARKS;
 
-/// Forges files, one after the other.
+/// Forges files from one random roadmap, one after the other.
 pub struct Forger {
     original: Vec<u8>,
     search: Box<SearchWorkspace<NODES>>,
     sipp: Box<SippWorkspace<NODES, 8>>,
 }
 
-/// Forges one file as a fuzzer's bytes say.
+/// Forges one file as a fuzzer's bytes choose.
 ///
 /// # Panics
-/// It is accepted and a search is wrong.
+/// The file is accepted, and a search on it is wrong.
 pub fn attack(data: &[u8]) {
     let mut bytes = Bytes(data);
     let seed = bytes.bits() % 256;
@@ -69,10 +69,10 @@ pub fn attack(data: &[u8]) {
 }
 
 impl Forger {
-    /// One that forges a random roadmap.
+    /// A forger of a random roadmap.
     ///
     /// # Panics
-    /// A search on the roadmap itself is wrong.
+    /// A search on the unchanged roadmap is wrong.
     pub fn new(dice: &mut Dice) -> Self {
         let mut search = Box::new(SearchWorkspace::new());
         let original = random_roadmap(dice, &mut search);
@@ -81,14 +81,14 @@ impl Forger {
         forger
     }
 
-    /// Changes some of the roadmap's file, makes its CRC right again, and searches what is
-    /// accepted.
+    /// Changes some words of the roadmap's file, corrects its CRC, and runs every search on it if
+    /// it is accepted.
     ///
     /// # Errors
-    /// Reason why the file is refused.
+    /// Why the file is refused.
     ///
     /// # Panics
-    /// It is accepted and a search is wrong.
+    /// The file is accepted, and a search on it is wrong.
     pub fn forge(&mut self, entropy: &mut impl Entropy) -> Result<(), RoadmapError> {
         let mut bytes = self.original.clone();
         if entropy.bits().is_multiple_of(8) {
@@ -120,7 +120,7 @@ impl Forger {
         Ok(())
     }
 
-    /// Alone in the air, the way past others is the shortest there is.
+    /// Without other flights, the route that safe-interval search finds must be the shortest path.
     fn routes_are_right(&mut self, view: &RoadmapView<'_>) {
         let (starts, goals) = (view.header().starts, view.header().goals);
         if starts == 0 || goals == 0 {
@@ -158,13 +158,13 @@ impl Forger {
     }
 }
 
-/// A length, and what it should be, metres.
+/// Asserts that a length is what it should be but for rounding, metres.
 #[track_caller]
 fn near(found: f64, way: f64) {
     assert!(found == way || (found - way).abs() <= 1e-5 * (1.0 + way), "{found} in place of {way}");
 }
 
-/// Nodes anywhere, joined where they are near: some of them may be apart from the rest.
+/// A file of random nodes, of which near ones are joined at random: some may be unreachable.
 fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<NODES>) -> Vec<u8> {
     let count = 20 + dice.below(281);
     let side_m = 4.0 * (count as f32).cbrt() * dice.real(0.5, 1.5);
@@ -177,7 +177,7 @@ fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<NODES>) -> Vec<u
             edges.push(Edge { a: a as u16, b: b as u16, clearance_m: dice.real(0.25, 3.25) });
         }
     }
-    // Half of the files are of version 1, without heights.
+    // Half of the files are of version 1 of the format, without heights.
     let heights_m: Vec<f32> =
         if dice.chance(0.5) { nodes.iter().map(|node| node.z).collect() } else { Vec::new() };
     let columns = LANDMARKS + usize::from(!heights_m.is_empty());
@@ -191,25 +191,26 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + WORD].try_into().expect("four bytes"))
 }
 
-/// Bytes of header, nodes, offsets, half-edges, ways to the landmarks and heights, as the header
-/// says.
+/// Bytes of header, nodes, offsets, half-edges, distances to the landmarks and heights, as the
+/// file's header states them.
 fn sizes(bytes: &[u8]) -> [usize; 6] {
     let (nodes, half_edges) = (word(bytes, 60) as usize, word(bytes, 64) as usize);
     let heights = if bytes[8] == 2 { nodes * WORD } else { 0 };
     [HEADER_LEN, nodes * NODE, (nodes + 1) * WORD, half_edges * WORD, nodes * WAYS, heights]
 }
 
-/// Changes one or a few words of a file: of the header, a node, an offset, a half-edge, a way to a
-/// landmark; or the ways to a landmark by a constant, which differences between neighbours do not
-/// show.
+/// Changes one to three words of a file: of the header, a node, an offset, a half-edge, a distance
+/// to a landmark; or all distances to a landmark by a constant, which the differences between
+/// neighbours do not show.
 fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
     let sizes = sizes(bytes);
     for _ in 0..1 + entropy.bits() % 3 {
         let (choice, value) = (entropy.bits(), entropy.bits());
-        // Half of the changes go to the landmarks, which nothing else in the file explains.
+        // Half of the changes go to the distances to the landmarks, which no other part of the file
+        // implies.
         let part = [0, 1, 2, 3, 4, 4, 4, 4, 5][(choice % 9) as usize];
         let begin: usize = sizes[..part].iter().sum();
-        // Where there are no heights, that is the CRC, which is made right again.
+        // Without heights this word is the CRC, which is corrected afterwards.
         let at = begin + (choice >> 32) as usize % (sizes[part] / WORD).max(1) * WORD;
         let (old, share) = (word(bytes, at), (value >> 40) as f32 / (1 << 24) as f32);
         let new = match (choice >> 8) % 8 {
@@ -238,8 +239,8 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
     }
 }
 
-/// Puts the lengths along ways of fewest edges in place of the shortest: each is a sum of edges,
-/// and many are right.
+/// Replaces the shortest distances to the landmarks by lengths along paths of fewest edges: each is
+/// a sum of edges, and many are right.
 fn lengthen_ways(bytes: &mut [u8]) {
     let view = RoadmapView::parse(bytes).expect("nothing is changed yet");
     let mut ways = vec![[0.0_f32; LANDMARKS]; view.node_count()];
@@ -270,7 +271,7 @@ fn lengthen_ways(bytes: &mut [u8]) {
     }
 }
 
-/// Whatever was accepted can be read everywhere.
+/// Asserts that every node and half-edge of an accepted file can be read and is sound.
 fn read_all(view: &RoadmapView<'_>) {
     for node in 0..view.node_count() as u16 {
         let at = view.node(node);
@@ -288,11 +289,11 @@ fn read_all(view: &RoadmapView<'_>) {
     }
 }
 
-/// Lengths of the shortest ways from a node over edges that are wide enough, in f64 (Dijkstra 1959).
+/// Lengths of the shortest paths from a node over edges with a clearance, in f64 (Dijkstra 1959).
 fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> {
     let mut ways = vec![f64::INFINITY; view.node_count()];
     ways[usize::from(from)] = 0.0;
-    // The bits of positive floats are in their order.
+    // `f64` is not `Ord`; non-negative floats order like their bits.
     let mut open = BinaryHeap::from([(Reverse(0_u64), from)]);
     while let Some((Reverse(bits), node)) = open.pop() {
         let here = f64::from_bits(bits);
@@ -310,8 +311,8 @@ fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> 
     ways
 }
 
-/// The ways to the landmarks, node 0 and the node farthest from it, are as long as the file says; 0
-/// where there is none.
+/// Asserts that the distances to the landmarks (node 0, and the node farthest from it) are as
+/// stored in the file; 0 for unreachable nodes.
 fn landmarks_are_right(view: &RoadmapView<'_>, bytes: &[u8]) {
     let begin: usize = sizes(bytes)[..4].iter().sum();
     let stored = |node: usize, landmark: usize| {
@@ -326,8 +327,8 @@ fn landmarks_are_right(view: &RoadmapView<'_>, bytes: &[u8]) {
     }
 }
 
-/// Every kind of search between four nodes finds what there is, and asks about each half-edge once
-/// at most.
+/// Asserts that every kind of search between four nodes finds the shortest paths, and reads each
+/// half-edge at most once.
 fn searches_are_right(
     view: &RoadmapView<'_>,
     from: [u16; 2],

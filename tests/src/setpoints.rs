@@ -1,71 +1,71 @@
-//! The one checker of a stream of setpoints: what it asks of the vehicle, and whether it is fit to
-//! be flown.
+//! Checks a stream of setpoints: records the motion that it demands, and whether it is fit to be
+//! flown.
 //!
 //! Speed, acceleration and jerk are divided differences of the positions that were sent, in the
-//! autopilot's frame, so they hold whatever feed-forward goes along, and however the steps lie in
+//! autopilot's frame. So they hold whatever feed-forward is sent too, and however the steps lie in
 //! time: a curve whose third derivative is bounded has third divided differences within that bound.
 //! A gap longer than `GAP_S` begins another stream, and so does a setpoint that an autopilot in
 //! another mode did not follow: it has to be finite and inside the fence all the same. A setpoint
-//! that moves without a velocity of its own follows a vehicle that another flies, or is believed
-//! to: it moves no faster than `FOLLOWS_MPS`.
+//! that moves without a velocity of its own follows a vehicle that is flown by its pilot, or is
+//! believed to be: it moves no faster than `FOLLOWS_MPS`.
 
 use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
 use nalgebra::Vector3;
 
-/// After a longer pause the next setpoint is the first of another stream, seconds.
+/// Gap between two setpoints after which the next one begins another stream, seconds.
 const GAP_S: f32 = 0.3;
-/// A setpoint without velocity that moves further than this follows the vehicle, metres.
+/// Movement above which a setpoint without velocity counts as following the vehicle, metres.
 const STILL_M: f32 = 1e-4;
-/// How fast it does so at most, and some room for rounding, m/s.
+/// Greatest speed of setpoints that follow the vehicle, with room for rounding, m/s.
 const FOLLOWS_MPS: f32 = 15.2;
-/// Greatest jerk, m/s³, and that of a stop by the safety filter.
+/// Greatest jerk, m/s³: in general, then in a stop by the safety filter.
 const JERK_MPS3: f32 = 4.0;
 const URGENT_JERK_MPS3: f32 = 8.0;
-/// Half a unit in the last place of an f32 of three axes, for each metre.
+/// Rounding error of a position of three f32 coordinates, metres for each metre.
 const ROUNDING: f32 = 1.04e-7;
-/// Of the mask: the position is ignored.
+/// Bits of `type_mask` by which the position is ignored.
 const NO_POSITION: u16 = 0b111;
 
-/// The greatest of everything that was asked for.
+/// Greatest values that a stream of setpoints demanded, and counts of its faults.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SetpointStats {
-    /// Setpoints with a position.
+    /// Number of setpoints with a position.
     pub count: u64,
-    /// Distance from one to the next, metres.
+    /// Greatest distance from one setpoint to the next, metres.
     pub step_m: f32,
-    /// Speed between two, m/s.
+    /// Greatest speed between two setpoints, m/s.
     pub speed_mps: f32,
-    /// Change of that speed, m/s².
+    /// Greatest acceleration, from three setpoints, m/s².
     pub accel_mps2: f32,
-    /// Change of that acceleration, m/s³, but for what rounding may make of it.
+    /// Greatest jerk, from four setpoints, m/s³, less the part that rounding may cause.
     pub jerk_mps3: f32,
-    /// The same in stops by the safety filter.
+    /// As `jerk_mps3`, in stops by the safety filter.
     pub urgent_jerk_mps3: f32,
-    /// Setpoints sent in such stops.
+    /// Number of setpoints sent in stops by the safety filter.
     pub urgent: u64,
-    /// Difference between the velocity sent and the one the positions move at, m/s.
+    /// Greatest difference between the velocity sent and that of the positions sent, m/s.
     pub mismatch_mps: f32,
-    /// Setpoints with a number that is not finite.
+    /// Number of setpoints with a number that is not finite.
     pub not_finite: u64,
-    /// Setpoints outside the fence.
+    /// Number of setpoints outside the fence.
     pub outside: u64,
-    /// Setpoints with more jerk than allowed.
+    /// Number of setpoints with more jerk than allowed.
     pub jerky: u64,
-    /// Setpoints further from the last one than [`Limits::speed_mps`] leads.
+    /// Number of setpoints further from the one before than [`Limits::speed_mps`] leads.
     pub jumps: u64,
 }
 
-/// What a stream is held to.
+/// Limits that a stream of setpoints must keep.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Greatest speed, m/s.
     pub speed_mps: f32,
-    /// Corners of the fence in the autopilot's frame, metres.
+    /// Lowest and highest corner of the fence in the autopilot's frame, metres; `None`: no fence.
     pub fence: Option<(Vector3<f32>, Vector3<f32>)>,
 }
 
 impl SetpointStats {
-    /// Takes those of another stream in.
+    /// Adds the statistics of another stream.
     pub fn merge(&mut self, other: &Self) {
         self.count += other.count;
         self.step_m = self.step_m.max(other.step_m);
@@ -104,41 +104,41 @@ impl std::fmt::Display for SetpointStats {
     }
 }
 
-/// What was sent last, as far as it goes back without a gap.
+/// The last setpoint, and what it and those before it without a gap demanded.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     at_s: f64,
-    /// Time since the setpoint before, and since the one before that, seconds.
+    /// Time from the setpoint before to this one, and from the one before that, seconds.
     dt_s: [f32; 2],
     position: Vector3<f32>,
     velocity: Option<Vector3<f32>>,
     accel: Option<Vector3<f32>>,
     jerk_mps3: f32,
-    /// Setpoints since the last one in a stop by the safety filter.
+    /// Number of setpoints since the last one in a stop by the safety filter; 0 in the stop.
     calm: u8,
     rounded_m: f32,
 }
 
-/// Watches one stream.
+/// Checks one stream of setpoints.
 #[derive(Clone, Debug)]
 pub struct SetpointCheck {
     limits: Limits,
     last: Option<Last>,
-    /// Whether the safety filter stops the vehicle now.
+    /// Whether the safety filter stops the vehicle now; the caller sets it.
     pub urgent: bool,
-    /// Whether the vehicle is believed to be flown by another: setpoints go with it.
+    /// Whether setpoints follow a vehicle that its pilot flies; the caller sets it.
     pub follows: bool,
-    /// What a place was rounded by on its way to the checker, metres, beside what its own numbers
-    /// show.
+    /// Rounding of positions on their way to the checker, metres, in addition to that of their own
+    /// f32; the caller sets it.
     pub rounded_m: f32,
-    /// What was seen.
+    /// Statistics of all setpoints so far.
     pub stats: SetpointStats,
-    /// The first few things that were not fit: seconds and what.
+    /// The first eight faults: time in seconds and text.
     pub faults: Vec<(f64, String)>,
 }
 
 impl SetpointCheck {
-    /// Nothing seen yet.
+    /// A checker that has seen no setpoint.
     pub fn new(limits: Limits) -> Self {
         Self {
             limits,
@@ -162,12 +162,12 @@ impl SetpointCheck {
         }
     }
 
-    /// The next setpoint is the first of another stream: the last was not followed.
+    /// Begins another stream with the next setpoint: the last one was not followed.
     pub fn restart(&mut self) {
         self.last = None;
     }
 
-    /// Takes a setpoint in.
+    /// Checks one setpoint sent at `at_s`.
     pub fn take(&mut self, at_s: f64, data: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
         let fields = [
             data.x, data.y, data.z, data.vx, data.vy, data.vz, data.afx, data.afy, data.afz,
@@ -197,7 +197,7 @@ impl SetpointCheck {
             before.map_or(u8::MAX, |last| last.calm.saturating_add(1))
         };
         self.stats.urgent += u64::from(self.urgent);
-        // The sums of the smoother are rounded like what is sent.
+        // The smoother sums in f32 too, so its rounding counts as much again.
         let rounded_m = self.rounded_m + 2.0 * rounding_m(data);
         let mut next = Last {
             at_s,
@@ -236,7 +236,7 @@ impl SetpointCheck {
         self.last = Some(next);
     }
 
-    /// Acceleration and jerk, from this setpoint and those before it.
+    /// Checks acceleration and jerk, from this setpoint and up to three before it.
     fn take_change(&mut self, before: &Last, next: &mut Last, jumps: bool) {
         let (dt_s, stats) = (next.dt_s[0], &mut self.stats);
         let (Some(velocity), Some(velocity_before)) = (next.velocity, before.velocity) else {
@@ -251,14 +251,15 @@ impl SetpointCheck {
             let rounding = 8.0 * next.rounded_m.max(before.rounded_m) / shortest_s.powi(3);
             let jerk_mps3 = (((accel - accel_before) / over_s).norm() - rounding).max(0.0);
             next.jerk_mps3 = jerk_mps3;
-            // The difference reaches three setpoints back.
+            // The third difference reaches three setpoints back, so those after a stop count as in
+            // it.
             let (worst, most_mps3) = if next.calm <= 3 {
                 (&mut stats.urgent_jerk_mps3, URGENT_JERK_MPS3)
             } else {
                 (&mut stats.jerk_mps3, JERK_MPS3)
             };
             *worst = worst.max(jerk_mps3);
-            // A thousandth for the sums.
+            // A thousandth more for the rounding of the sums.
             if jerk_mps3 > most_mps3 * 1.001 {
                 stats.jerky += 1;
                 if !jumps {
@@ -269,7 +270,7 @@ impl SetpointCheck {
     }
 }
 
-/// What its f32 round a place by, metres.
+/// Rounding error of the setpoint's position from its f32 coordinates, metres.
 pub fn rounding_m(data: &SET_POSITION_TARGET_LOCAL_NED_DATA) -> f32 {
     ROUNDING * data.x.abs().max(data.y.abs()).max(data.z.abs())
 }

@@ -1,4 +1,4 @@
-//! Random swarms, each with a roadmap of its own, for tests of schedules.
+//! Random swarms, each with a random roadmap, for tests of schedules.
 
 use host_sim::capacity::on_heap;
 use planner_core::Point;
@@ -12,52 +12,52 @@ use planner_core::schedule::{ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// A board's capacities.
+/// Capacities of a board: nodes and vehicles here, gates and timed segments below.
 const NODES: usize = 4096;
 const VEHICLES: usize = 32;
-/// Waypoints of a path.
+/// Most waypoints of a path.
 pub const WAYPOINTS: usize = 64;
 const GATES: usize = 128;
 const PIECES: usize = 2048;
-/// The schedule keeps this much more between centres than the safety distance, metres.
+/// Distance that the schedule keeps between centres beyond the safety distance, metres.
 const STRAY_M: f32 = 0.5;
 
-/// The plan of a swarm with a board's capacities.
+/// The plan of a whole swarm, with a board's capacities.
 pub type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
-/// A vehicle's part of it.
+/// One vehicle's part of the plan, with its gates.
 pub type Own = VehiclePlan<WAYPOINTS, GATES>;
 
-/// Seeded random numbers.
+/// A seeded generator of random numbers.
 #[derive(Debug)]
 pub struct Random(Pcg32);
 
 impl Random {
-    /// From a seed.
+    /// A generator that starts from a seed.
     pub fn new(seed: u64) -> Self {
         Self(Pcg32::seed_from_u64(seed))
     }
 
-    /// A number between two.
+    /// A uniformly distributed random number from `low` to `high`.
     pub fn uniform(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * (self.0.next_u32() as f32 / u32::MAX as f32)
     }
 
-    /// A number below a bound.
+    /// A random whole number from 0 to below a bound.
     pub fn below(&mut self, bound: usize) -> usize {
         (self.0.next_u32() as usize) % bound
     }
 
-    /// True once in so many times.
+    /// Whether a random event of probability 1 / `count` occurs.
     pub fn one_in(&mut self, count: usize) -> bool {
         self.below(count) == 0
     }
 }
 
-/// Boxes of free space that overlap.
+/// Free space as the union of overlapping boxes.
 #[derive(Debug)]
 struct Space {
     boxes: Vec<(Point, Point)>,
-    /// Longest edge of its roadmap, metres.
+    /// Longest edge of a roadmap in this space, metres.
     edge_max_m: f32,
 }
 
@@ -65,13 +65,13 @@ impl Space {
     fn random(rng: &mut Random) -> Self {
         let height = rng.uniform(1.0, 3.0);
         let boxes = match rng.below(13) {
-            // A room, every other one high.
+            // A room; every other one is high.
             0..4 => {
                 let height = if rng.one_in(2) { rng.uniform(3.0, 32.0) } else { height };
                 let size = Point::new(rng.uniform(8.0, 35.0), rng.uniform(8.0, 35.0), height);
                 vec![(Point::zeros(), size)]
             }
-            // A corridor, with side rooms or without.
+            // A corridor, with up to two side rooms.
             4..8 => {
                 let (length, width) = (rng.uniform(15.0, 45.0), rng.uniform(0.5, 3.5));
                 let mut boxes = vec![(Point::zeros(), Point::new(length, width, height))];
@@ -95,7 +95,7 @@ impl Space {
                 let lift = Point::new(0.0, 0.0, size.z - 2.0);
                 vec![(Point::zeros(), size), (low, high), (low + lift, high + lift)]
             }
-            // So long that timed segments are longer.
+            // A hall so long that timed segments have to be longer than usual.
             _ => {
                 let size =
                     Point::new(rng.uniform(200.0, 1500.0), rng.uniform(2.0, 60.0), 3.0 * height);
@@ -139,33 +139,33 @@ impl Space {
     }
 }
 
-/// A swarm and the roadmap it is planned on.
+/// A swarm, and the roadmap that it is planned on.
 #[derive(Debug)]
 pub struct Swarm {
     roadmap: Vec<u8>,
-    /// Its vehicles.
+    /// Tasks of its vehicles.
     pub tasks: Vec<VehicleTask>,
     descents_m: Vec<f32>,
     mode: Mode,
-    /// Separation and speeds.
+    /// Separation and speeds of the schedule.
     pub schedule: ScheduleConfig,
-    /// What is kept between centres, metres.
+    /// Safety distance between centres, metres.
     pub safety_m: f32,
 }
 
-/// What a swarm is drawn from.
+/// Parameters of a random swarm.
 struct Draw {
     space: Space,
     vehicles: usize,
     goals: usize,
-    /// The highest climb and descent, metres.
+    /// Greatest height of a climb or descent, metres.
     highest_m: f32,
     safety_m: f32,
 }
 
 impl Swarm {
-    /// Any: rooms, corridors with side rooms, shafts, far ways; now and then more vehicles than
-    /// goals or fewer.
+    /// Any swarm: in rooms, corridors with side rooms, shafts or long halls; now and then with more
+    /// vehicles than goals, or fewer.
     pub fn random(rng: &mut Random) -> Self {
         let space = Space::random(rng);
         let vehicles = if rng.one_in(20) { 9 + rng.below(24) } else { 2 + rng.below(7) };
@@ -176,7 +176,7 @@ impl Swarm {
         Self::drawn(&Draw { space, vehicles, goals, highest_m, safety_m }, rng)
     }
 
-    /// A small one where vehicles often meet.
+    /// A small swarm in a small space, where vehicles often meet.
     pub fn small(count: usize, rng: &mut Random) -> Self {
         let space = Space::small(rng);
         let highest_m = [1.5, 3.0][rng.below(2)];
@@ -186,7 +186,7 @@ impl Swarm {
     fn drawn(draw: &Draw, rng: &mut Random) -> Self {
         let safety_m = draw.safety_m;
         let parked_separation_m = safety_m + [0.25, 0.25, 0.4, 0.8][rng.below(4)];
-        // Between centres that stand: mostly such that a plan can be expected.
+        // Distance between vehicles that stand: mostly so large that a plan can be expected.
         let apart_m = safety_m + [-0.6, 0.3, 0.55, 0.85, 1.1, 1.5][rng.below(6)];
         let one_floor = rng.one_in(2);
         let mut places = |wanted: usize| {
@@ -241,7 +241,7 @@ impl Swarm {
         let labelled = rng.one_in(2);
         let last_id = 1 + rng.below(200) as u8;
         let task = |(i, &climb_m): (usize, &f32)| VehicleTask {
-            // Whether the higher id comes first or last is chance.
+            // Ids rise or fall with the index, by chance.
             id: if last_id.is_multiple_of(2) { last_id + i as u8 } else { last_id + 32 - i as u8 },
             required_clearance_m: if one_size { 0.8 } else { [0.5, 0.8, 1.0][i % 3] },
             climb_m,
@@ -259,10 +259,10 @@ impl Swarm {
         Self { roadmap: bytes, tasks, descents_m, mode, schedule, safety_m }
     }
 
-    /// Its plan.
+    /// Plans the swarm.
     ///
     /// # Errors
-    /// As the planner has them.
+    /// The error of the planner.
     pub fn plan(&self) -> Result<Box<Plan>, PlanError> {
         let view = RoadmapView::parse(&self.roadmap).expect("written here");
         let request = PlanRequest {
@@ -277,10 +277,10 @@ impl Swarm {
         plan::plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
     }
 
-    /// Each vehicle's part of it.
+    /// Each vehicle's part of `plan`, with its gates.
     ///
     /// # Errors
-    /// A part that does not fit.
+    /// A part does not fit into a vehicle's memory.
     pub fn owns(&self, plan: &Plan) -> Result<Vec<Own>, ScheduleError> {
         let mut ws = ScheduleWorkspace::default();
         let own = |index: usize| {
@@ -291,13 +291,13 @@ impl Swarm {
     }
 }
 
-/// Where a vehicle is at an arc length.
+/// Position of a vehicle at an arc length; before 0 and beyond the path's end below its ends.
 pub fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
     let below_m = (-along_m).max(along_m - flight.path.length_m()).max(0.0);
     flight.path.point_at(along_m).unwrap() - Point::new(0.0, 0.0, below_m)
 }
 
-/// Where its flight ends, metres along its path.
+/// Arc length at which a vehicle's flight ends, metres: its landing, or its pad if it stays there.
 pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
     if flight.task.leaves_pad() {
         flight.path.length_m() + flight.descent_m
@@ -306,7 +306,7 @@ pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
     }
 }
 
-/// A number from the environment.
+/// A number from the environment variable `name`, or `default`.
 pub fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }

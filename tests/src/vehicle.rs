@@ -1,5 +1,5 @@
-//! One vehicle: a board in QEMU in lock step with a simulated autopilot, and a ground station on
-//! its radio.
+//! One vehicle for tests: a board in QEMU in lock step with a simulated autopilot, and a ground
+//! station on the board's radio.
 
 use std::path::{self, PathBuf};
 use std::time::Duration;
@@ -24,11 +24,11 @@ use sim_autopilot::{Autopilot, Config};
 use crate::downfall::{self, Downfall};
 
 const STEP: Duration = Duration::from_millis(4);
-/// A megabyte of garbage takes 100 s.
+/// Longest wait for an event, vehicle's time: a megabyte of garbage takes 100 s.
 const PATIENCE: Duration = Duration::from_secs(400);
-/// Between two commands to start.
+/// Time between two commands to start the mission.
 const AGAIN: Duration = Duration::from_secs(1);
-/// States of a mission that was not started, or still waits.
+/// States of a mission that has not left its pad.
 const ON_PAD: [State; 6] = [
     State::WaitAutopilot,
     State::WaitPosition,
@@ -37,62 +37,62 @@ const ON_PAD: [State; 6] = [
     State::Scheduled,
     State::PadReplanning,
 ];
-/// ArduCopter's estimator is ready sooner than the real one's.
+/// Time until the simulated estimator is ready, seconds: sooner than ArduCopter's real one.
 const READY_S: f32 = 2.0;
 
-/// What came from the board.
+/// Messages received from the board.
 #[derive(Debug, Default)]
 pub struct Heard {
-    /// STATUSTEXT, heard on the radio.
+    /// STATUSTEXT messages received by radio.
     pub texts: Vec<String>,
-    /// Setpoints to the autopilot.
+    /// Setpoints that the board sent to the autopilot.
     pub setpoints: Vec<SET_POSITION_TARGET_LOCAL_NED_DATA>,
-    /// When the board sent each, microseconds of its time.
+    /// When the board sent each setpoint, microseconds of the board's time.
     pub setpoints_us: Vec<u64>,
-    /// Commands to the autopilot: number and first parameter.
+    /// Commands that the board sent to the autopilot: number and first parameter.
     pub commands: Vec<(u32, f32)>,
-    /// Its state as last reported.
+    /// State of the companion, as last reported by radio.
     pub state: State,
-    /// Frames missing in the row of each line, by their numbers. A companion that restarts counts
-    /// from zero, which shows too.
+    /// Number of frames missing on each port, by their sequence numbers. A companion that restarts
+    /// counts from zero, which shows here too.
     pub missing: [u32; 2],
     last: [Option<u8>; 2],
 }
 
-/// The vehicle.
+/// A vehicle whose companion runs on an emulated board.
 pub struct Vehicle {
-    /// Its companion.
+    /// The board that runs its companion.
     pub board: EmulatedBoard,
-    /// Its autopilot and the vehicle itself.
+    /// Its simulated autopilot and airframe.
     pub autopilot: Autopilot,
-    /// What was heard from the board since this was last emptied.
+    /// Messages received from the board since the caller last emptied this.
     pub heard: Heard,
-    /// What was heard from the board's radio, as it came, for others to read.
+    /// Bytes received from the board's radio, for others to read.
     pub radio: Vec<u8>,
-    /// Steps so far.
+    /// Simulated time so far.
     pub time: Duration,
     program: PathBuf,
     folder: tempfile::TempDir,
-    /// When the board started.
+    /// Simulated time at which the board last started.
     started: Duration,
     plugged: [bool; 2],
-    /// What it is about to receive.
+    /// Bytes that the board receives with the next step.
     pieces: Vec<PortBytes>,
     framers: [Framer; 2],
     ground_m: f32,
     sequence: u8,
 }
 
-/// A scenario's mission, ready to be flown.
+/// Prepares a scenario's mission for flight.
 ///
 /// # Panics
-/// The scenario is no good.
+/// The scenario is invalid, or the mission cannot be prepared.
 pub fn mission(text: &str) -> Mission {
     let scenario = scenario::parse(text, "vehicle.toml").expect("the scenario is good");
     Mission::prepare(scenario, &Progress::on_terminal()).expect("it can be prepared")
 }
 
-/// The middle of the widest leg in the second half of a path.
+/// The middle of the widest leg among those in the second half of a path.
 ///
 /// # Panics
 /// The path has no legs.
@@ -104,8 +104,8 @@ pub fn ahead<const W: usize>(path: &Path<W>) -> Point {
 }
 
 impl Vehicle {
-    /// The first vehicle of a mission, on its pad, its autopilot and its board just switched on;
-    /// the board's flash holds the files of `known`.
+    /// The first vehicle of a mission on its pad, its autopilot and its board just switched on; the
+    /// board's flash holds the files of the mission `known`.
     ///
     /// # Panics
     /// The board does not start.
@@ -136,23 +136,23 @@ impl Vehicle {
         }
     }
 
-    /// What the board logged, in defmt's encoding.
+    /// File with the board's log, in defmt's encoding.
     pub fn log(&self) -> PathBuf {
         self.folder.path().join("log")
     }
 
-    /// A line's cable is plugged in, or pulled out.
+    /// Plugs in, or pulls out, the cable of a port: without it no byte passes.
     pub fn plug(&mut self, port: Port, plugged: bool) {
         self.plugged[port as usize] = plugged;
         self.framers[port as usize] = Framer::new();
         self.heard.last[port as usize] = None;
     }
 
-    /// Brings the board down, now; it starts again by itself.
+    /// Makes the board fail now; it restarts by itself.
     pub fn bring_down(&mut self, how: Downfall) {
         how.befall(&mut self.board, &self.program);
         self.starts();
-        // Meanwhile nothing is heard from it.
+        // Until the board has restarted, nothing is received from it.
         for _ in 0..how.lasts().as_micros() / STEP.as_micros() {
             self.step_autopilot();
             self.pieces.clear();
@@ -162,17 +162,17 @@ impl Vehicle {
         self.heard = Heard::default();
     }
 
-    /// Has its planner fault whenever it plans, until the next start.
+    /// Makes the board's planner raise a fault whenever it plans, until the next restart.
     pub fn break_planner(&mut self) {
         downfall::break_planner(&mut self.board, &self.program);
     }
 
-    /// Has its planner take so much longer, until the next start.
+    /// Makes the board's planner take `time` longer for each plan, until the next restart.
     pub fn slow_planner(&mut self, time: Duration) {
         downfall::slow_planner(&mut self.board, &self.program, time);
     }
 
-    /// The board's time begins again.
+    /// The board has restarted: its time begins at 0.
     fn starts(&mut self) {
         self.started = self.time;
         self.pieces.clear();
@@ -180,7 +180,7 @@ impl Vehicle {
         self.heard.last = [None; 2];
     }
 
-    /// Sends the companion a command.
+    /// Sends the companion a command by its radio, as a ground station.
     pub fn order(&mut self, command: MavCmd, param1: f32) {
         let data = COMMAND_LONG_DATA {
             command,
@@ -192,7 +192,7 @@ impl Vehicle {
         self.tell(&data);
     }
 
-    /// Sends the companion a message by its radio.
+    /// Sends the companion a message by its radio, as a ground station.
     pub fn tell(&mut self, data: &impl MessageData) {
         let mut out = [0; frame::MAX_FRAME_LEN];
         let header = Header { system: 255, component: 190, sequence: self.sequence };
@@ -201,7 +201,7 @@ impl Vehicle {
         self.send(Port::Swarm, &out[..length]);
     }
 
-    /// Sends the board bytes, if the cable is in: it receives them with the next step.
+    /// Sends bytes to a port of the board with the next step, if its cable is plugged in.
     pub fn send(&mut self, port: Port, bytes: &[u8]) {
         if self.plugged[port as usize] {
             let at_us = (self.time - self.started).as_micros() as u64;
@@ -209,7 +209,7 @@ impl Vehicle {
         }
     }
 
-    /// 4 ms.
+    /// One step of 4 ms of the vehicle: autopilot, then board.
     pub fn step(&mut self) {
         self.step_autopilot();
         self.time += STEP;
@@ -234,15 +234,15 @@ impl Vehicle {
         }
     }
 
-    /// Steps for some time, by the vehicle's.
+    /// Steps until `time` has passed in the simulation.
     pub fn run(&mut self, time: Duration) {
         (0..time.as_micros() / STEP.as_micros()).for_each(|_| self.step());
     }
 
-    /// Steps until something holds.
+    /// Steps until `holds` is true.
     ///
     /// # Panics
-    /// It does not in good time.
+    /// That does not happen within 400 s.
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
         let began = self.time;
         while !holds(self) {
@@ -257,17 +257,17 @@ impl Vehicle {
         }
     }
 
-    /// Steps until the board says something that begins so.
+    /// Steps until the board sends a STATUSTEXT that begins with `text`.
     ///
     /// # Panics
-    /// It does not in good time.
+    /// That does not happen within 400 s.
     pub fn until_said(&mut self, text: &str) {
         self.until(text, |vehicle| vehicle.heard.texts.iter().any(|said| said.starts_with(text)));
     }
 
-    /// Starts the mission whenever it is ready, and steps until it has left the pad's states: a
-    /// state heard is up to a second old, and a board that has just lost its autopilot may still
-    /// seem ready.
+    /// Commands the start whenever the mission is ready, and steps until it has left its states on
+    /// the pad. A reported state is up to a second old, and a board that has just lost its
+    /// autopilot may still seem ready.
     pub fn start(&mut self) {
         let mut last = None;
         self.until("started", |vehicle| {
@@ -280,12 +280,12 @@ impl Vehicle {
         });
     }
 
-    /// Whether the vehicle is off the ground, in truth.
+    /// Whether the vehicle is off the ground, by its true state.
     pub fn flies(&self) -> bool {
         !self.autopilot.true_state().touching
     }
 
-    /// What the board sent arrives, if the cable is in.
+    /// Receives what the board sent through a port, if its cable is plugged in.
     fn hear(&mut self, PortBytes { port, at_us, bytes }: &PortBytes) {
         let line = *port as usize;
         if !self.plugged[line] {
@@ -332,7 +332,7 @@ impl Heard {
     }
 }
 
-/// The autopilot of a mission's first vehicle.
+/// Settings of the simulated autopilot of a mission's first vehicle.
 fn config(mission: &Mission) -> Config {
     let (vehicle, origin) = (&mission.scenario.vehicles[0], mission.scenario.map.origin);
     let pad = mission.pad_position(0);

@@ -1,5 +1,5 @@
-//! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs; Figs. 8 to 10, 12 and 13 in
-//! the report.
+//! Recomputes Tables 2 to 6 and A1 to A12 of CPP (Luna 2022) with our planner, prints them beside
+//! the paper's values, and draws the paper's Figs. 8 to 10, 12 and 13 in the report.
 //!
 //! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in
 //! [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`SMALL`]; V_a 3 m/s, V_d 1
@@ -26,26 +26,27 @@ use crate::scenario::coverage::Method;
 use crate::scenario::{self, Scenario};
 use crate::{output, report};
 
-/// Area of the short track: lanes of up to 150 m.
+/// Polygon of the short track, east and north in metres: lanes of up to 150 m.
 const SHORT_TRACK: &str = "[[0, 0], [150, 0], [150, 180], [0, 180]]";
-/// Area of the long track: lanes of up to 320 m.
+/// Polygon of the long track, east and north in metres: lanes of up to 320 m.
 const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
-/// Area of Table 2: convex, five vertices.
+/// Polygon of Table 2, east and north in metres: convex, five vertices.
 const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
-/// Areas of Fig. 9: two more that are convex.
+/// Polygons of the two further areas of Fig. 9, east and north in metres: both convex.
 const COMPARED_AREAS: [&str; 2] = [
     "[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]",
     "[[0, 0], [200, -15], [260, 120], [90, 200]]",
 ];
-/// Area of Table 4: small, so that the distance to the area counts.
+/// Polygon of Table 4, east and north in metres: so small that the flight to it counts.
 const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
-/// Starts of the UAVs of Table 4: one is far away.
+/// Starts of the three UAVs of Table 4, east and north in metres: the first is far away.
 const STARTS_ONE_FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
 const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
-/// Plans of each kind that are timed.
+/// Number of plans timed for each method and fleet size; Table 3 gets the median time.
 const TIMED_RUNS: usize = 51;
 
-/// A scenario: polygon, vehicles in a row 20 m before its first corner, spacing, height.
+/// A coverage scenario: the area, one vehicle (ids from 1) on each of `places` (east and north in
+/// metres), lanes and waypoints `lane_m` apart, flown at `height_m`.
 fn paper_scenario(
     polygon: &str,
     places: &[[f64; 2]],
@@ -69,16 +70,18 @@ fn in_a_row(count: usize) -> Vec<[f64; 2]> {
     (0..count).map(|i| [5.0 * i as f64, -20.0]).collect()
 }
 
-/// Results of all plans together.
+/// Rows of all tables, and whether every plan so far passed its check.
 struct Tables {
     rows: Vec<Row>,
     complete: bool,
-    /// The largest cost in seconds of the plan whose result is kept.
+    /// Cost in seconds and `result.json` of the plan with the greatest cost so far; a plan with
+    /// findings ranks above all without.
     worst: Option<(f64, serde_json::Value)>,
 }
 
 impl Tables {
-    /// Plans, checks, and gives each vehicle's cost: 0 for one that stays on the ground.
+    /// Plans and checks; returns each vehicle's cost in `unit` (`m`, else seconds): 0 for a vehicle
+    /// that stays on the ground.
     fn plan_costs(
         &mut self,
         scenario: &Scenario,
@@ -151,7 +154,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let plan_s = planning.iter().flatten().sum();
     let timing = Timing { plan_s, wall_s: began.elapsed().as_secs_f64(), ..Timing::default() };
     results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
-    // Fig. 8 d: Table 2's plan by POWELL-BINPAT.
+    // The page's 3D scene shows Fig. 8 d: the plan of Table 2 by POWELL-BINPAT.
     let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)?;
     let findings = check_plan(&planned);
@@ -168,7 +171,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// The paper's drawings of our plans.
+/// The paper's Figs. 8 to 10, 12 and 13, drawn with our plans and costs.
 fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
     let convex = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let compared = [
@@ -190,7 +193,8 @@ fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Our medians, seconds: the whole plan, by method, for 2 to 7 vehicles.
+/// Our part of Table 3: median seconds to compute a whole plan, a row a method, a column for each
+/// of 2 to 7 vehicles.
 fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
     let mut all = [[0.0; 6]; 3];
     for (row, method) in all.iter_mut().zip(METHODS) {
@@ -207,7 +211,8 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
     Ok(all)
 }
 
-/// One vehicle stands so far away that the others are done sooner without it.
+/// Table 4: one vehicle stands so far away that the fleet finishes sooner if it stays on the
+/// ground.
 fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
     for (method, theirs) in METHODS[1..].iter().zip(FEWER_M) {

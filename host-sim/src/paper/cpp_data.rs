@@ -1,15 +1,15 @@
-//! What CPP (Luna 2022) printed: numbers only.
+//! Values that CPP (Luna 2022) printed in its Tables 2 to 6 and A1 to A12.
 
 /// One of Tables A1 to A12: flight times of each vehicle in Gazebo, seconds, for six pairs of lane
 /// spacing and height.
 pub(super) struct Flown {
     /// Number of the table.
     pub(super) name: &'static str,
-    /// Whether lanes are 320 m long, or 150 m.
+    /// Whether the track is the long one, with lanes of 320 m; the short one has lanes of 150 m.
     pub(super) long: bool,
     /// The method.
     pub(super) method: &'static str,
-    /// Times by column and vehicle.
+    /// Flight times, seconds: for each of the table's six columns one value a vehicle.
     pub(super) times_s: [&'static [f64]; 6],
 }
 

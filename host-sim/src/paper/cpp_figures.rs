@@ -1,6 +1,6 @@
-//! CPP's Figs. 8, 9, 10, 12 and 13 with our plans. Theirs are pictures: the figures 12 and 13
-//! beside ours are drawn from the times in their Tables A1 to A12. The areas of Figs. 8 to 10 are
-//! not stated; ours are in `cpp.rs`.
+//! CPP's Figs. 8, 9, 10, 12 and 13, drawn with our plans. The paper prints them as pictures only:
+//! its half of Figs. 12 and 13 is drawn from the times in its Tables A1 to A12. It does not state
+//! the areas of Figs. 8 to 10; ours are in `cpp.rs`.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -12,13 +12,14 @@ use crate::result::rounded;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::Method;
 
-/// Numbers of UAVs, a part of Fig. 12 each.
+/// Numbers of UAVs: Fig. 12 has two panels for each, ours and the paper's.
 const FLEETS: [usize; 2] = [3, 5];
-/// Tracks, a part of Fig. 13 each.
+/// Tracks: Fig. 13 has two panels for each, ours and the paper's.
 const TRACKS: [&str; 2] = ["short", "long"];
 
-/// Fig. 8: an area with its UAVs, and the routes of three methods; Fig. 9 without the works of
-/// others, one area after the other; Fig. 10: fewer UAVs finish sooner.
+/// Fig. 8: an area with its UAVs, and the routes of three methods. Fig. 9: those routes in two
+/// further areas, without the routes of other works. Fig. 10: a fleet that finishes sooner with
+/// fewer UAVs.
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].
@@ -86,7 +87,7 @@ pub(super) fn route_figures(
     ])
 }
 
-/// A plan from above; without its routes, area and UAVs alone.
+/// A map from above of the area and the UAVs; with `shown` also of the routes, and their costs.
 fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
     let corners = planned.wanted.rings_of(RingKind::Outer).flatten();
     let flights = planned.flights();
@@ -118,7 +119,7 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
     })
 }
 
-/// Drawn part of a row.
+/// Whose values a panel shows: ours, or those that the paper printed.
 #[derive(Clone, Copy)]
 enum Figures {
     Ours,
@@ -137,8 +138,8 @@ impl Figures {
     }
 }
 
-/// Fig. 12: average times by case, for three and five UAVs; Fig. 13: CV by case, on the short and
-/// the long track.
+/// Fig. 12: average time of the UAVs by case, for three and five UAVs. Fig. 13: coefficient of
+/// variation (CV) by case, on the short and the long track.
 pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.track.is_some()).collect();
     let (mut times, mut spreads) = (Vec::new(), Vec::new());
@@ -178,8 +179,8 @@ pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     ]
 }
 
-/// Rows as a chart: a series for each method, and number of UAVs where it differs; a case for each
-/// track, spacing and height.
+/// A chart of rows: one series a method (and number of UAVs, if the rows differ in it), one case a
+/// pair of spacing and height (and track, if the rows differ in it).
 fn chart(
     title: String,
     (unit, scale): (&str, &'static str),
@@ -200,7 +201,7 @@ fn chart(
         if !series.iter().any(|own| own.name == name) {
             series.push(Series { name: name.clone(), values: Vec::new() });
         }
-        // Rows of a series come in the order of the cases.
+        // The rows of each series come in the order of the cases, so values can be appended.
         if let (Some(own), Some(value)) =
             (series.iter_mut().find(|own| own.name == name), value(row))
         {

@@ -1,4 +1,4 @@
-//! The lines of CPP's tables: what it printed beside ours.
+//! Rows of CPP's tables: the paper's values, ours, and the statistics of both.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::result::rounded;
 #[derive(Debug, Serialize)]
 pub(super) struct Row {
     pub(super) table: String,
-    /// Which track, of A1 to A12.
+    /// `short` or `long` in a row of Tables A1 to A12, `None` in any other.
     #[serde(skip)]
     pub(super) track: Option<&'static str>,
     pub(super) method: &'static str,
@@ -21,7 +21,7 @@ pub(super) struct Row {
     pub(super) theirs_summary: Option<Summary>,
 }
 
-/// Max, Av, SD and CV.
+/// Largest value, mean (Av), the sample's standard deviation (SD), and CV = 100 · SD / Av.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct Summary {
     pub(super) max: f64,

@@ -1,4 +1,4 @@
-//! What the papers measured, and the same measured here.
+//! Tables and figures of papers, recomputed here beside the paper's own values.
 
 pub mod cpp;
 mod cpp_data;

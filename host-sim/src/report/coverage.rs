@@ -1,5 +1,5 @@
-//! What the page shows of a coverage mission: which vehicle photographs what, from when on, and
-//! what pictures show.
+//! A coverage mission in the report: which vehicle photographs which lanes, from what time on, and
+//! the footprints of the pictures.
 
 use planner_core::Point;
 use serde::Serialize;
@@ -7,52 +7,52 @@ use serde::Serialize;
 use super::pack;
 use super::track::Footprint;
 
-/// A coverage mission.
+/// A coverage mission's part of the report data.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CoverageLayers {
     /// Distance from one lane to the next, metres.
     pub lane_m: f32,
-    /// The plan, and what became of it, by rising time: at least one.
+    /// Divisions by rising time, at least one: the plan, then each division made in flight.
     pub divisions: Vec<Division>,
-    /// Pictures, by rising time.
+    /// Footprints of the pictures, by rising time.
     #[serde(serialize_with = "pack::footprints")]
     pub footprints: Vec<Footprint>,
 }
 
-/// Division of the area among the vehicles from a time on.
+/// How the area is divided among the vehicles from a time on.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Division {
-    /// Seconds.
+    /// Time from which the division holds, seconds.
     pub t_s: f32,
-    /// Vehicles that do not take part any more.
+    /// MAVLink ids of the vehicles lost since the division before.
     pub lost: Vec<u8>,
-    /// Part of each vehicle that flies.
+    /// Waypoints and path of each vehicle that still flies.
     pub parts: Vec<Part>,
-    /// Waypoints that changed hands.
+    /// Waypoints that this division moves from one vehicle to another.
     pub taken: Vec<Taken>,
 }
 
-/// Part of one vehicle.
+/// What one vehicle photographs in a division.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Part {
     /// MAVLink system id.
     pub vehicle: u8,
-    /// Waypoints.
+    /// Number of waypoints.
     pub waypoints: u32,
     /// Path of the vehicle, metres.
     #[serde(serialize_with = "pack::points")]
     pub path: Vec<Point>,
-    /// Both ends of each stretch of a lane that it photographs, metres.
+    /// Both ends of each stretch of a lane that the vehicle photographs, metres.
     #[serde(serialize_with = "pack::points")]
     pub lanes: Vec<Point>,
 }
 
-/// Waypoints that go from one vehicle to another.
+/// Waypoints that a division moves from one vehicle to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Taken {
-    /// Vehicle that had the waypoints before.
+    /// Vehicle that was to photograph the waypoints before.
     pub from: u8,
-    /// Vehicle that has the waypoints now.
+    /// Vehicle that is to photograph the waypoints now.
     pub to: u8,
     /// Number of waypoints.
     pub waypoints: u32,

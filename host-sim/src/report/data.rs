@@ -1,4 +1,4 @@
-//! What one page shows.
+//! The data that one report page shows.
 
 use planner_core::Point;
 use serde::Serialize;
@@ -9,34 +9,34 @@ use super::pack;
 use super::surface::MapSurface;
 use super::track::TrackPoint;
 
-/// All that one page shows.
+/// All data that one report page shows.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ReportData {
     /// Heading of the page, such as the scenario's name.
     pub title: String,
-    /// The command that wrote it: `plan`, `fly`, `demo`.
+    /// The command that made the page: `plan`, `fly`, `demo`.
     pub command: String,
     /// Program and version, such as `host-sim 0.1.0`.
     pub generated_by: String,
-    /// The scenario as it was run, shown as text.
+    /// The scenario's TOML as it was run, shown as text.
     pub scenario_toml: String,
-    /// Surface of the obstacle map, where there is one.
+    /// Surface of the obstacle map; `None` where the mission has no map.
     pub map: Option<MapSurface>,
-    /// Roadmap, where there is one.
+    /// Nodes and edges of the roadmap; `None` where the mission has no roadmap.
     pub roadmap: Option<RoadmapLines>,
-    /// Vehicles in the order of the table.
+    /// Vehicles in the order of the page's table of vehicles.
     pub vehicles: Vec<VehicleTrack>,
-    /// Borders on the ground: the area of a coverage mission.
+    /// Borders on the ground: area, holes and no-fly zones of a coverage mission.
     pub outlines: Vec<Outline>,
-    /// Division of the area, in a coverage mission.
+    /// Divisions of the area and pictures; `None` outside coverage missions.
     pub coverage: Option<CoverageLayers>,
-    /// Obstacles that are not in the map.
+    /// Obstacles that appear in flight and are not in the map.
     pub obstacles: Vec<SphereObstacle>,
     /// Events, in any order.
     pub events: Vec<Event>,
     /// Plots over time, in order.
     pub plots: Vec<Plot>,
-    /// Figures of a paper, below all that.
+    /// Figures that repeat a paper's, at the end of the page.
     pub figures: Vec<Figure>,
     /// Content of `result.json`.
     pub result: serde_json::Value,
@@ -60,7 +60,7 @@ pub struct Outline {
 pub enum OutlineKind {
     /// Area to photograph.
     Area,
-    /// A part of it that is left out.
+    /// A part of the area that is not photographed.
     Hole,
     /// A region that no vehicle enters.
     NoFly,
@@ -77,32 +77,32 @@ pub struct RoadmapLines {
     pub edges: Vec<[u16; 2]>,
 }
 
-/// One vehicle: its task, and its track.
+/// One vehicle: its goal, its planned path and its flown track.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct VehicleTrack {
     /// MAVLink system id.
     pub id: u8,
     /// Radius of the body, metres.
     pub radius_m: f32,
-    /// sRGB; [`vehicle_color`] of its place in the list where absent.
+    /// Colour in the page, sRGB; `None` takes [`vehicle_color`] of the vehicle's index.
     pub color: Option<[u8; 3]>,
-    /// Index of the goal it was given.
+    /// Index of the goal that the vehicle was assigned; `None` if it has none.
     pub goal_index: Option<usize>,
-    /// Start of the vehicle, metres.
+    /// Where the vehicle's path begins, metres.
     #[serde(serialize_with = "pack::point")]
     pub start: Point,
-    /// Place where the vehicle shall land or hold, metres.
+    /// Goal where the vehicle is to land or hold, metres; `None` if it has none.
     #[serde(serialize_with = "pack::maybe_point")]
     pub goal: Option<Point>,
     /// Planned path, metres.
     #[serde(serialize_with = "pack::points")]
     pub planned: Vec<Point>,
-    /// Flown track by rising time, 5–10 Hz; empty where nothing was flown.
+    /// Flown track by rising time, 5–10 points a second; empty if nothing was flown.
     #[serde(serialize_with = "pack::track")]
     pub track: Vec<TrackPoint>,
 }
 
-/// An obstacle that appears during the flight.
+/// A spherical obstacle that appears during the flight.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SphereObstacle {
     /// Centre, metres.
@@ -112,7 +112,7 @@ pub struct SphereObstacle {
     pub radius_m: f32,
     /// When it appears, seconds.
     pub from_s: f32,
-    /// When it goes, seconds; `None` stays.
+    /// When it disappears, seconds; `None` if it stays to the end.
     pub until_s: Option<f32>,
 }
 
@@ -120,7 +120,7 @@ pub struct SphereObstacle {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// Part of a clean mission.
+    /// Part of a mission without faults.
     #[default]
     Info,
     /// A fault or a deviation that was handled.
@@ -134,7 +134,7 @@ pub enum Level {
 pub struct Event {
     /// Time, seconds.
     pub t_s: f32,
-    /// Vehicle of the event; `None` concerns the swarm.
+    /// MAVLink id of the vehicle that the event is about; `None` for the swarm.
     pub vehicle: Option<u8>,
     /// Severity.
     pub level: Level,
@@ -149,7 +149,7 @@ pub struct Plot {
     pub title: String,
     /// Unit of the values, such as `m`.
     pub unit: String,
-    /// A line the values are judged by, such as the safety distance.
+    /// Limit for the values, drawn as a line, such as the safety distance; `None` draws none.
     pub limit: Option<Limit>,
     /// The curves.
     pub curves: Vec<Curve>,
@@ -160,16 +160,16 @@ pub struct Plot {
 pub struct Limit {
     /// Value in the plot's unit.
     pub value: f32,
-    /// Label of the curve, such as `safety distance`.
+    /// Label of the line, such as `safety distance`.
     pub label: String,
 }
 
-/// One curve: `values[i]` at `t_s[i]`. A value that is not finite is a gap.
+/// One curve of a plot: `values[i]` at `t_s[i]`. A value that is not finite is a gap.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curve {
     /// Name in the legend.
     pub name: String,
-    /// The vehicle it belongs to, for its colour.
+    /// Id of the vehicle whose colour the curve has; `None` for one of the whole swarm.
     pub vehicle: Option<u8>,
     /// Rising times, seconds.
     #[serde(serialize_with = "pack::floats")]
@@ -179,8 +179,8 @@ pub struct Curve {
     pub values: Vec<f32>,
 }
 
-/// The colour of the `index`-th vehicle, sRGB: ten that stay apart on a dark ground, then ever
-/// darker rounds of them.
+/// The colour of the `index`-th vehicle, sRGB: ten that differ clearly on a dark ground, then the
+/// same at 78 % and at 60 % of their brightness, then from the first again.
 pub fn vehicle_color(index: usize) -> [u8; 3] {
     const ROUND: [[u8; 3]; 10] = [
         [77, 163, 255],

@@ -1,11 +1,11 @@
-//! Figures below the scene: small maps of routes, bars and lines by case. `figures.js` draws them.
+//! Figures below the 3D scene: route maps, bar charts and line charts. `figures.js` draws them.
 
 use planner_core::Point;
 use serde::Serialize;
 
 use super::pack;
 
-/// A figure: panels side by side.
+/// A figure: its panels side by side, and a caption.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Figure {
     /// Name of the figure, such as `Fig. 8`.
@@ -20,15 +20,15 @@ pub struct Figure {
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum Panel {
-    /// Routes from above.
+    /// Routes from above, over the area's border.
     Map(RouteMap),
-    /// A bar for each case and series.
+    /// A chart with a bar for each case and series.
     Bars(Chart),
-    /// A line over the cases for each series.
+    /// A chart with a line for each series, over the cases.
     Lines(Chart),
 }
 
-/// Routes from above, metres.
+/// A map of routes seen from above, metres.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RouteMap {
     /// Heading of the panel.
@@ -38,11 +38,11 @@ pub struct RouteMap {
     /// Corners of the area.
     #[serde(serialize_with = "pack::points")]
     pub area: Vec<Point>,
-    /// Each vehicle's place, and its way; empty where it has none.
+    /// Start and path of each vehicle; the path is empty where no route is drawn.
     pub routes: Vec<MapRoute>,
 }
 
-/// A vehicle on a map.
+/// A vehicle's start and path on a route map.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MapRoute {
     /// MAVLink system id.
@@ -66,15 +66,15 @@ pub struct Chart {
     pub cases: Vec<String>,
     /// The series.
     pub series: Vec<Series>,
-    /// Charts with the same word here have one scale.
+    /// Charts of the page with the same `scale` are drawn with the same largest value.
     pub scale: &'static str,
 }
 
-/// One series: a value for each case.
+/// One series of a chart: a value for each case.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Series {
     /// Name of the series.
     pub name: String,
-    /// Values, as many as cases.
+    /// Values, one for each case, in the order of the cases.
     pub values: Vec<f64>,
 }

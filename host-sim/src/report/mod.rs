@@ -1,10 +1,10 @@
 //! `report.html`: one self-contained page with the scene in 3D, a time slider, and plots.
 //!
-//! A command fills [`ReportData`] and calls [`write`]. The page needs no network: its libraries are
-//! inlined from `assets/vendor`, its own scripts from `assets/report`, and the data is JSON in a
-//! `<script>` element, in which every long array is base64 of little-endian numbers (see [`pack`]).
-//! Positions are ENU metres of the mission frame, times are seconds since the start of the
-//! simulation.
+//! A command fills [`ReportData`] and calls [`page()`]. The page needs no network: its libraries
+//! are inlined from `assets/vendor`, its own scripts from `assets/report`, and the data is JSON in
+//! a `<script>` element, in which every long array is base64 of little-endian numbers (see
+//! [`pack`]). Positions are ENU metres of the mission frame, times are seconds since the start of
+//! the simulation.
 
 mod coverage;
 mod data;
@@ -25,7 +25,7 @@ pub use figures::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 pub use surface::{FACE_LIMIT, MapSurface};
 pub use track::{Footprint, TrackPoint};
 
-/// The page, in one piece of a few megabytes.
+/// The report page as one self-contained HTML text of a few megabytes.
 ///
 /// # Errors
 /// The data disagrees with itself: an edge without its node, a curve of unequal lengths.

@@ -1,8 +1,8 @@
-//! Long arrays as base64 of little-endian numbers: a third of the size of decimal text, and a typed
-//! array in the page.
+//! Serializes long arrays as base64 of little-endian numbers: a third of the size of decimal text,
+//! and decoded to a typed array in the page.
 //!
 //! Points are `x y z` as f32, track points `t x y z` as f32, footprints `t vehicle` and four `x y`
-//! as f32, edges two u16. The page's `decode` in `data.js` is the other end.
+//! as f32, edges two u16. `decode` in `data.js` reads them.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

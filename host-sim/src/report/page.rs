@@ -1,4 +1,4 @@
-//! Puts the page together: template, styles, libraries, scripts, data.
+//! Assembles the HTML page: template, styles, libraries, scripts, data.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ const LIBRARIES: &str = concat!(
     "\n",
     include_str!("../../assets/vendor/uPlot.iife.min.js")
 );
-/// One function scope, so that nothing of ours is global.
+/// All scripts of ours in one function scope, so that none of their names is global.
 const SCRIPT: &str = concat!(
     "(() => {\n\"use strict\";\n",
     include_str!("../../assets/report/data.js"),
@@ -29,16 +29,16 @@ const SCRIPT: &str = concat!(
     "})();\n"
 );
 
-/// Data that the scripts read.
+/// The data as the scripts read it, as JSON.
 #[derive(Serialize)]
 struct PageData<'a> {
     #[serde(flatten)]
     data: &'a ReportData,
-    /// A colour for each vehicle that has none of its own.
+    /// [`vehicle_color`] of each vehicle, by index; used for one without a `color`.
     palette: Vec<[u8; 3]>,
 }
 
-/// The whole page as text.
+/// The whole page as HTML text.
 pub(super) fn html(data: &ReportData) -> anyhow::Result<String> {
     let palette = (0..data.vehicles.len()).map(vehicle_color).collect();
     let json = script_safe(&serde_json::to_string(&PageData { data, palette })?);
@@ -52,7 +52,7 @@ pub(super) fn html(data: &ReportData) -> anyhow::Result<String> {
     }))
 }
 
-/// Replaces each `{{name}}` once; what is put in is never searched again.
+/// Replaces each `{{name}}` by `part(name)`; the inserted text is not searched for names.
 fn fill_template(template: &str, part: impl Fn(&str) -> String) -> String {
     let mut out = String::new();
     let mut rest = template;
@@ -66,13 +66,13 @@ fn fill_template(template: &str, part: impl Fn(&str) -> String) -> String {
     out
 }
 
-/// Text as HTML text.
+/// Escapes text for HTML content.
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// JSON that no HTML parser can leave: these characters stand only inside its strings, where an
-/// escape means the same.
+/// Escapes `<`, `>` and `&` in JSON, so that no data can end the `<script>` element around it: they
+/// stand only inside JSON strings, where `\\u003c` means the same.
 fn script_safe(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }

@@ -12,39 +12,40 @@ use serde::Serialize;
 
 use super::pack;
 
-/// Most rectangles a page carries: 12 bytes each, so 2.4 MB of base64. A map that has more is drawn
-/// from cells twice as large, again and again, until it fits; the page says so.
+/// Most rectangles, and most crease lines, of a page: 12 bytes a rectangle, so 2.4 MB of base64. A
+/// map with more rectangles is drawn from cells twice as large, again and again, until it fits; the
+/// page says so.
 pub const FACE_LIMIT: usize = 150_000;
-/// Most cells that are compared: time and memory of writing a page stay bounded.
+/// Most drawn cells, which bounds time and memory; a larger map is drawn from larger cells.
 const CELL_LIMIT: usize = 1 << 25;
 
-/// Drawn surface of a map.
+/// Drawn surface of a voxel map.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MapSurface {
     /// Minimum corner, metres.
     #[serde(serialize_with = "pack::point")]
     pub min: Point,
-    /// Maximum corner of the map itself, metres.
+    /// Maximum corner of the map itself, metres; drawn cells may reach beyond it.
     #[serde(serialize_with = "pack::point")]
     pub max: Point,
     /// Edge of a cell of the map, metres.
     pub resolution_m: f32,
     /// Edge of a cell as drawn, metres: the resolution times a power of two.
     pub drawn_m: f32,
-    /// Six numbers a rectangle: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and `v`,
-    /// extent along `u` and `v`; in drawn cells, with `u` and `v` the two axes after `axis` in the
-    /// cycle east, north, up.
+    /// Rectangles, six numbers each: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and
+    /// `v`, extent along `u` and `v`; in drawn cells, with `u` and `v` the two axes after `axis` in
+    /// the cycle east, north, up.
     #[serde(serialize_with = "pack::words")]
     pub faces: Vec<u16>,
-    /// Five numbers a line: axis it runs along, `u`, `v`, start, length. Empty where there are more
-    /// than [`FACE_LIMIT`].
+    /// Crease lines, five numbers each, in drawn cells: axis the line runs along, `u`, `v`, start,
+    /// length. Empty if there are more than [`FACE_LIMIT`].
     #[serde(serialize_with = "pack::words")]
     pub creases: Vec<u16>,
 }
 
 impl MapSurface {
-    /// The surface of what is filled in `grid`. Beyond its faces nothing is drawn, whatever
-    /// [`VoxelGrid::outside`] says, so that an open map stays open to the eye.
+    /// The surface of the occupied cells of `grid`. Nothing is drawn outside the grid, whatever
+    /// [`VoxelGrid::outside`] says, so that an open map looks open.
     pub fn of(grid: &VoxelGrid<'_>) -> Self {
         let shape = grid.shape();
         let mut scale = 1;
@@ -77,8 +78,8 @@ impl MapSurface {
     }
 }
 
-/// Occupancy one byte a cell, with one empty layer around it, so that neighbours need no range
-/// check.
+/// Occupancy of the drawn cells, one byte each, with one empty layer around the map, so that a
+/// cell's neighbours need no range check.
 struct Cells {
     dims: [usize; 3],
     stride: [usize; 3],
@@ -86,7 +87,7 @@ struct Cells {
 }
 
 impl Cells {
-    /// Cells of `scale`³ cells of the grid, filled where any of those is.
+    /// Drawn cells of `scale`³ cells of the grid each, filled if any of these is occupied.
     fn of(grid: &VoxelGrid<'_>, scale: u32) -> Self {
         let dims = grid.shape().dims.map(|d| d.div_ceil(scale) as usize);
         let stride = [1, dims[0] + 2, (dims[0] + 2) * (dims[1] + 2)];
@@ -145,7 +146,8 @@ impl Cells {
                             let (p, q) = (self.filled[at], self.filled[at + self.stride[u]]);
                             let at = at + self.stride[v];
                             let (r, s) = (self.filled[at], self.filled[at + self.stride[u]]);
-                            // flat: all alike, or split along u or along v
+                            // No crease if the four cells are flat: all alike, or split along u or
+                            // along v.
                             !((p == q && r == s) || (p == r && q == s))
                         };
                         match (here, start) {
@@ -164,7 +166,8 @@ impl Cells {
     }
 }
 
-/// Covers the non-zero cells of `mask`, `nu` a row, with rectangles of one kind, and clears them.
+/// Covers the non-zero cells of `mask` (`nu` a row) with rectangles of one value each, calls
+/// `rectangle(value, a, b, width, height)` for each, and sets the cells to 0.
 fn merge(mask: &mut [u8], nu: usize, mut rectangle: impl FnMut(u8, usize, usize, usize, usize)) {
     let nv = mask.len() / nu;
     for b in 0..nv {

@@ -1,8 +1,8 @@
-//! A point of a track, and what a picture taken there shows.
+//! A point of a flown track, and the footprint of a picture on the ground.
 
 use planner_core::Point;
 
-/// Place of a vehicle at one time.
+/// True position of a vehicle at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrackPoint {
     /// Time, seconds.
@@ -11,13 +11,13 @@ pub struct TrackPoint {
     pub position: Point,
 }
 
-/// Footprint of a picture.
+/// Footprint of a picture on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     /// When it was taken, seconds.
     pub t_s: f32,
-    /// Vehicle that took the picture; 0 for a flight before.
+    /// Vehicle that took the picture; 0 for a picture of an earlier flight.
     pub vehicle: u8,
-    /// Corners of the footprint in turn, metres east and north.
+    /// Corners of the footprint in order around it, metres east and north.
     pub corners: [[f32; 2]; 4],
 }

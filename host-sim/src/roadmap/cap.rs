@@ -1,22 +1,22 @@
-//! Fewer edges, so that a roadmap fits a board: every two nodes that were connected stay so, and
-//! paths lengthen little.
+//! Drops edges so that a roadmap fits a board: nodes that were connected stay connected, and
+//! shortest paths become little longer.
 //!
 //! 1. *Connected.* The edges of a spanning forest of greatest clearances are kept (Kruskal 1956):
-//!    between two nodes it has a way whose narrowest edge is as wide as that of the widest way
+//!    between two nodes it has a path whose narrowest edge is as wide as that of the widest path
 //!    there is (Hu 1961). So whatever clearance is required, a node that could reach another one
 //!    before still can.
-//! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the
-//!    room.
-//! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`PATH_SOURCES`]
-//!    nodes lose most by: the number of paths over an edge, times how much longer the way around it
-//!    is over the edges kept so far. Half of them are chosen first, since what is around the others
-//!    is shorter then.
+//! 2. *Near.* Of the other edges, those to each node's nearest neighbours come first, up to
+//!    `NEAREST_EDGE_SHARE` of the room left.
+//! 3. *Far.* The rest of the room goes to the edges whose loss would lengthen the shortest paths
+//!    from [`PATH_SOURCES`] nodes most: the number of paths over an edge, times how much longer the
+//!    detour around it is over the edges kept so far. Half of them are chosen first: these shorten
+//!    the detours around the others.
 //!
 //! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those
 //! of each class of required clearances ([`CLEARANCE_CLASSES_M`]).
 //!
-//! Cost: edges · log edges, a search a source and class, and a short one a node, class and round,
-//! on all cores.
+//! Cost: a sort of the edges, a Dijkstra search for each source and class, and a short one for each
+//! node, class and round, on all cores.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -25,21 +25,22 @@ use planner_core::Point;
 use planner_core::roadmap::Edge;
 use rayon::prelude::*;
 
-/// Required clearances for which paths are kept short, metres.
+/// Required clearances for which shortest paths are kept short, metres.
 pub const CLEARANCE_CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
-/// Share of the edges that goes to nearest neighbours. More keep the longest detours short, fewer
-/// the usual ones; measured on the scanned maps of `tests/tests/boards_hold.rs`.
+/// Share of the edges beyond the forest that goes to nearest neighbours. A larger share shortens
+/// the longest detours, a smaller one the usual ones; measured on the scanned maps of
+/// `tests/tests/boards_hold.rs`.
 const NEAREST_EDGE_SHARE: f32 = 0.65;
-/// Nodes from which shortest paths are counted.
+/// Number of nodes from which shortest paths are counted.
 const PATH_SOURCES: usize = 64;
-/// Rounds in which the far edges are chosen; a third one gains a tenth of what the second does.
+/// Rounds in which the far edges are chosen; a third would gain a tenth of what the second does.
 const FAR_EDGE_ROUNDS: usize = 2;
-/// Greatest length of a detour around an edge, over the edge's length; a longer detour counts as
+/// Longest detour around an edge, as a multiple of the edge's length; a longer detour counts as
 /// this long.
 const MAX_DETOUR_RATIO: f32 = 1.5;
 
-/// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes
-/// connected.
+/// Keeps at most `most` of the edges, in their order; `None` if that many cannot keep connected
+/// what is connected.
 pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
     if edges.len() <= most {
         return Some(edges.to_vec());
@@ -59,24 +60,24 @@ pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<E
     let far = room - near;
     for round in 0..FAR_EDGE_ROUNDS {
         let losses = path_length_losses(&rows, &usages, &kept);
-        // The bits of floats that are not negative are in their order.
+        // `f32` is not `Ord`; non-negative floats order like their bits.
         let most = far * (round + 1) / FAR_EDGE_ROUNDS - far * round / FAR_EDGE_ROUNDS;
         keep_first(&mut kept, most, &lengths, |i| Reverse(losses[i].to_bits()));
     }
     Some(edges.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(edge, _)| *edge).collect())
 }
 
-/// An edge as seen from one of its nodes.
+/// A half-edge: an edge as seen from one of its two nodes.
 #[derive(Clone, Copy)]
 struct OutgoingEdge {
     to: u16,
-    /// Number of [`CLEARANCE_CLASSES_M`] that the edge is wider than.
+    /// How many of [`CLEARANCE_CLASSES_M`] the edge's clearance exceeds.
     class: u8,
     length_m: f32,
     edge: u32,
 }
 
-/// The edges of each node, by length.
+/// The half-edges of each node, shortest first.
 fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<OutgoingEdge>> {
     let mut rows = vec![Vec::new(); nodes];
     for (i, (edge, &length_m)) in edges.iter().zip(lengths).enumerate() {
@@ -93,8 +94,9 @@ fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out
     rows
 }
 
-/// For each edge how many shorter ones its nodes have, wide enough for a vehicle of some class that
-/// it is wide enough for: the fewest of either node and any class.
+/// The rank of each edge: how many shorter edges one of its nodes has that vehicles of some class
+/// can fly, among the classes that can fly the edge itself; the least over both nodes and these
+/// classes.
 fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     let mut ranks = vec![u32::MAX; edges];
     for row in rows {
@@ -110,7 +112,7 @@ fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     ranks
 }
 
-/// Which edges belong to a spanning forest of greatest clearances; of equal ones, the first.
+/// Marks the edges of a spanning forest of greatest clearances; of equal edges the first.
 fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..edges.len()).collect();
     order.sort_by(|&a, &b| edges[b].clearance_m.total_cmp(&edges[a].clearance_m).then(a.cmp(&b)));
@@ -137,7 +139,7 @@ fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     kept
 }
 
-/// Keeps `count` more edges, first by the given order, then the shortest.
+/// Keeps `count` more edges: the first by `order`, then the shortest, then the lowest index.
 fn keep_first<O: Ord>(
     kept: &mut [bool],
     count: usize,
@@ -153,14 +155,14 @@ fn keep_first<O: Ord>(
     }
 }
 
-/// The classes of vehicles, as [`OutgoingEdge::class`] has them.
+/// The classes of required clearances, numbered as in [`OutgoingEdge::class`].
 fn clearance_classes() -> impl Iterator<Item = u8> {
     1..=CLEARANCE_CLASSES_M.len() as u8
 }
 
-/// For each edge that is not kept how much longer the shortest paths over it become, metres, in the
-/// mean over all paths of a class; the sum over the classes. `usages` are the paths over each edge,
-/// of each class.
+/// By how many metres the shortest paths become longer without an edge, for each edge that is not
+/// kept: the mean over all paths of a class, summed over the classes. `usages[class][edge]` is the
+/// number of paths over an edge.
 fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
     let is_kept = |out: &&OutgoingEdge| kept[out.edge as usize];
     let kept_rows: Vec<Vec<OutgoingEdge>> =
@@ -186,7 +188,7 @@ fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[b
                 );
                 let loss = |out: &&OutgoingEdge| {
                     let around_m = ways_m[usize::from(out.to)].min(MAX_DETOUR_RATIO * out.length_m);
-                    // Rounding alone can make it less than nothing.
+                    // By rounding, the detour can come out shorter than the edge.
                     let longer_m = (around_m - out.length_m).max(0.0);
                     (out.edge, usage[out.edge as usize] as f32 / all * longer_m)
                 };
@@ -200,8 +202,8 @@ fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[b
     losses
 }
 
-/// Lengths of the shortest ways from a node over edges of at least a class, as far as they are no
-/// longer than `most_m`.
+/// Lengths of the shortest paths from `source` to all nodes over edges of at least `class`, metres;
+/// infinite where longer than `most_m`.
 fn shortest_distances_within(
     source: usize,
     rows: &[Vec<OutgoingEdge>],
@@ -227,8 +229,8 @@ fn shortest_distances_within(
     way_m
 }
 
-/// For each edge the number of shortest paths that lead over it, of those from [`PATH_SOURCES`]
-/// nodes to all others, of vehicles of a class.
+/// How many shortest paths lead over each edge, of those from [`PATH_SOURCES`] nodes to all others
+/// over edges of at least `class`.
 fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     let sources = PATH_SOURCES.min(rows.len());
     let searches: Vec<Vec<(u32, u32)>> = (0..sources)
@@ -242,13 +244,13 @@ fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     usage
 }
 
-/// The edges of the shortest paths from a node over edges of at least a class, each with how many
-/// of them lead over it (Dijkstra 1959).
+/// The edges of the shortest paths from `source` to all nodes over edges of at least `class`, each
+/// with the number of these paths that lead over it (Dijkstra 1959).
 fn paths_from(source: usize, rows: &[Vec<OutgoingEdge>], class: u8) -> Vec<(u32, u32)> {
     let mut way_m = vec![f32::INFINITY; rows.len()];
     let mut last_edge = vec![None; rows.len()];
     let (mut settled, mut order) = (vec![false; rows.len()], Vec::new());
-    // The bits of positive floats are in their order.
+    // `f32` is not `Ord`; non-negative floats order like their bits.
     let mut waiting = BinaryHeap::from([(Reverse(0_u32), source)]);
     way_m[source] = 0.0;
     while let Some((_, node)) = waiting.pop() {

@@ -1,13 +1,14 @@
-//! Nodes in passages that random nodes miss: where the roadmap does not join a start to a goal and
-//! the map does, the corners of a way over the map's cells become nodes.
+//! Adds nodes in narrow passages that random sampling misses: if the roadmap does not connect a
+//! start to a goal and the map does, the corners of a path over the map's cells become nodes.
 //!
 //! A passage hardly wider than a vehicle and its margin takes up next to nothing of the space that
-//! nodes are drawn from, so no number of random nodes is sure to find it. A cell's centre is what
-//! nodes lie on here, and every step between two of them keeps the clearance, so what is joined is
-//! as clear as any edge.
+//! nodes are drawn from, so no number of random nodes is sure to find it. The nodes added here lie
+//! on the centres of cells, and every step between two of them keeps the required clearance, so the
+//! new edges are as clear as any other.
 //!
-//! Cost: a search over the map's cells (A*) for each pair of parts that are not joined; missions
-//! whose roadmap joins all of their starts and goals pay a tree of boxes and the look.
+//! Cost: an A* search over the map's cells for each pair of components that is to be joined; a
+//! mission whose roadmap connects all its starts and goals pays for the tree of boxes and the test
+//! of that.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -19,25 +20,26 @@ use planner_core::voxel::GridShape;
 
 use crate::map::{BoxTree, VoxelMap};
 
-/// What a way keeps beyond the clearance, metres: more than rounding, and than the millimetre that
-/// the file rounds down to.
+/// Clearance of a passage's path beyond the required one, metres: more than rounding, and than the
+/// millimetre that the file rounds down to.
 const CLEARANCE_SLACK_M: f32 = 1.2e-3;
-/// Most cells of a grid that is searched: the search keeps nine bytes a cell.
+/// Largest map that is searched, cells: the search keeps about nine bytes a cell.
 const MAX_SEARCHED_CELLS: usize = 1 << 25;
 
-/// A start and a goal, by their nodes, and the clearance that the vehicle between them needs,
-/// metres.
+/// A start and a goal, as nodes, that are to be connected, and the clearance that their vehicle
+/// requires, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WantedConnection {
     /// The start's node.
     pub start: usize,
     /// The goal's node.
     pub goal: usize,
-    /// Radius and margin.
+    /// Required clearance, metres: the vehicle's radius and safety margin.
     pub required_m: f32,
 }
 
-/// Nodes that join what is wanted and not joined yet, where the map has a way for it.
+/// Nodes that connect each wanted pair that `edges` do not connect, where the map has a path for
+/// it.
 pub fn missing_passage_nodes(
     map: &VoxelMap,
     tree: &BoxTree,
@@ -47,7 +49,7 @@ pub fn missing_passage_nodes(
     wanted: &[WantedConnection],
 ) -> Vec<Point> {
     let mut wanted = wanted.to_vec();
-    // A passage that is wide enough for a large vehicle is so for a smaller one.
+    // Widest first: a passage found for a large vehicle also serves smaller ones.
     wanted.sort_by(|a, b| b.required_m.total_cmp(&a.required_m));
     let mut found = Vec::new();
     let mut ways: Vec<WantedConnection> = Vec::new();
@@ -77,7 +79,8 @@ pub fn missing_passage_nodes(
     found
 }
 
-/// Which nodes edges of some clearance join: union by the lowest node.
+/// Connected components (union-find) of the edges wider than a clearance; the lowest node is the
+/// root.
 pub(super) struct ConnectedComponents(Vec<usize>);
 
 impl ConnectedComponents {
@@ -103,13 +106,13 @@ impl ConnectedComponents {
     }
 }
 
-/// Whether a straight flight keeps the clearance, by more than rounding.
+/// Whether a straight segment keeps the required clearance and [`CLEARANCE_SLACK_M`] more.
 fn is_clear(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) -> bool {
     let enough_m = required_m + CLEARANCE_SLACK_M;
     tree.clearance_m(a, b, 2.0 * enough_m, enough_m) > enough_m
 }
 
-/// A search over the centres of the map's cells.
+/// An A* search over the centres of the map's cells.
 struct CellSearch<'a> {
     shape: &'a GridShape,
     map: &'a VoxelMap,
@@ -118,7 +121,7 @@ struct CellSearch<'a> {
 }
 
 impl<'a> CellSearch<'a> {
-    /// The search; none where the map is too large.
+    /// The search; `None` if the map has more than [`MAX_SEARCHED_CELLS`] cells.
     fn new(map: &'a VoxelMap, tree: &'a BoxTree, required_m: f32) -> Option<Self> {
         let cells =
             map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
@@ -140,7 +143,7 @@ impl<'a> CellSearch<'a> {
         self.shape.min + Point::new(i, j, k) * self.shape.resolution_m
     }
 
-    /// The cell itself and those that touch it.
+    /// The cell itself and its up to 26 neighbours inside the map.
     fn cell_and_neighbours(&self, cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
         let dims = self.shape.dims;
         (0..27).filter_map(move |n| {
@@ -154,7 +157,8 @@ impl<'a> CellSearch<'a> {
         })
     }
 
-    /// Cells from whose centres a place is seen.
+    /// The cells at and next to `place` that a clear straight segment from it to their centre
+    /// joins.
     fn cells_seen_from(&self, place: &Point) -> Vec<usize> {
         let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
         let sees =
@@ -162,7 +166,8 @@ impl<'a> CellSearch<'a> {
         self.cell_and_neighbours(cell).filter(sees).map(|next| self.index(next)).collect()
     }
 
-    /// The places of a shortest way over cells, both ends among them.
+    /// The points of a shortest path over cell centres, `from` and `to` included; `None` if there
+    /// is none.
     fn shortest_cell_path(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
         let ends: BTreeSet<usize> = self.cells_seen_from(to).into_iter().collect();
         let grid = self.map.grid();
@@ -170,7 +175,7 @@ impl<'a> CellSearch<'a> {
         let cells = self.shape.dims.iter().map(|&d| d as usize).product();
         let (mut cost, mut came) = (vec![f32::INFINITY; cells], vec![u32::MAX; cells]);
         let mut open = BinaryHeap::new();
-        // The bits of floats that are not negative are in their order.
+        // `f32` is not `Ord`; non-negative floats order like their bits.
         let rank = |cost_m: f32, at: &Point| Reverse((cost_m + (to - at).norm()).to_bits());
         for index in self.cells_seen_from(from) {
             let centre = self.centre(self.cell(index));
@@ -209,8 +214,8 @@ impl<'a> CellSearch<'a> {
     }
 }
 
-/// The places between the ends of a way that the fewest edges join: each is clear and as long as
-/// edges may be.
+/// The inner corners of the path with the fewest edges along `way`, at least one: each edge is
+/// clear and between the edge lengths of `config`. `None` if no such path exists.
 fn fewest_corners(
     tree: &BoxTree,
     way: &[Point],

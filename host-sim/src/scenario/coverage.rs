@@ -1,4 +1,4 @@
-//! What `[area]` says: the scenario of a coverage mission.
+//! The `[area]` table of a scenario, as read: what a coverage mission photographs, and how.
 
 use std::sync::Arc;
 
@@ -14,65 +14,66 @@ use planner_core::frames::Geodetic;
 
 use crate::terrain::HeightGrid;
 
-/// Hint of an error about a vehicle that does not stand on the ground.
+/// Hint of an error about a vehicle whose start is not on the ground.
 pub const ORIGIN_HINT: &str =
     "area.origin = { lat_deg = …, lon_deg = …, alt_m = … } says how high the ground is";
 
-/// `[area]`
+/// `[area]`: the area of a coverage mission, and how it is photographed.
 #[derive(Clone, Debug)]
 pub struct Area {
-    /// Source of the area for error messages, as `FILE:LINE`.
+    /// Where the area stands in the scenario, for error messages, as `FILE:LINE`.
     pub place: String,
-    /// Vertices of all rings, metres east and north of the origin.
+    /// Vertices of all rings, one ring after the other, metres east and north of the origin.
     pub vertices: Vec<Flat>,
-    /// The rings.
+    /// Kind of each ring, and where its vertices end.
     pub rings: Vec<Ring>,
-    /// The mission's origin.
+    /// Origin of the mission frame.
     pub origin: Geodetic,
-    /// The camera, where one is given.
+    /// The camera; `None` if `lane_m` and `waypoint_m` are given instead.
     pub camera: Option<Camera>,
-    /// Footprint and spacings.
+    /// Footprint of a picture, and distances of lanes and waypoints, metres.
     pub spacing: Spacing,
-    /// Spacing with the part of a picture that the plan counts on.
+    /// `spacing` with the part of the footprint that the plan counts on despite errors in flight.
     pub usable: Spacing,
-    /// Height of the pictures above the origin, or above the ground.
+    /// Height of the pictures, metres: above the ground with terrain, else above the origin.
     pub height_m: f32,
-    /// The greatest height of the pictures, and of the layers over that.
+    /// Greatest height of the pictures above the origin, and distance between transit layers,
+    /// metres.
     pub heights: Heights,
-    /// The ground, where it is not level.
+    /// Heights of the ground; `None` over level ground.
     pub terrain: Option<Terrain>,
-    /// Direction of the lanes, where it is given: degrees from east to the left.
+    /// Direction of the lanes, degrees counter-clockwise from east; `None`: the plan chooses it.
     pub angle_deg: Option<f32>,
-    /// Lanes begin and end so far beyond the edge.
+    /// How far beyond the area's edge lanes begin and end, metres.
     pub margin_m: f32,
     /// Whether a route may take more than one battery.
     pub batteries: bool,
-    /// How work is divided.
+    /// How the work is divided among the vehicles.
     pub method: Method,
-    /// Heading of the vehicles.
+    /// Heading of the vehicles on the lanes.
     pub heading: HeadingRule,
-    /// Trigger of the pictures.
+    /// What triggers the camera.
     pub trigger: Trigger,
 }
 
-/// The ground below an area.
+/// Heights of the ground below an area, and how vehicles follow them.
 #[derive(Clone, Debug)]
 pub struct Terrain {
-    /// Heights of the terrain, metres above the mission's origin.
+    /// Heights of the ground, metres above the mission's origin.
     pub grid: Arc<HeightGrid>,
-    /// Bytes of the field that vehicles follow.
+    /// Bytes of the height field that vehicles follow (`field.bin`).
     pub field: Arc<[u8]>,
-    /// Vehicles fly at most so much higher above the field than [`Area::height_m`], metres.
+    /// How far vehicles may fly higher above the field than [`Area::height_m`], metres.
     pub tolerance_m: f32,
-    /// Metres up or down for each metre over ground, at most.
+    /// Steepest slope that vehicles fly, metres of height a metre over ground.
     pub slope: f32,
 }
 
 impl Terrain {
-    /// Surface that paths follow at this height above the ground.
+    /// The surface that paths follow at this height above the ground, metres.
     ///
     /// # Errors
-    /// The bytes are no field.
+    /// The field's bytes are malformed.
     pub fn following(&self, height_m: f32) -> Result<TerrainFollowing<'_>, FileError> {
         let field = FieldView::parse(&self.field)?;
         Ok(TerrainFollowing { field, height_m, tolerance_m: self.tolerance_m, slope: self.slope })
@@ -80,8 +81,8 @@ impl Terrain {
 }
 
 impl Area {
-    /// The ground at a place, metres above the origin: level ground where there is no terrain, and
-    /// beyond its map.
+    /// Height of the ground at a place, metres above the origin; 0 without terrain and outside its
+    /// map.
     pub fn ground_m(&self, place: &Flat) -> f32 {
         self.terrain.as_ref().and_then(|terrain| terrain.grid.height_at(place)).unwrap_or(0.0)
     }
@@ -94,17 +95,17 @@ impl Area {
     }
 }
 
-/// How work is divided.
+/// How the work is divided among the vehicles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Whole lanes.
+    /// Whole lanes, in shares by the vehicles' weights (SIMPLE-BINPAT).
     SimpleBinpat,
-    /// Waypoints.
+    /// Waypoints, in shares by the vehicles' weights (BINPAT).
     Binpat,
-    /// Waypoints, by the best shares.
+    /// Waypoints, in the shares that Powell's method finds best (POWELL-BINPAT).
     #[default]
     PowellBinpat,
-    /// The best contiguous division there is.
+    /// The division into contiguous parts whose greatest cost is the least possible.
     Exact,
 }
 
@@ -122,7 +123,7 @@ impl Method {
     /// The method of this name.
     ///
     /// # Errors
-    /// There is none; all names.
+    /// No method has this name; the text lists all names.
     pub fn named(name: &str) -> Result<Self, String> {
         let found = Self::NAMES.iter().find(|(known, _)| *known == name);
         found
@@ -130,7 +131,7 @@ impl Method {
             .ok_or_else(|| "must be one of simple-binpat, binpat, powell-binpat, exact".to_owned())
     }
 
-    /// Name of the method in results.
+    /// Name of the method in results, the first of its names.
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|(_, method)| *method == self).map_or("", |(name, _)| name)
     }

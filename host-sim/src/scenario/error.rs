@@ -1,11 +1,11 @@
-//! Errors that point at the line of a scenario.
+//! Errors of a scenario file, which name line and column and show the line.
 
 use std::fmt;
 use std::ops::Range;
 
 use crate::quote::{MAX_QUOTE_CHARS, quoted};
 
-/// Characters of a long line that are shown before the one in error.
+/// Characters of a long line that are shown before the marked ones.
 const CONTEXT_CHARS: usize = 40;
 
 /// Error of a scenario: the fault, its place, and a remedy.
@@ -13,8 +13,8 @@ const CONTEXT_CHARS: usize = 40;
 pub struct ScenarioError {
     /// The scenario's name, usually its path.
     pub file: String,
-    /// Line and column, counted from 1, and the line's text; none where the file itself could not
-    /// be read.
+    /// Line and column of the fault, and the line's text; `None` if the file itself could not be
+    /// read.
     pub place: Option<Place>,
     /// Fault of the scenario.
     pub why: String,
@@ -22,7 +22,7 @@ pub struct ScenarioError {
     pub hint: Option<String>,
 }
 
-/// A place in a scenario.
+/// A place in a scenario's text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Line, from 1.
@@ -31,12 +31,12 @@ pub struct Place {
     pub column: usize,
     /// The whole line.
     pub text: String,
-    /// Characters to mark from the column on, at least 1.
+    /// Number of characters to mark from the column on, at least 1.
     pub marked: usize,
 }
 
 impl Place {
-    /// The place of a span of bytes.
+    /// The place of a range of bytes in the text.
     pub(super) fn of(text: &str, span: &Range<usize>) -> Self {
         let start =
             (0..=span.start.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0);
@@ -74,9 +74,8 @@ impl fmt::Display for ScenarioError {
     }
 }
 
-/// A line as it is shown, of which `marked` characters from `from` on are meant; then how many
-/// characters of it stand before those, and how many of those are shown. Of a long line that is the
-/// part around them.
+/// A line cut for display around the `marked` characters from `from` on: the text, how many of its
+/// characters stand before the marked ones, and how many marked ones it shows.
 fn marked_line(text: &str, from: usize, marked: usize) -> (String, usize, usize) {
     let begin =
         if from + marked > MAX_QUOTE_CHARS { from.saturating_sub(CONTEXT_CHARS) } else { 0 };

@@ -1,8 +1,8 @@
-//! A scenario: everything a run depends on, in one TOML file.
+//! Reads a scenario: everything a run depends on, in one TOML file.
 //!
-//! Every key has a default but the map, the vehicles and the goals. A key that nobody knows, a
-//! value out of range or two values that cannot both hold are errors that name file, line and
-//! column. Lengths are metres in the mission's ENU frame. Keys for what is not built yet are read
+//! Every key has a default except the map, the vehicles and the goals. An unknown key, a value out
+//! of range, and two values that contradict each other are errors that name file, line and column.
+//! Lengths are metres in the mission's ENU frame. Keys of features that are not built yet are read
 //! and then refused by name: see [`Scenario::check_supported`].
 
 pub mod coverage;
@@ -33,7 +33,7 @@ pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
     read(&text, &name, &folder)
 }
 
-/// A scenario file's text, its name in errors, and its folder.
+/// A scenario file's text, its name for errors, and its folder.
 fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
     let name = quoted_path(path);
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
@@ -53,7 +53,8 @@ pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
     read(text, name, Path::new(""))
 }
 
-/// Reads a text, by the kind of mission that it is for.
+/// Reads a scenario's text: a coverage mission if it has `[area]` and no `[map]`, else one with
+/// goals.
 fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
     let text = reader::Text { file, text };
     sections::read_root(text, |root| match (root.get("map"), root.get("area")) {

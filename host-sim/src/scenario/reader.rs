@@ -1,7 +1,7 @@
-//! A cursor over a TOML table that keeps where every value stands and which keys were asked for.
+//! A reader of TOML tables that keeps each value's place and which keys were asked for.
 //!
-//! Derived deserialising loses the place of a value once its range is checked, and cannot name the
-//! nearest key; here both are at hand where the value is read.
+//! Deserialising with serde's derive loses a value's place before its range is checked, and cannot
+//! suggest the nearest key; here both are known where the value is read.
 
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
@@ -13,11 +13,11 @@ use toml::de::{DeString, DeTable, DeValue};
 use super::error::{Place, ScenarioError};
 use crate::quote::quoted;
 
-/// Bytes of the scenario.
+/// Range of bytes in the scenario's text.
 pub(super) type Span = Range<usize>;
 pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
 
-/// The text and its name, for errors.
+/// The scenario's text, and its name for errors.
 #[derive(Clone, Copy)]
 pub(super) struct Text<'a> {
     pub(super) file: &'a str,
@@ -25,7 +25,7 @@ pub(super) struct Text<'a> {
 }
 
 impl Text<'_> {
-    /// Place of the span, as `FILE:LINE`.
+    /// Where the span begins, as `FILE:LINE`.
     pub(super) fn line(&self, span: &Span) -> String {
         format!("{}:{}", self.file, Place::of(self.text, span).line)
     }
@@ -49,7 +49,7 @@ impl Text<'_> {
     }
 }
 
-/// A value with its name in errors.
+/// A TOML value, with its name and place for errors.
 #[derive(Clone)]
 pub(super) struct Value<'a> {
     pub(super) text: Text<'a>,
@@ -71,7 +71,7 @@ impl<'a> Value<'a> {
         self.error(&format!("must be {what}, not a value of type {}", self.value.type_str()))
     }
 
-    /// A finite number inside a range.
+    /// The value as a finite number inside a range.
     pub(super) fn f64(&self, range: &RangeInclusive<f64>) -> Result<f64> {
         let number = match self.value {
             DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
@@ -93,7 +93,7 @@ impl<'a> Value<'a> {
         i64::from_str_radix(integer.as_str(), integer.radix()).ok()
     }
 
-    /// A whole number inside a range.
+    /// The value as a whole number inside a range.
     pub(super) fn integer_in_range(&self, range: RangeInclusive<u64>) -> Result<u64> {
         if !self.value.is_integer() {
             return Err(self.expected_error("a whole number"));
@@ -116,7 +116,7 @@ impl<'a> Value<'a> {
         self.value.as_str().ok_or_else(|| self.expected_error("a string"))
     }
 
-    /// Value of a keyword, from a list of keywords and their values.
+    /// The value's string looked up in `words`: the meaning of that keyword.
     pub(super) fn one_of<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
         let given = self.str()?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == given) {
@@ -142,7 +142,7 @@ impl<'a> Value<'a> {
         Ok(array.iter().enumerate().map(item).collect())
     }
 
-    /// Three finite numbers.
+    /// The value as three numbers, each within ±[`MAX_COORDINATE_M`].
     pub(super) fn triple(&self) -> Result<[f64; 3]> {
         let items = self.items().map_err(|_| self.expected_error("[east, north, up] in metres"))?;
         let [x, y, z] = items.as_slice() else {
@@ -169,7 +169,8 @@ impl<'a> Value<'a> {
     }
 }
 
-/// A table whose keys are asked for one by one; [`Table::finish`] refuses those nobody asked for.
+/// A table whose keys are read one by one; [`Table::finish`] refuses keys that were never asked
+/// for.
 pub(super) struct Table<'a> {
     pub(super) text: Text<'a>,
     pub(super) span: Span,
@@ -192,11 +193,11 @@ impl<'a> Table<'a> {
         self.table.get(key).map(|value| Value::new(self.text, self.path(key), value))
     }
 
-    /// The value, or an error at the table.
+    /// The value of `key`; if the key is missing, an error at the table with `hint`.
     pub(super) fn required(&self, key: &'static str, hint: &str) -> Result<Value<'a>> {
         self.get(key).ok_or_else(|| {
-            // A misspelt key is what the user sees in the file; that it is missing is only what
-            // follows from it.
+            // A misspelt key is what the user sees in the file, so that is reported, not the
+            // missing key.
             let misspelt = |(given, _): &(&Spanned<_>, _)| {
                 strsim::jaro_winkler(AsRef::<str>::as_ref(given.get_ref()), key) > 0.85
             };
@@ -222,7 +223,7 @@ impl<'a> Table<'a> {
         ScenarioError { hint, ..error }
     }
 
-    /// Names keys that will be asked for later.
+    /// Marks keys as known that are read later, or not at all.
     pub(super) fn declare_keys(&self, keys: &[&'static str]) {
         self.known.borrow_mut().extend(keys);
     }
@@ -266,7 +267,7 @@ impl<'a> Table<'a> {
         self.get(key).map_or(Ok(default), |v| v.one_of(words))
     }
 
-    /// Refuses the first key in the file that was never asked for.
+    /// Refuses the first key in the file that was neither read nor declared.
     pub(super) fn finish(&self) -> Result<()> {
         let known = self.known.borrow();
         let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
@@ -275,7 +276,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The nearest word, or all of them where none is near.
+/// A hint with the word nearest to `given`, or with all words if none is near.
 fn nearest_word<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
     let given = given.to_lowercase();
     let score = |word: &&str| strsim::jaro_winkler(&given, word);

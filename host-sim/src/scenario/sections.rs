@@ -1,4 +1,4 @@
-//! The tables of a scenario, one function each.
+//! Reads the tables of a scenario, one function each.
 
 pub(super) mod area;
 mod checks;
@@ -34,14 +34,14 @@ use crate::map::{RESOLUTION_RANGE_M, Source, Unknown};
 use crate::margins;
 use crate::quote::{quoted, quoted_path};
 
-/// Time after which a flight is given up unless the scenario says otherwise, seconds.
+/// Time limit of a simulated flight if the scenario gives none, seconds.
 const DEFAULT_TIME_LIMIT_S: f32 = 600.0;
-/// Most faults of a scenario.
+/// Most `[[faults]]` of a scenario.
 const MAX_FAULTS: usize = 1000;
-/// Mission origin where the scenario gives none: a test field.
+/// Mission origin if the scenario gives none: a test field.
 const DEFAULT_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
-/// Content of a scenario's root table, if it is TOML and all its keys are known.
+/// Parses the text as TOML, refuses unknown root keys, and calls `read` with the root table.
 pub(super) fn read_root<T>(
     text: Text<'_>,
     read: impl FnOnce(&Table<'_>) -> Result<T>,
@@ -70,7 +70,7 @@ pub(super) fn read_root<T>(
     read(&root)
 }
 
-/// The scenario of a mission with goals.
+/// Reads the scenario of a mission with goals.
 pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } =
@@ -138,17 +138,17 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
     })
 }
 
-/// Settings of scenarios of all kinds of mission.
+/// Settings that scenarios of every kind of mission have.
 struct Common {
     seed: u64,
     deconfliction: Deconfliction,
     simulation: Simulation,
-    /// Place where the estimator is chosen.
+    /// Where `simulation.estimator` stands, if it is given.
     estimator_span: Option<Span>,
 }
 
-/// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the deviation of two
-/// vehicles, metres, and the time limit of a flight, seconds.
+/// Reads the settings that every kind of mission has. Two defaults depend on the kind: the
+/// deviation of two vehicles from their paths, metres, and the time limit of a flight, seconds.
 fn read_common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
     let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
@@ -161,7 +161,7 @@ fn read_common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32))
     Ok(Common { seed, deconfliction, simulation, estimator_span })
 }
 
-/// Faults of the vehicles.
+/// Reads `[[faults]]`; a fault's vehicle must be one of `vehicles`.
 fn read_faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<Fault>> {
     let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
     let Some(value) = root.get("faults") else { return Ok(Vec::new()) };
@@ -170,7 +170,7 @@ fn read_faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result
     items.iter().map(|v| read_fault(&v.table()?, &ids)).collect()
 }
 
-/// Usual cause of text that is no TOML.
+/// Hint at a usual mistake in text that is not TOML, by its next character and `what`.
 fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
     match rest.chars().next() {
         Some('“' | '”' | '„' | '‘' | '’' | '«') => {
@@ -184,7 +184,7 @@ fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
     }
 }
 
-/// A table that the file leaves out: all defaults.
+/// An empty table in place of one that the file leaves out: all its keys have their defaults.
 fn empty_table<'a>(text: Text<'a>, name: &str) -> Table<'a> {
     static EMPTY: std::sync::LazyLock<DeTable<'static>> = std::sync::LazyLock::new(DeTable::new);
     Table::new(text, name, 0..0, &EMPTY)
@@ -218,7 +218,7 @@ fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
     Ok(Geodetic { lat_deg, lon_deg, alt_m })
 }
 
-/// The map, and whether its origin was given.
+/// Reads `[map]`; the flag says whether the scenario gives its origin.
 fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     let file_value =
         table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
@@ -291,7 +291,7 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
     Ok(roadmap)
 }
 
-/// The mission, and where its mode stands.
+/// Reads `[mission]`; the span is where its `mode` stands, if it is given.
 fn read_mission(
     table: &Table<'_>,
     folder: &Path,
@@ -353,7 +353,7 @@ fn read_mission(
     Ok((mission, mode_span))
 }
 
-/// The geofence, and whose commands count.
+/// Reads the geofence, and the MAVLink system ids of ground stations whose commands count.
 fn fence_and_ground_stations(
     table: &Table<'_>,
     vehicles: &[(Vehicle, VehicleSpans)],
@@ -365,7 +365,7 @@ fn fence_and_ground_stations(
     Ok((geofence, ground_stations))
 }
 
-/// Refuses a list that is longer than any mission's.
+/// Refuses a list of more than `most` items, which are called `what` in the error.
 fn check_list_len(value: &Value<'_>, count: usize, most: usize, what: &str) -> Result<()> {
     if count > most {
         return Err(value.error(&format!("holds more than {most} {what}")));
@@ -373,7 +373,7 @@ fn check_list_len(value: &Value<'_>, count: usize, most: usize, what: &str) -> R
     Ok(())
 }
 
-/// System ids whose commands count.
+/// Reads the MAVLink system ids of the ground stations whose commands count.
 fn read_stations(
     value: &Value<'_>,
     vehicles: &[(Vehicle, VehicleSpans)],
@@ -392,8 +392,8 @@ fn read_stations(
     Ok(ids)
 }
 
-/// A point of the mission frame, in metres or by latitude and longitude about the origin that was
-/// given.
+/// Reads a point of the mission frame: ENU metres, or latitude, longitude and altitude, for which
+/// the scenario must give its origin.
 fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     if !value.is_table() {
         return read_point(value);
@@ -409,7 +409,7 @@ fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     Ok(geodetic_to_enu(origin, &position))
 }
 
-/// One `x y z` a line; empty lines and those that begin with `#` are passed over.
+/// Reads goals, one `x y z` a line, each with its `FILE:LINE`; skips empty lines and `#` lines.
 fn read_goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
     let path = folder.join(value.str()?);
     let text = files::read_text(&path).map_err(|error| {

@@ -1,4 +1,4 @@
-//! What a scenario says, table by table.
+//! The tables of a scenario, as read and checked.
 
 use std::path::PathBuf;
 
@@ -14,14 +14,14 @@ use super::error::ScenarioError;
 use crate::link::LinkUrl;
 use crate::map::Unknown;
 
-/// A scenario, checked.
+/// A scenario, read and checked.
 #[derive(Clone, Debug)]
 pub struct Scenario {
     /// Name of the scenario: the path it was read from.
     pub path: String,
     /// Text of the scenario, as read.
     pub text: String,
-    /// Seed of all randomness.
+    /// Seed of all random numbers of the run.
     pub seed: u64,
     /// `[map]`
     pub map: Map,
@@ -29,9 +29,9 @@ pub struct Scenario {
     pub roadmap: Roadmap,
     /// `[mission]`
     pub mission: Mission,
-    /// `[[vehicles]]`, as they stand in the file.
+    /// `[[vehicles]]`, in the order of the file.
     pub vehicles: Vec<Vehicle>,
-    /// Place of each vehicle's start in the file, as `FILE:LINE`.
+    /// Where each vehicle's start stands in the file, as `FILE:LINE`.
     pub vehicle_places: Vec<String>,
     /// `[deconfliction]`
     pub deconfliction: Deconfliction,
@@ -39,111 +39,111 @@ pub struct Scenario {
     pub simulation: Simulation,
     /// `[[faults]]`
     pub faults: Vec<Fault>,
-    /// `[area]`: what a coverage mission photographs.
+    /// `[area]`: what a coverage mission photographs; `None` in a mission with goals.
     pub area: Option<Area>,
-    /// `[formation]`
+    /// `[formation]`, which is not supported yet.
     pub formation: Option<UnsupportedTable>,
-    /// Settings that are requested and not built yet, in the file's order.
+    /// An error for each setting that is not supported yet, in the file's order.
     pub(super) unsupported: Vec<ScenarioError>,
 }
 
-/// A table that is read by a part not built yet.
+/// A table of the scenario that no code uses yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnsupportedTable {
     /// The table as TOML values.
     pub table: toml::Table,
 }
 
-/// `[map]`
+/// `[map]`: the obstacle map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// A builtin's name, or a path that is relative to the working directory (resolved against the
-    /// scenario's folder). Empty where a coverage mission has no map: level ground at height 0.
+    /// Name of a built-in map, or path of the map file relative to the working directory (resolved
+    /// against the scenario's folder). Empty in a coverage mission: level ground at height 0.
     pub file: String,
-    /// Edge of a planning cell.
+    /// Edge of a cell of the planning grid, metres.
     pub resolution_m: f32,
     /// Whether unknown space may be flown through.
     pub unknown: Unknown,
-    /// Mission origin.
+    /// Origin of the mission frame.
     pub origin: Geodetic,
 }
 
-/// `[roadmap]`
+/// `[roadmap]`: how the roadmap is built.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Roadmap {
-    /// Random nodes besides starts and goals.
+    /// Number of random nodes besides starts and goals.
     pub nodes: u32,
-    /// Shortest edge.
+    /// Shortest length of an edge, metres.
     pub edge_min_m: f32,
-    /// Longest edge.
+    /// Longest length of an edge, metres.
     pub edge_max_m: f32,
-    /// Range of edges as shares of the map's longest side, where they are given so (P2D).
+    /// Shortest edge as a share of the map's longest side; with `None`, `edge_min_m` counts (P2D).
     pub edge_min_share: Option<f32>,
-    /// See `edge_min_share`.
+    /// Longest edge as a share of the map's longest side; with `None`, `edge_max_m` counts (P2D).
     pub edge_max_share: Option<f32>,
-    /// Whether edges join two terminals.
+    /// Whether edges may join two starts or goals.
     pub terminals: Terminals,
-    /// Margin beyond a vehicle's radius.
+    /// Clearance of edges beyond a vehicle's radius, metres.
     pub safety_margin_m: f32,
-    /// How nodes are drawn.
+    /// How random nodes are sampled.
     pub sampling: Sampling,
-    /// Whether passages that they miss get nodes of their own.
+    /// Whether narrow passages that random nodes miss get nodes of their own.
     pub passages: bool,
 }
 
-/// Whether edges join two starts or goals.
+/// Whether edges may join two terminals, that is starts or goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Terminals {
-    /// Terminals are joined as any other nodes (P3D).
+    /// Two terminals are joined as any other nodes (P3D).
     Joined,
-    /// Never (P2D).
+    /// No edge joins two terminals (P2D).
     Apart,
 }
 
 /// `[mission]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mission {
-    /// Which vehicle goes where.
+    /// How goals are assigned to vehicles, or which other kind of mission it is.
     pub mode: Mode,
-    /// Objective that an assignment minimises.
+    /// What the assignment of goals minimises.
     pub objective: Objective,
-    /// Speed along a path, m/s.
+    /// Nominal speed of the vehicles along their paths, m/s.
     pub cruise_mps: f32,
-    /// Tasks, ENU metres.
+    /// Goals of the vehicles, ENU metres.
     pub goals: Vec<Point>,
-    /// Place of each goal in the file, as `FILE:LINE`.
+    /// Where each goal stands in the file, as `FILE:LINE`.
     pub goal_places: Vec<String>,
-    /// Volume in which vehicles may be.
+    /// Box that vehicles must not leave; `None`: there is no fence.
     pub geofence: Option<Geofence>,
-    /// System ids whose commands count; 0 is no id.
+    /// MAVLink system ids of the ground stations whose commands count; 0 fills unused places.
     pub ground_stations: [u8; GROUND_STATIONS],
 }
 
-/// Which vehicle goes where.
+/// How goals are assigned to vehicles, or which other kind of mission it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Goals are shared out.
+    /// Any vehicle may fly to any goal: the assignment decides.
     Unlabelled,
-    /// Each vehicle names its goal.
+    /// Each vehicle flies to the goal that its `goal` names.
     Labelled,
-    /// All to the one goal.
+    /// All vehicles fly to the one goal, each to a slot of its own around it.
     SingleGoal,
-    /// An area is covered.
+    /// An area is photographed.
     Coverage,
-    /// A formation is flown.
+    /// A formation is flown (not supported yet).
     Formation,
 }
 
-/// Objective that an assignment minimises.
+/// What the assignment of goals minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objective {
-    /// The sum of path lengths.
+    /// The sum of all path lengths.
     Total,
-    /// The longest path.
+    /// The length of the longest path.
     Makespan,
 }
 
-/// A box, ENU metres.
+/// A box that vehicles must not leave, ENU metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geofence {
     /// Lowest corner.
@@ -164,43 +164,43 @@ impl Geofence {
 pub struct Vehicle {
     /// MAVLink system id, 1 to 250.
     pub id: u8,
-    /// Start of the vehicle, ENU metres.
+    /// Where the vehicle's path begins, ENU metres.
     pub start: Point,
-    /// Index of its goal, in labelled missions.
+    /// Index of the vehicle's goal, in labelled missions.
     pub goal: Option<usize>,
-    /// Radius of its hull.
+    /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,
-    /// Layer of the vehicle on 2D maps.
+    /// Height at which the vehicle flies on 2D maps, metres (not supported yet).
     pub altitude_m: Option<f32>,
-    /// Highest speed, m/s.
+    /// Highest speed of the vehicle, m/s.
     pub speed_max_mps: f32,
-    /// Flight time on one battery.
+    /// Flight time on one battery, seconds (coverage).
     pub endurance_s: Option<f32>,
-    /// Payload of the vehicle.
+    /// Payload of the vehicle, kg (not supported yet).
     pub payload_kg: Option<f32>,
-    /// Kind of the vehicle's autopilot.
+    /// Autopilot of the vehicle: PX4 or ArduPilot.
     pub personality: AutopilotKind,
-    /// Home of the vehicle, if not its start.
+    /// Home of the autopilot; `None`: where it arms.
     pub home: Option<Geodetic>,
-    /// EKF origin of the vehicle, if not its home.
+    /// EKF origin of the autopilot; `None`: its pad.
     pub ekf_origin: Option<Geodetic>,
-    /// Place where the vehicle's companion runs.
+    /// Where the vehicle's companion runs.
     pub companion: Companion,
-    /// Coverage: its share of the work beside those of the others.
+    /// Coverage: weight of the vehicle's share of the work.
     pub weight: Option<f32>,
-    /// Coverage: speed of climb, m/s.
+    /// Coverage: speed V_a of the vehicle's climbs, m/s.
     pub climb_mps: Option<f32>,
-    /// Coverage: speed of descent, m/s.
+    /// Coverage: speed V_d of the vehicle's descents, m/s.
     pub descend_mps: Option<f32>,
 }
 
-/// Climbing speed V_a of a vehicle that has none of its own, m/s.
+/// Speed V_a of climbs if the vehicle gives none, m/s.
 const DEFAULT_CLIMB_MPS: f32 = 3.0;
-/// Descending speed V_d of a vehicle that has none of its own, m/s.
+/// Speed V_d of descents if the vehicle gives none, m/s.
 const DEFAULT_DESCEND_MPS: f32 = 1.0;
 
 impl Vehicle {
-    /// V_a and V_d, m/s.
+    /// Speeds of climb and descent, V_a and V_d, m/s.
     pub fn climbs_mps(&self) -> [f32; 2] {
         [
             self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS),
@@ -209,85 +209,85 @@ impl Vehicle {
     }
 }
 
-/// Place where a companion runs.
+/// Where a vehicle's companion runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Companion {
     /// The companion runs in this process.
     InProcess {
-        /// File of the companion's flash; no scenario's file names one.
+        /// File that holds the companion's flash; `None` in every scenario read from a file.
         flash: Option<PathBuf>,
     },
-    /// On a board, or in another process.
+    /// On a board, or in another process, reached by links.
     Url {
-        /// Companion's port for the autopilot.
+        /// Link to the companion's port for the autopilot.
         autopilot: LinkUrl,
-        /// Companion's port for the radio; none where the radio is joined to others by another
-        /// program, or to none.
+        /// Link to the companion's port for the radio; `None` if the radio is connected by another
+        /// program, or not at all.
         radio: Option<LinkUrl>,
     },
-    /// On a board in QEMU, in lock step with the simulation; no scenario's file says so.
+    /// On a board in QEMU in lock step with the simulation; no scenario file can choose this.
     Emulated {
-        /// The firmware for the board `qemu`.
+        /// Program of the board: the firmware built for the board `qemu`.
         program: PathBuf,
-        /// Log of the board.
+        /// File for the log of the board.
         log: PathBuf,
     },
 }
 
-/// `[deconfliction]`
+/// `[deconfliction]`: how vehicles are kept apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deconfliction {
     /// How vehicles keep apart.
     pub method: Method,
-    /// Distance that vehicles keep, centre to centre.
+    /// Distance between two vehicles' centres that must not be undercut, metres.
     pub safety_distance_m: f32,
-    /// Distance that the schedule plans between vehicles' paths, centre to centre.
+    /// Distance that the schedule keeps between vehicles' paths, centre to centre, metres.
     pub separation_m: f32,
 }
 
-/// `[simulation]`
+/// `[simulation]`: wind, sensors, links and time limit of the simulated flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
     /// Mean wind, m/s.
     pub wind_mps: f32,
-    /// Gusts on top.
+    /// Peak of the gusts on top of the mean wind, m/s.
     pub gust_mps: f32,
-    /// Standard deviation of the reported position.
+    /// Standard deviation of the estimated position, metres.
     pub position_noise_m: f32,
-    /// How good the autopilots' estimates are.
+    /// How far the autopilots' position estimates err.
     pub estimator: Estimator,
-    /// Serial links, bits a second.
+    /// Baud rate of the serial links between companions and autopilots.
     pub serial_baud: u32,
-    /// Share of bytes corrupted.
+    /// Probability that a byte on a serial link is corrupted.
     pub serial_corruption: f32,
-    /// Share of radio frames lost.
+    /// Probability that a receiver misses a radio packet.
     pub radio_loss: f32,
-    /// Delay of a radio frame.
+    /// Delay of a radio packet, seconds.
     pub radio_delay_s: f32,
-    /// Beyond it nobody hears.
+    /// Distance beyond which radios do not hear each other, metres.
     pub radio_range_m: f32,
-    /// When a run is given up.
+    /// Simulated time after which the flight is given up, seconds.
     pub time_limit_s: f32,
 }
 
 /// One fault of `[[faults]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// When it strikes.
+    /// When the fault begins, seconds of simulated time.
     pub at_s: f32,
-    /// How long it lasts; for good if absent.
+    /// Duration of the fault, seconds; `None`: it does not end.
     pub duration_s: Option<f32>,
-    /// The vehicle that it strikes, if one.
+    /// MAVLink id of the vehicle that it strikes; `None`: it strikes all.
     pub vehicle: Option<u8>,
-    /// Kind of the fault, one of [`FAULT_KINDS`].
+    /// Kind of the fault: one of [`FAULT_KINDS`], or [`FAULT_OBSTACLE`].
     pub kind: &'static str,
-    /// `radio-cut`: which way.
+    /// `radio-cut`: which direction fails, `tx`, `rx` or `both`.
     pub direction: Option<String>,
-    /// `position-jump`, `origin-change`: by how much.
+    /// `position-jump`, `origin-change`: offset, ENU metres.
     pub offset_m: Option<Point>,
-    /// `obstacle`: where.
+    /// `obstacle`: centre of the sphere, ENU metres.
     pub position: Option<Point>,
-    /// `obstacle`: how large.
+    /// `obstacle`: radius of the sphere, metres.
     pub radius_m: Option<f32>,
 }
 
@@ -299,7 +299,7 @@ impl Fault {
     }
 }
 
-/// Every kind of fault.
+/// Every kind of fault that strikes vehicles.
 pub const FAULT_KINDS: [&str; 17] = [
     "kill",
     "radio-cut",
@@ -319,21 +319,22 @@ pub const FAULT_KINDS: [&str; 17] = [
     "return-order",
     "land-order",
 ];
-/// The fault that puts an obstacle into the world.
+/// The kind of fault that puts a spherical obstacle into the world and strikes no vehicle.
 pub const FAULT_OBSTACLE: &str = "obstacle";
 
 impl Scenario {
-    /// Refuses what the file asks for and is not built yet, so that nothing is silently ignored.
+    /// Refuses the first setting of the file that is not supported yet, so that none is silently
+    /// ignored.
     pub fn check_supported(&self) -> Result<(), ScenarioError> {
         self.unsupported.first().map_or(Ok(()), |error| Err(error.clone()))
     }
 
-    /// The largest clearance any vehicle needs: its radius and the safety margin.
+    /// The greatest clearance that any vehicle requires, metres: largest radius and safety margin.
     pub fn required_clearance_m(&self) -> f32 {
         self.largest_radius_m() + self.roadmap.safety_margin_m
     }
 
-    /// The largest vehicle's radius.
+    /// The radius of the largest vehicle, metres.
     pub fn largest_radius_m(&self) -> f32 {
         self.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max)
     }

@@ -1,12 +1,14 @@
-//! A companion on a board or in another process: the far ends of its two serial ports, and what it
-//! reports of itself.
+//! A vehicle's companion on a board or in another process: our ends of its two serial ports, and
+//! the state, progress and texts that it reports.
 //!
-//! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL,
-//! its words from STATUSTEXT, all heard on its radio's port. A board whose radio is not ours is
-//! heard on the port for the autopilot, which carries no TUNNEL.
+//! The simulation knows what the companion does from its messages only: its state from HEARTBEAT,
+//! its progress from TUNNEL, its texts from STATUSTEXT, all received on the port of its radio. A
+//! board whose radio is not ours is received on the port for the autopilot, which carries no
+//! TUNNEL.
 //!
 //! A board in QEMU is in lock step with the simulation ([`crate::boards`]): it runs through a step
-//! while the desk computes the others', and its bytes are taken at the step's end.
+//! while the desk computes the other vehicles, and the simulation takes its bytes at the step's
+//! end.
 
 use std::path::Path;
 
@@ -23,7 +25,7 @@ use super::step::STEP_US;
 use crate::boards::{self, EmulatedBoard, PortBytes};
 use crate::link::{Link, LinkUrl};
 
-/// One board.
+/// One companion on a board or in another process.
 pub struct Board {
     ends: BoardConnection,
     framer: Framer,
@@ -31,41 +33,42 @@ pub struct Board {
     progress_m: Option<f32>,
 }
 
-/// Links that a board is joined to.
+/// The simulated links that a board is connected to during a step.
 pub struct BoardLinks<'a> {
-    /// Bytes from the board's autopilot.
+    /// Bytes on their way from the simulated autopilot to the board.
     pub up: &'a mut SerialLink,
-    /// Bytes to the board's autopilot.
+    /// Bytes on their way from the board to the simulated autopilot.
     pub down: &'a mut SerialLink,
-    /// Radio of the board.
+    /// The swarm's simulated radio.
     pub radio: &'a mut Radio,
-    /// Index of the board among the radio's stations.
+    /// Index of the board's vehicle among the radio's stations.
     pub station: usize,
-    /// Places of the stations.
+    /// True positions of all stations, ENU metres.
     pub places: &'a [Point],
-    /// Takes its words.
+    /// Called with each STATUSTEXT of the board.
     pub said: &'a mut dyn FnMut(&str),
 }
 
-/// Ends of our connection to the board.
+/// How the simulation is connected to a board.
 enum BoardConnection {
-    /// Links, at the speed of the clock.
+    /// Opened links to a board that runs by its own clock; `radio` is `None` if its radio is not
+    /// ours.
     Links { autopilot: Box<dyn Link>, radio: Option<Box<dyn Link>> },
-    /// Grants of time.
+    /// An emulated board that runs only while the simulation grants it time.
     LockStep(LockStep),
 }
 
-/// A board in lock step.
+/// An emulated board in lock step with the simulation.
 struct LockStep {
     board: EmulatedBoard,
-    /// When it started, microseconds of the simulation's time.
+    /// Simulation time at which the board last started, microseconds.
     started_us: u64,
-    /// Whether it runs.
+    /// Whether the board runs through a grant that is not finished yet.
     runs: bool,
 }
 
 impl Board {
-    /// Switches on a board in QEMU whose flash holds these files.
+    /// Starts a board in QEMU whose flash holds this roadmap file and this mission file.
     ///
     /// # Errors
     /// QEMU or the program does not start; the board does not hold the files.
@@ -84,8 +87,8 @@ impl Board {
         Self { ends, framer: Framer::new(), state: State::default(), progress_m: None }
     }
 
-    /// Connects to the board's port for the autopilot and, if its radio is ours, the one for the
-    /// radio.
+    /// Opens the link to the board's port for the autopilot and, if `radio` is given, to the port
+    /// for its radio.
     ///
     /// # Errors
     /// A link cannot be opened.
@@ -94,23 +97,24 @@ impl Board {
         Ok(Self::new(BoardConnection::Links { autopilot: autopilot.open()?, radio }))
     }
 
-    /// State of the board's companion as last reported.
+    /// State of the board's companion, as last reported.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Progress of the vehicle along its own path as last reported, metres; none if it has reported
-    /// none.
+    /// Progress of the vehicle along its own path, as last reported, metres; `None` before the
+    /// first report.
     pub fn progress_m(&self) -> Option<f32> {
         self.progress_m
     }
 
-    /// Whether its radio is ours.
+    /// Whether the board's radio traffic passes through the simulated radio.
     pub fn has_radio(&self) -> bool {
         !matches!(self.ends, BoardConnection::Links { radio: None, .. })
     }
 
-    /// Bytes of the stack that were used since its start; of boards in lock step alone.
+    /// Greatest stack use of the board since its start, bytes; `None` for a board that is not in
+    /// lock step.
     ///
     /// # Errors
     /// The board is gone.
@@ -124,15 +128,16 @@ impl Board {
         board.stack_used().map(Some)
     }
 
-    /// Carries bytes between the board, its autopilot and the radio, up to the end of a step; one
-    /// in lock step is granted the next one.
+    /// Carries bytes between the board, its autopilot and the radio up to `now_us`, the end of a
+    /// step. A board in lock step is then granted the next step.
     ///
     /// # Errors
     /// A board in lock step hangs or is gone.
     pub fn step(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         match &mut self.ends {
             BoardConnection::Links { .. } => {
-                // A board that is gone is silent, as one without power.
+                // An error of the link is ignored: a board that is gone is silent, as without
+                // power.
                 let _: anyhow::Result<()> = self.exchange_bytes(now_us, lines);
                 Ok(())
             }
@@ -151,7 +156,7 @@ impl Board {
         }
     }
 
-    /// Bytes that have come by now on the links.
+    /// Passes on, in both directions, the bytes that have arrived by `now_us` on opened links.
     fn exchange_bytes(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         let BoardConnection::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
         while let Some((_, bytes)) = lines.up.next_by(now_us) {
@@ -188,7 +193,7 @@ impl Board {
         Ok(())
     }
 
-    /// The board's radio sends bytes: its frames go out as whole packets.
+    /// The board's radio broadcasts `bytes`, one packet for each whole frame in them.
     fn broadcast_frames(&mut self, now_us: u64, bytes: &[u8], lines: &mut BoardLinks<'_>) {
         let mut input = bytes;
         while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
@@ -199,7 +204,7 @@ impl Board {
         }
     }
 
-    /// Keeps what the board reports of itself.
+    /// Keeps state or progress that a frame of the companion reports, or passes on its text.
     fn note_report(&mut self, frame: &Frame, said: &mut dyn FnMut(&str)) {
         if frame.component != COMPANION_COMPONENT {
             return;
@@ -221,7 +226,7 @@ impl Board {
 }
 
 impl LockStep {
-    /// Bytes that the board sent in the step that ends now.
+    /// Ends the grant of the last step; returns the bytes that the board sent in it.
     fn end_grant(&mut self, now_us: u64) -> anyhow::Result<Vec<PortBytes>> {
         if !core::mem::take(&mut self.runs) {
             return Ok(Vec::new());
@@ -233,7 +238,7 @@ impl LockStep {
         Ok(answer.sent)
     }
 
-    /// Grants it the next step, and what it receives meanwhile.
+    /// Grants the board the next step, with the bytes that reach it during that step.
     fn begin_grant(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         let until_us = now_us + STEP_US;
         let board_us = |us: u64| us.max(now_us) - self.started_us;
@@ -253,7 +258,7 @@ impl LockStep {
     }
 }
 
-/// The state that a companion's HEARTBEAT reports.
+/// The state that a companion's HEARTBEAT reports in `custom_mode`; `None` if it is no known one.
 pub fn reported_state(frame: &Frame) -> Option<State> {
     let reported = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
     State::ALL.iter().copied().find(|state| *state as u32 == reported)

@@ -1,6 +1,6 @@
-//! Divisions that companions of a coverage mission make in flight, from their radio messages: the
-//! plans that they fly after it, and what each division follows from. Whoever has the mission file
-//! can plan the same again.
+//! Logs the divisions that companions of a coverage mission agree on in flight, from their radio
+//! messages: the plan that each vehicle flies after one, and the inputs that the plan is computed
+//! from. With these inputs and the mission file anybody can compute it again.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -13,44 +13,45 @@ use companion::time::Instant;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
-/// A division that counts, as one vehicle flies it.
+/// A division that the fleet agreed on, as flown by one vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Division {
-    /// When the vehicle first reported that it flies it, seconds.
+    /// When the vehicle first reported the plan of this division, seconds.
     pub t_s: f32,
     /// MAVLink system id of the vehicle.
     pub vehicle: u8,
-    /// Divisions that count, this one among them.
+    /// Number of divisions agreed on so far, this one included.
     pub number: u8,
-    /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody
-    /// reported them.
+    /// Inputs of this division, one a vehicle in the order of the vehicles' ids; empty if no
+    /// vehicle reported them.
     pub lots: Vec<DivisionInput>,
-    /// The CRC of the plan that the vehicle flies.
+    /// CRC of the plan that the vehicle flies after this division.
     pub plan_crc: u32,
 }
 
-/// Last report of one vehicle.
+/// What one vehicle last reported.
 #[derive(Clone, Copy, Debug, Default)]
 struct Reported {
     plan_crc: u32,
     number: u8,
     counted: u32,
-    /// The division whose plan it flies, and the CRC of that.
+    /// Number of the division whose plan the vehicle flies; `flown_crc` is the CRC of that plan.
     flies: u8,
     flown_crc: u32,
 }
 
-/// Reports heard so far.
+/// The reports heard so far, and the divisions found in them.
 #[derive(Debug, Default)]
 pub struct DivisionLog {
     vehicles: HashMap<u8, Reported>,
-    /// Lots by the hash under which they were reported.
+    /// Inputs of each division, by the hash that the vehicles reported for it.
     lots: HashMap<u32, Vec<DivisionInput>>,
     reported: Vec<Division>,
 }
 
 impl DivisionLog {
-    /// Handles what stations sent.
+    /// Reads the TUNNEL messages, roster reports and intents, among packets that stations sent at
+    /// `t_s`.
     pub fn handle_packets(&mut self, t_s: f32, packets: &[Rc<[u8]>]) {
         for packet in packets {
             let mut input = &packet[..];
@@ -76,7 +77,7 @@ impl DivisionLog {
         if roster.hash == 0 {
             return;
         }
-        // A vehicle without a part in the division before has none in this one.
+        // A vehicle that took no part in the division before takes none in this one.
         let before = self.lots.get(&roster.committed_hash).cloned().unwrap_or_default();
         let lots = self.lots.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
@@ -93,7 +94,8 @@ impl DivisionLog {
         self.note_division(t_s, intent.system_id);
     }
 
-    /// A division that counts is flown once the plan is another one.
+    /// Logs a division for `vehicle` once it reports both a higher number of divisions and another
+    /// plan.
     fn note_division(&mut self, t_s: f32, vehicle: u8) {
         let reported = self.vehicles.entry(vehicle).or_default();
         if reported.number > reported.flies && reported.plan_crc != reported.flown_crc {
@@ -104,7 +106,7 @@ impl DivisionLog {
         }
     }
 
-    /// The divisions that were flown, in order of time.
+    /// The divisions that vehicles flew, in order of time.
     pub fn into_divisions(self) -> Vec<Division> {
         self.reported
     }

@@ -1,5 +1,5 @@
-//! The script player: strikes vehicles with the scenario's `[[faults]]` at their times and takes
-//! back what ends.
+//! Plays the scenario's `[[faults]]`: begins each at its time on the vehicles that it strikes, and
+//! ends it after its duration.
 //!
 //! | kind | strikes | ends after `duration_s` |
 //! |---|---|---|
@@ -22,7 +22,7 @@
 //! | `land-order` | the ground station commands to land | |
 //! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | gone; the companions keep off on |
 //!
-//! A fault without a vehicle strikes all; an obstacle strikes nobody.
+//! A fault without a vehicle strikes all vehicles; an obstacle strikes none.
 
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
@@ -33,19 +33,20 @@ use super::radio::{Radio, RadioOutage};
 use crate::report::{Event, Level};
 use crate::scenario::{Companion, FAULT_OBSTACLE, Fault, Scenario};
 
-/// Share of bytes changed by `serial-corrupt`: half of all frames of a setpoint's length are lost.
+/// Share of bytes that `serial-corrupt` changes: half of all frames as long as a setpoint are lost.
 const CORRUPTED_SHARE: f64 = 0.01;
-/// Charge left by `battery-low`: below the companions' limit, above the autopilots'.
+/// Share of the charge that `battery-low` leaves: below the companions' limit, above the
+/// autopilots'.
 const BATTERY_LEFT: f32 = 0.1;
-/// Offset by which `position-jump` moves the estimate, metres.
+/// By how much `position-jump` moves the estimate if the fault has no `offset_m`, ENU metres.
 const POSITION_JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
-/// Offset by which `origin-change` moves the origin, metres.
+/// By how much `origin-change` moves the EKF origin if the fault has no `offset_m`, ENU metres.
 const ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
-/// Length of a stall or a boot where the script states none, seconds.
+/// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
 const DEFAULT_FAULT_S: f32 = 3.0;
 
-/// Refuses what cannot be done to a vehicle: what strikes a companion or its radio needs them in
-/// this process.
+/// Refuses faults that this simulation cannot do to their vehicle: resetting a companion, its
+/// planner or its radio needs them in this process.
 ///
 /// # Errors
 /// Names the fault and the vehicle.
@@ -70,15 +71,15 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Parts of the simulation that a fault acts on.
+/// The parts of the simulation that a fault acts on.
 pub struct FaultTargets<'a> {
     /// The vehicles, in the order of the scenario.
     pub members: &'a mut [SimulatedVehicle],
     /// Radio of the swarm.
     pub radio: &'a mut Radio,
-    /// The ground station that commands them to continue.
+    /// The ground station, which commands vehicles and reports obstacles.
     pub ground_station: &'a mut GroundStation,
-    /// Spheres that are on no map: centre and radius, metres.
+    /// Spherical obstacles that are in no map: centre and radius, metres.
     pub obstacles: &'a mut Vec<(Point, f32)>,
 }
 
@@ -89,7 +90,7 @@ enum Stage {
     Over,
 }
 
-/// The scenario's faults and how far they have come.
+/// The scenario's faults, which of them act or are over, and which vehicles they have struck.
 pub struct FaultScript<'a> {
     scenario: &'a Scenario,
     stages: Vec<Stage>,
@@ -97,7 +98,7 @@ pub struct FaultScript<'a> {
 }
 
 impl<'a> FaultScript<'a> {
-    /// A script of which nothing has happened yet.
+    /// A script of which no fault has begun.
     pub fn new(scenario: &'a Scenario) -> Self {
         Self {
             scenario,
@@ -111,7 +112,7 @@ impl<'a> FaultScript<'a> {
         self.struck[vehicle]
     }
 
-    /// Whether all faults have begun and ended.
+    /// Whether every fault is over, or acts and has no end.
     pub fn is_over(&self) -> bool {
         let ends = |fault: &Fault| fault.duration_s.is_some();
         let mut pairs = self.scenario.faults.iter().zip(&self.stages);
@@ -120,7 +121,7 @@ impl<'a> FaultScript<'a> {
         })
     }
 
-    /// Begins and ends the faults that are due, and logs each.
+    /// Begins and ends the faults that are due at `now_us`, and logs each.
     pub fn step(
         &mut self,
         now_us: u64,
@@ -234,7 +235,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         "pilot-takeover" => return_from_pilot(i, now_us, world),
         "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Resume),
-        // The others end by themselves, or never.
+        // All other faults end by themselves or never.
         _ => {}
     }
 }

@@ -1,9 +1,11 @@
-//! The swarm seen from a ground station: `fly --qgc URL`.
+//! The link to a real ground station that watches and commands the simulated swarm:
+//! `fly --qgc URL`.
 //!
-//! Each autopilot has one more port for it, with a ground station's rates
-//! ([`sim_autopilot::port::GROUND_STREAMS`]); of what companions send by radio their heartbeats,
-//! texts and answers go along. What comes back goes to every autopilot and by radio to every
-//! companion; each heeds what is addressed to it, as behind a real telemetry radio.
+//! Each autopilot has one more port for the ground station, with a ground station's stream rates
+//! ([`sim_autopilot::port::GROUND_STREAMS`]). Of the packets that companions broadcast, heartbeats,
+//! texts and command acknowledgements go to it too. What the ground station sends goes to every
+//! autopilot and by radio to every companion; each obeys what is addressed to it, as behind a real
+//! telemetry radio.
 
 use std::io;
 use std::rc::Rc;
@@ -16,12 +18,12 @@ use super::member::SimulatedVehicle;
 use super::radio::Radio;
 use crate::link::Link;
 
-/// HEARTBEAT, COMMAND_ACK, STATUSTEXT.
+/// Message ids passed on from companions: HEARTBEAT, COMMAND_ACK, STATUSTEXT.
 const FROM_COMPANIONS: [u32; 3] = [0, 77, 253];
-/// Longest datagram, bytes: small enough for any path.
+/// Longest datagram, bytes: within the MTU of any usual network path.
 const MAX_DATAGRAM: usize = 1400;
 
-/// A link to a ground station.
+/// A link to a ground station, and the datagram that is being filled for it.
 pub struct Gateway {
     link: Box<dyn Link>,
     datagram: Vec<u8>,
@@ -33,13 +35,13 @@ impl Gateway {
         Self { link, datagram: Vec::new() }
     }
 
-    /// Gives the vehicles their port for it.
+    /// Gives every vehicle's autopilot a port for the ground station.
     pub fn add_ground_ports(&self, members: &mut [SimulatedVehicle]) {
         members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
     }
 
-    /// Takes the frames that came in since the last step, then sends those that are to go out: of
-    /// the radio's packets those `overheard`.
+    /// Passes on what the ground station sent since the last step; then sends it what the
+    /// autopilots have for it, and the packets of companions among `overheard` that it gets.
     ///
     /// # Errors
     /// The link is gone for good.
@@ -76,7 +78,7 @@ impl Gateway {
         self.flush()
     }
 
-    /// Whole frames, gathered up to the size of a datagram.
+    /// Appends whole frames to the datagram; sends that first if they do not fit any more.
     fn send(&mut self, frames: &[u8]) -> io::Result<()> {
         if self.datagram.len() + frames.len() > MAX_DATAGRAM {
             self.flush()?;
@@ -94,7 +96,7 @@ impl Gateway {
     }
 }
 
-/// A companion sends one frame a packet.
+/// Whether a packet's frame, one a packet from companions, is among [`FROM_COMPANIONS`].
 fn is_for_ground(packet: &[u8]) -> bool {
     let mut input = packet;
     let frame = Framer::new().next(Instant::ZERO, &mut input);

@@ -1,7 +1,7 @@
-//! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl
-//! or a script would, and commands a vehicle to continue that its pilot gave back, gives the orders
-//! of the script, and reports each obstacle it sees to all. A vehicle that cannot fly is not waited
-//! for, and one that is late not for ever.
+//! The simulated operator's ground station. As QGroundControl or a script would, it starts the
+//! whole swarm by radio once every companion is ready, gives the commands of the fault script,
+//! resumes a vehicle that its pilot gave back, and reports each obstacle that appears. It does not
+//! wait for a vehicle that cannot fly, and only 90 s for one that is late.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -13,34 +13,34 @@ use planner_core::frames::Geodetic;
 use super::member::{SimulatedVehicle, is_finished};
 use super::radio::Radio;
 
-/// MAV_COMP_ID_MISSIONPLANNER.
+/// MAVLink component id of the ground station: MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
-/// Time after which a command that was not obeyed is repeated, microseconds.
+/// Time after which a command that a vehicle has not obeyed is repeated, microseconds.
 const COMMAND_EVERY_US: u64 = 1_000_000;
-/// Time with some vehicle ready after which the ready vehicles are started without the rest,
-/// microseconds.
+/// Time after the first vehicle is ready after which the ready vehicles are started without the
+/// others, microseconds.
 const START_WITHOUT_REST_US: u64 = 90_000_000;
-/// Time for which an order is repeated, microseconds: some messages are lost.
+/// Time for which a command to one vehicle is repeated, microseconds: some messages are lost.
 const ORDER_REPEATED_FOR_US: u64 = 10_000_000;
 
-/// Command to one vehicle.
+/// What the operator commands one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OperatorCommand {
-    /// To continue after a pilot's control, or after a pause.
+    /// Continue, after a pilot's control or a pause.
     Resume,
-    /// To stop.
+    /// Stop and hold (`Paused`).
     Pause,
-    /// To fly home.
+    /// Fly home (RTL).
     Return,
-    /// To land.
+    /// Land.
     Land,
 }
 
 impl OperatorCommand {
-    /// Whether a vehicle in this state still needs the command.
+    /// Whether a vehicle in this state has not obeyed the command yet.
     fn is_still_needed(self, state: State) -> bool {
         match self {
-            // On the pad a vehicle waits for it in its states before the start.
+            // A vehicle before its start needs it too: a pause holds it on its pad.
             Self::Resume => matches!(
                 state,
                 State::PilotReturned
@@ -65,7 +65,7 @@ impl OperatorCommand {
     }
 }
 
-/// Sends MISSION_START to system 0.
+/// A ground station that starts the swarm (MISSION_START) and commands single vehicles.
 #[derive(Debug)]
 pub struct GroundStation {
     system_id: u8,
@@ -73,9 +73,9 @@ pub struct GroundStation {
     ready_us: Option<u64>,
     first_us: Option<u64>,
     last_us: u64,
-    /// Commands to vehicles, and until when they are repeated.
+    /// Commands to single vehicles: vehicle's index, command, and until when it is repeated.
     orders: Vec<(usize, OperatorCommand, u64)>,
-    /// Centres and radii of obstacles to report, metres.
+    /// Centre and radius (metres) of each obstacle to report.
     obstacles: Vec<(Geodetic, f32)>,
 }
 
@@ -93,28 +93,29 @@ impl GroundStation {
         }
     }
 
-    /// Whether the start was commanded.
+    /// Whether the swarm's start was commanded.
     pub fn is_started(&self) -> bool {
         self.first_us.is_some()
     }
 
-    /// When it was first commanded, seconds; 0 before.
+    /// When the swarm's start was first commanded, seconds; 0 before.
     pub fn started_s(&self) -> f64 {
         self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
-    /// Sets the command for a vehicle; it replaces the earlier command.
+    /// Sets the command for one vehicle, repeated for 10 s; it replaces the vehicle's earlier one.
     pub fn set_command(&mut self, now_us: u64, vehicle: usize, order: OperatorCommand) {
         self.orders.retain(|&(of, ..)| of != vehicle);
         self.orders.push((vehicle, order, now_us + ORDER_REPEATED_FOR_US));
     }
 
-    /// Reports an obstacle to all vehicles, from now on.
+    /// Reports a spherical obstacle to all vehicles, each second from now on.
     pub fn report_obstacle(&mut self, centre: Geodetic, radius_m: f32) {
         self.obstacles.push((centre, radius_m));
     }
 
-    /// Commands the start once all are ready, and again to each that has not heard it.
+    /// Sends what is due: the start once all are ready, then each second the start, commands and
+    /// obstacles to vehicles that need them.
     pub fn step(
         &mut self,
         now_us: u64,
@@ -129,7 +130,7 @@ impl GroundStation {
         }
     }
 
-    /// Frames that the ground station sends.
+    /// Frames that the ground station sends at `now_us`; empty if none is due.
     fn due_frames(&mut self, now_us: u64, members: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
         let state = |m: &SimulatedVehicle| m.state();
         if self.first_us.is_none() {
@@ -151,7 +152,7 @@ impl GroundStation {
             return Vec::new();
         }
         self.last_us = now_us;
-        // A pause that was obeyed is not commanded again: it may be resumed.
+        // A pause that was obeyed is not repeated: another station may resume the vehicle.
         self.orders.retain(|&(of, order, until_us)| {
             now_us < until_us
                 && (order != OperatorCommand::Pause || order.is_still_needed(state(&members[of])))
@@ -194,10 +195,11 @@ impl GroundStation {
 const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
 const PAUSE_CONTINUE: MavCmd = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
 
-/// Target system that means all.
+/// Target system that addresses all vehicles.
 const ALL_SYSTEMS: u8 = 0;
 
-/// A frame by which ground station `from` commands the start; returns its length.
+/// Writes a MISSION_START of ground station `from` to `target_system` into `out`; returns its
+/// length.
 pub fn mission_start(from: u8, target_system: u8, out: &mut [u8; frame::MAX_FRAME_LEN]) -> usize {
     encode(&command_long(START, target_system, 0.0), from, 0, out)
 }

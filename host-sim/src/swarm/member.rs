@@ -1,4 +1,4 @@
-//! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
+//! One simulated vehicle of the swarm: companion, autopilot and the serial link between them.
 
 use anyhow::Context;
 use companion::storage::store::{MAX_READ, Store};
@@ -19,56 +19,56 @@ use crate::mission::{Mission, OwnPlan};
 use crate::report::{self, Level};
 use crate::say;
 
-/// Steps between two readings of the height of the ground below, which changes slowly.
+/// Steps between two measurements of the ground's height below a vehicle, which changes slowly.
 const GROUND_CHECK_STEPS: u64 = 25;
 
-/// How the shell answers a companion that asks for a plan.
+/// How the simulation answers a companion that requests a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Planner {
-    /// At once and rightly.
+    /// With the right plan, at once.
     #[default]
     Sound,
-    /// The plan is late.
+    /// Not at all.
     Late,
-    /// The plan is from a damaged roadmap.
+    /// With the result of planning on a damaged roadmap.
     BadRoadmap,
 }
 
-/// One vehicle.
+/// One vehicle of the simulated swarm.
 pub struct SimulatedVehicle {
     /// Autopilot of the vehicle.
     pub autopilot: Autopilot,
-    /// Companion of the vehicle, unless a board runs it.
+    /// The vehicle's companion; idle if a board runs it.
     pub companion: Box<DeskCompanion>,
-    /// A board that decides in its place.
+    /// The board or process whose companion flies the vehicle instead of `companion`.
     board: Option<Board>,
-    /// Flash of the companion.
+    /// Flash of the companion; `None`: it has no store.
     flash: Option<DeskFlash>,
-    /// The plans that the companion waits for.
+    /// The plans that the companion has requested and not got yet.
     plan_requests: PlanRequests,
-    /// How it is answered.
+    /// How a plan request is answered.
     pub planner: Planner,
-    /// The last warning of a mission that did not continue since: why it left its usual course.
+    /// Text of the last warning of the mission table since the vehicle last followed its path.
     pub cause: Option<&'static str>,
-    /// When it left the ground, seconds.
+    /// When the vehicle first left the ground, seconds.
     pub took_off_s: Option<f64>,
-    /// When it stood on the ground again with its motors off, seconds.
+    /// When the vehicle first stood on the ground again, disarmed, seconds.
     pub landed_s: Option<f64>,
     config: Config<VEHICLES>,
     up: SerialLink,
     down: SerialLink,
     ground_m: f32,
     bytes: Vec<u8>,
-    /// When the companion's clock began, microseconds.
+    /// When the companion last started, microseconds of simulation time.
     companion_us: u64,
-    /// The autopilot boots until then, microseconds.
+    /// Simulation time until which the autopilot boots, microseconds.
     boots_until_us: u64,
     killed: bool,
     wrecked: bool,
 }
 
 impl SimulatedVehicle {
-    /// A vehicle on its pad, powered up.
+    /// A vehicle on its pad, switched on.
     pub fn new(
         autopilot: &sim_autopilot::Config,
         config: Config<VEHICLES>,
@@ -98,10 +98,10 @@ impl SimulatedVehicle {
         })
     }
 
-    /// Gives the companion this flash from now on.
+    /// Restarts the companion with this flash as its store.
     ///
     /// # Errors
-    /// None that the first start had not.
+    /// As [`Self::new`]; none if that succeeded with the same settings.
     pub fn attach_flash(&mut self, flash: DeskFlash) -> anyhow::Result<()> {
         self.flash = Some(flash);
         self.start_companion()
@@ -115,12 +115,12 @@ impl SimulatedVehicle {
         Ok(())
     }
 
-    /// A board runs the companion from now on.
+    /// From now on this board flies the vehicle instead of the companion in this process.
     pub fn attach_board(&mut self, board: Board) {
         self.board = Some(board);
     }
 
-    /// Prints how much stack its board used, if the board is in lock step.
+    /// Prints how much stack the vehicle's board used, if that board is in lock step.
     ///
     /// # Errors
     /// The board is gone.
@@ -142,23 +142,23 @@ impl SimulatedVehicle {
         self.config.system_id
     }
 
-    /// Whether it has lost all power.
+    /// Whether the vehicle has lost all power (`kill`).
     pub fn is_powerless(&self) -> bool {
         self.killed
     }
 
-    /// Whether it fell without its motors.
+    /// Whether the vehicle fell because its motors stopped in the air.
     pub fn is_wrecked(&self) -> bool {
         self.wrecked
     }
 
-    /// Cuts the power of autopilot and companion.
+    /// Cuts the power of autopilot and companion for good.
     pub fn cut_power(&mut self) {
         self.cut_motors();
         self.killed = true;
     }
 
-    /// Restarts the autopilot; it is silent and deaf until `until_us`.
+    /// Restarts the autopilot: motors off; until `until_us` it neither sends nor receives.
     pub fn reboot_autopilot(&mut self, until_us: u64) {
         self.cut_motors();
         self.boots_until_us = until_us;
@@ -170,10 +170,10 @@ impl SimulatedVehicle {
         self.autopilot.reboot();
     }
 
-    /// Restarts the companion, its clock with it.
+    /// Restarts the companion, and its clock from 0.
     ///
     /// # Errors
-    /// None that the first start had not.
+    /// As [`Self::new`]; none if that succeeded with the same settings.
     pub fn reset_companion(&mut self, now_us: u64) -> anyhow::Result<()> {
         self.start_companion()?;
         self.companion_us = now_us;
@@ -187,19 +187,19 @@ impl SimulatedVehicle {
         self.down.stall(until_us);
     }
 
-    /// Changes the share of bytes that the serial link changes.
+    /// Sets the share of bytes that the serial link changes, 0 to 1.
     pub fn set_serial_corruption(&mut self, share: f64) {
         self.up.set_corruption(share);
         self.down.set_corruption(share);
     }
 
-    /// The companion's time.
+    /// The companion's own time: since its last start.
     fn companion_now(&self, now_us: u64) -> Instant {
         Instant::from_micros(now_us - self.companion_us)
     }
 
-    /// One physics step of the autopilot and all bytes that arrive by its end; what the companion
-    /// reports goes to `log`.
+    /// One physics step of the vehicle: its autopilot, and all bytes that arrive by the step's end.
+    /// Events of the companion go to `log`.
     ///
     /// # Errors
     /// Its board hangs or is gone.
@@ -253,7 +253,7 @@ impl SimulatedVehicle {
         Ok(())
     }
 
-    /// Carries bytes between the board, its autopilot and the radio.
+    /// Carries bytes between the vehicle's board, its autopilot and the radio for one step.
     fn step_board(
         &mut self,
         now_us: u64,
@@ -280,7 +280,7 @@ impl SimulatedVehicle {
             .with_context(|| format!("the board of vehicle {id}"))
     }
 
-    /// Gives the companion in this process the bytes that have arrived by now.
+    /// Gives the companion the bytes that arrived by `now_us`; handles timeout, events and flash.
     fn step_companion(
         &mut self,
         now_us: u64,
@@ -304,7 +304,7 @@ impl SimulatedVehicle {
             match happened {
                 Event::PlanRequested(wanted) => self.plan_requests.add(wanted),
                 Event::RestartRequested => restarts = true,
-                // The companion also sends it as STATUSTEXT.
+                // The companion also sends this as STATUSTEXT, so it is not logged.
                 Event::WaitsForStart { .. } => {}
                 Event::FlownAround { left } => {
                     let text = format!("Flown around: {left} waypoints are left");
@@ -326,38 +326,38 @@ impl SimulatedVehicle {
         }
         self.drain_companion(now_us, station, radio, places);
         if restarts {
-            // Cannot fail: the companion was made once, so it can be made again.
+            // An error is impossible: the same settings have made a companion before.
             let _ = self.reset_companion(now_us);
         }
     }
 
-    /// Faults of the vehicle's serial link over `lasted_s` seconds, the worse direction first.
+    /// Faults of the vehicle's serial link in `lasted_s` seconds, as text; `None` without faults.
     pub fn link_trouble(&self, lasted_s: f64) -> Option<String> {
         self.up.describe_fault(lasted_s).or_else(|| self.down.describe_fault(lasted_s))
     }
 
-    /// Passes on to a board without a radio what a ground station sends its companion: by the
-    /// autopilot, as that forwards it.
+    /// Gives a ground station's frame to a board that has no radio of ours, by the autopilot's
+    /// serial link, as an autopilot forwards it.
     pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
             self.up.write(now_us, frame);
         }
     }
 
-    /// Handles bytes from a ground station.
+    /// Gives the autopilot bytes from the ground station behind `--qgc`.
     pub fn handle_ground_bytes(&mut self, now_us: u64, bytes: &[u8]) {
         if !self.is_down(now_us) {
             self.autopilot.handle_ground_bytes(bytes);
         }
     }
 
-    /// Moves what a ground station gets into `out`, whole frames; the bytes moved.
+    /// Moves whole frames for the ground station behind `--qgc` into `out`; returns their length.
     pub fn poll_ground_transmit(&mut self, now_us: u64, out: &mut [u8]) -> usize {
         let length = self.autopilot.poll_ground_transmit(out);
         if self.is_down(now_us) { 0 } else { length }
     }
 
-    /// Whether the vehicle is without power, or boots.
+    /// Whether the vehicle has no power, or its autopilot boots.
     fn is_down(&self, now_us: u64) -> bool {
         self.killed || now_us < self.boots_until_us
     }
@@ -390,7 +390,7 @@ impl SimulatedVehicle {
         }
     }
 
-    /// How it ended: the state of its mission, and why where it left the usual course.
+    /// How the vehicle's flight ended: the state of its mission, and the warning that led there.
     pub fn describe_end(&self) -> String {
         match (self.killed, self.cause) {
             (true, _) => "Killed".to_owned(),
@@ -399,13 +399,13 @@ impl SimulatedVehicle {
         }
     }
 
-    /// The plan that the companion waits for, the most urgent one of several, if it is to be
-    /// answered.
+    /// The most urgent plan that the companion has requested; `None` if there is none, or if it is
+    /// not to be answered (`late-plan`).
     pub fn next_plan_request(&self) -> Option<PlanKind> {
         if self.planner == Planner::Late { None } else { self.plan_requests.take() }
     }
 
-    /// Answers the companion's request for a plan.
+    /// Gives the companion the plan that it requested, or the failure.
     pub fn answer_plan(
         &mut self,
         now_us: u64,
@@ -440,7 +440,7 @@ impl SimulatedVehicle {
         }
     }
 
-    /// The pictures that its autopilot took.
+    /// Takes the pictures that the vehicle's autopilot has taken.
     pub fn take_pictures(&mut self) -> Vec<Picture> {
         let vehicle = Some(self.system_id());
         let picture = |photo: Photo| Picture {
@@ -452,11 +452,11 @@ impl SimulatedVehicle {
         self.autopilot.take_photos().into_iter().map(picture).collect()
     }
 
-    /// State of the vehicle as the referee sees it.
+    /// The vehicle's true position and phase, for the referee.
     pub fn observation(&self) -> Observation {
         let truth = self.autopilot.true_state();
         let state = self.state();
-        // A board's report of its state is up to a second old; the autopilot's actions are seen.
+        // A board's reported state is up to a second old; the autopilot's landing is known at once.
         let lands = self.board.is_some() && self.autopilot.is_landing();
         let phase = match (truth.touching, on_path(state) && !lands) {
             (touching, _) if self.wrecked => {
@@ -470,7 +470,7 @@ impl SimulatedVehicle {
             (false, true) => Phase::Flying,
             _ => Phase::TakeOffOrLanding,
         };
-        // A vehicle that stands by order of a person is in no deadlock.
+        // A vehicle that stands by command of operator or pilot is not deadlocked.
         let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
         let progress_m = self
             .board
@@ -480,7 +480,7 @@ impl SimulatedVehicle {
     }
 }
 
-/// Whether a mission in this state will not move on by itself.
+/// Whether a vehicle in this state does not move any more: its mission is done or aborted.
 pub fn is_finished(state: State) -> bool {
     matches!(state, State::Done | State::Aborted)
 }

@@ -1,10 +1,10 @@
-//! A whole swarm on the desk: companions and simulated autopilots joined by emulated serial links
-//! and a radio.
+//! Simulates a whole swarm on the desk: companions and simulated autopilots, connected by emulated
+//! serial links and a radio.
 //!
 //! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario
 //! gives the same flight, bit for bit, in debug and release. Every byte between a companion and its
 //! autopilot passes a [`serial::SerialLink`], every byte between companions a [`radio::Radio`]; the
-//! [`referee::Referee`] sees the truth and gives it to nobody.
+//! [`referee::Referee`] sees the true motion and gives it to no companion.
 
 pub mod board;
 pub mod divisions;
@@ -44,44 +44,44 @@ use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded}
 use crate::scenario::Companion;
 use crate::shortage;
 
-/// A vehicle within this distance of its goal has reached it, metres.
+/// Distance from its goal within which a vehicle counts as having reached it, metres.
 const REACHED_M: f32 = 0.5;
-/// Distance from its pad beyond which a vehicle has left the pad, metres.
+/// Horizontal distance from its pad beyond which a vehicle has left it, metres.
 const OFF_PAD_M: f32 = 2.0;
-/// Simulated time that continues after the last vehicle is done, seconds.
+/// Simulated time after the last vehicle is done, before the simulation ends, seconds.
 const AFTERMATH_S: f64 = 1.0;
-/// Standstill of all vehicles after a fault after which no vehicle will fly any more, seconds:
-/// longer than from a gate's opening to the take-off.
+/// Time without any vehicle in motion, after all faults, after which none is expected to fly any
+/// more, seconds: longer than from a gate's opening to the take-off.
 const STANDSTILL_S: f64 = 30.0;
-/// Greatest lag of the simulation behind the wall clock that is made up for: if the simulation
-/// hurried, autopilots would live through seconds in which no companion in another process can say
-/// anything.
+/// Greatest lag of the simulation behind the wall clock that is caught up with; a longer one is
+/// kept: while the simulation hurried, autopilots would pass seconds in which no companion in
+/// another process can send anything.
 const MAX_CLOCK_LAG: Duration = Duration::from_millis(200);
 
-/// A flown mission.
+/// Outcome of a simulated flight.
 pub struct Flight {
     /// `result.json`.
     pub result: MissionResult,
-    /// True tracks, times and places, one per vehicle.
+    /// True track of each vehicle: times in seconds, positions in ENU metres.
     pub tracks: Vec<Vec<(f32, Point)>>,
-    /// Smallest distances over time.
+    /// Smallest distances over time, one sample each 0.2 s.
     pub samples: Vec<Sample>,
-    /// Pictures taken, vehicle by vehicle.
+    /// Pictures taken, sorted by vehicle.
     pub pictures: Vec<Picture>,
-    /// Events that the companions reported.
+    /// Events of the companions, the fault script and the referee.
     pub log: Vec<report::Event>,
-    /// Waypoints of a coverage mission that were photographed in flights before.
+    /// Waypoints of a coverage mission that were photographed in earlier flights.
     pub done: Vec<WaypointRange>,
-    /// Divisions that companions of a coverage mission made, in order of time.
+    /// Divisions that companions of a coverage mission agreed on, in order of time.
     pub divisions: Vec<Division>,
-    /// Simulated seconds.
+    /// Length of the simulated flight, seconds.
     pub simulated_s: f64,
-    /// Seconds of this machine's clock that the simulation took.
+    /// Time that the simulation took on this machine's clock, seconds.
     pub took_s: f64,
 }
 
-/// Flies a planned mission. `plan` is what the companions will ask for; every one of them gets its
-/// part of it.
+/// Simulates the flight of a planned mission, in real time if `realtime`. Each companion requests a
+/// plan and gets its vehicle's part of `plan`.
 pub fn fly(
     mission: &Mission,
     plan: &SwarmPlan,
@@ -92,7 +92,7 @@ pub fn fly(
     simulate(mission, plan, command, realtime, None, progress)
 }
 
-/// As `fly`, at the speed of the clock, with a ground station that looks on.
+/// As [`fly`], in real time, with a real ground station connected by `gateway`.
 ///
 /// # Errors
 /// The link to the ground station is gone.
@@ -121,9 +121,9 @@ struct SimulationRun<'a> {
     done: Vec<WaypointRange>,
     places: Vec<Point>,
     nearest_goal_m: Vec<f32>,
-    /// Simulated seconds.
+    /// Simulated time so far, seconds.
     t_s: f64,
-    /// When some vehicle that may fly was last seen to, seconds.
+    /// When some vehicle was last seen armed, or was still awaited, seconds.
     moved_s: f64,
     ends_at_s: f64,
 }
@@ -138,7 +138,7 @@ fn simulate(
 ) -> anyhow::Result<Flight> {
     let mut run = SimulationRun::new(mission, plan, gateway)?;
     let settings = &mission.scenario.simulation;
-    // The time of a board behind links is the clock's.
+    // A board behind links runs by its own clock, so the simulation runs in real time.
     let by_clock =
         mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
@@ -217,8 +217,8 @@ impl<'a> SimulationRun<'a> {
         );
         referee.terrain =
             scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
-        // Lanes of two vehicles may lie side by side: one waits for as long as the other is on
-        // them.
+        // Lanes of two vehicles may lie side by side, and one vehicle waits for as long as the
+        // other one is on its lanes: that is no deadlock.
         referee.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {
             mission,
@@ -270,7 +270,8 @@ impl<'a> SimulationRun<'a> {
                 let nearest_m = &mut self.nearest_goal_m[i];
                 *nearest_m = match plan.flights[i].task.goal() {
                     Some(_) => nearest_m.min(off.norm()),
-                    // The flight began where it ends: over its pad.
+                    // A flight over an area ends above its own pad, so the distance counts from its
+                    // return on.
                     None if off.xy().norm() > OFF_PAD_M => f32::INFINITY,
                     None => nearest_m.min(off.xy().norm()),
                 };
@@ -287,7 +288,7 @@ impl<'a> SimulationRun<'a> {
         Ok(())
     }
 
-    /// Sets the end of the simulation once no vehicle will move any more.
+    /// Sets the end of the simulation once no vehicle is expected to move any more.
     fn update_end(&mut self) {
         let (members, plan) = (&self.members, self.plan);
         let started = self.ground_station.is_started();
@@ -350,7 +351,7 @@ impl<'a> SimulationRun<'a> {
 
     fn vehicle_result(&self, i: usize) -> VehicleResult {
         let scenario = &self.mission.scenario;
-        // The vehicle cannot know of an error of its estimate.
+        // The vehicle cannot correct the error of its position estimate, so that is subtracted.
         let error_m = margins::max_estimate_error_m(
             scenario.simulation.estimator,
             scenario.vehicles[i].personality,
@@ -360,13 +361,13 @@ impl<'a> SimulationRun<'a> {
         vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
     }
 
-    /// Whether a vehicle flew to the end of its path and landed, if it flies.
+    /// Whether the vehicle flew to the end of its path and landed, or had no flight to make.
     fn has_completed_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
         !self.plan.flights[i].task.leaves_pad() || (vehicle.reached && vehicle.landed)
     }
 
-    /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row
-    /// of the table.
+    /// Whether a fault struck the vehicle and it has come to its end: without power, never taken
+    /// off, finished, or with its pilot.
     fn is_disabled_by_fault(&self, i: usize) -> bool {
         let member = &self.members[i];
         self.script.is_struck(i)
@@ -376,7 +377,8 @@ impl<'a> SimulationRun<'a> {
                 || is_left_to_pilot(member))
     }
 
-    /// Logs why links failed, and what the referee saw.
+    /// Logs the fault of the serial link of each vehicle that did not complete its task, and the
+    /// referee's incidents.
     fn log_losses(&mut self, result: &MissionResult) {
         let scenario = &self.mission.scenario;
         for (i, (member, vehicle)) in self.members.iter().zip(&result.vehicles).enumerate() {
@@ -396,19 +398,19 @@ impl<'a> SimulationRun<'a> {
     }
 }
 
-/// Whether a pilot has the vehicle: nobody knows for how long.
+/// Whether a pilot has, or has just given back, the vehicle: it may stay so for any time.
 fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
     matches!(member.state(), State::PilotControl | State::PilotReturned)
 }
 
-/// Result of planning on a roadmap with one bit changed.
+/// How planning fails on the roadmap file with one bit changed.
 fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
     let mut damaged = file.to_vec();
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     match RoadmapView::parse(&damaged) {
         Err(_) => Err(PlanFailure::NoRoadmap),
-        // The CRC sees every single bit.
+        // Not reached: the CRC detects every single changed bit.
         Ok(_) => Err(PlanFailure::Invalid),
     }
 }
@@ -423,7 +425,7 @@ fn vehicle_result(
     let reached = nearest_goal_m <= REACHED_M;
     let end = match (flight.task.leaves_pad(), member.state()) {
         (false, _) => "no goal".to_owned(),
-        // By its estimate the vehicle was at the goal.
+        // Its estimate was at the goal, its true position was not.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
         _ => member.describe_end(),
     };

@@ -1,4 +1,4 @@
-//! An emulated broadcast radio: range, loss and delay, packet by packet.
+//! An emulated broadcast radio of the swarm: range, loss and delay, packet by packet.
 
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -8,18 +8,18 @@ use rand_pcg::Pcg32;
 
 use super::serial::uniform_unit;
 
-/// Properties of the radio.
+/// Properties of the emulated radio.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadioConfig {
-    /// Distance beyond which nothing is heard, metres.
+    /// Distance of two stations beyond which they do not hear each other, metres.
     pub range_m: f32,
-    /// Probability that one receiver misses a packet.
+    /// Probability that a receiver misses a packet, for each receiver alone.
     pub loss: f64,
-    /// Time from sending to hearing, seconds.
+    /// Time from sending a packet to its reception, seconds.
     pub delay_s: f64,
 }
 
-/// Failures of a station.
+/// Which directions of a station's radio have failed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RadioOutage {
     /// The station sends nothing.
@@ -28,19 +28,19 @@ pub struct RadioOutage {
     pub rx: bool,
 }
 
-/// A radio shared by a number of stations; time in microseconds since the start of the simulation.
+/// A radio shared by several stations; time in microseconds since the start of the simulation.
 #[derive(Debug)]
 pub struct Radio {
     config: RadioConfig,
     rng: Pcg32,
     cuts: Vec<RadioOutage>,
     under_way: Vec<VecDeque<(u64, Rc<[u8]>)>>,
-    /// Packets that stations sent since the last call, if a gateway overhears.
+    /// Packets that stations sent since the last [`Self::take_recorded`]; `None`: not recorded.
     overheard: Option<Vec<Rc<[u8]>>>,
 }
 
 impl Radio {
-    /// A silent radio with `stations` receivers.
+    /// A radio with `stations` stations that has carried nothing yet.
     pub fn new(config: RadioConfig, stations: usize, seed: u64) -> Self {
         let under_way = (0..stations).map(|_| VecDeque::new()).collect();
         let cuts = vec![RadioOutage::default(); stations];
@@ -53,23 +53,24 @@ impl Radio {
         }
     }
 
-    /// Keeps the packets that stations send from now on, for [`Self::take_recorded`].
+    /// Records the packets that stations send from now on, for [`Self::take_recorded`].
     pub fn start_recording(&mut self) {
         self.overheard = Some(Vec::new());
     }
 
-    /// Packets that stations sent since the last call, at once and without loss.
+    /// Takes the packets that stations sent since the last call, without loss and delay; empty if
+    /// nothing is recorded.
     pub fn take_recorded(&mut self) -> Vec<Rc<[u8]>> {
         self.overheard.as_mut().map(core::mem::take).unwrap_or_default()
     }
 
-    /// Cuts a station off, or joins it again.
+    /// Sets which directions of a station's radio have failed: none by default.
     pub fn set_outage(&mut self, station: usize, cut: RadioOutage) {
         self.cuts[station] = cut;
     }
 
-    /// Sends a packet from a place to every other station; `from` is `None` for one that only sends
-    /// (the ground).
+    /// Broadcasts a packet to every other station in range of station `from`; from the ground
+    /// station (`None`) to all.
     pub fn broadcast(&mut self, now_us: u64, from: Option<usize>, places: &[Point], packet: &[u8]) {
         if from.is_some_and(|from| self.cuts[from].tx) {
             return;
@@ -88,7 +89,7 @@ impl Radio {
         }
     }
 
-    /// The next packet a station has heard by now.
+    /// The next packet that the station has received by `now_us`; `None` if there is none yet.
     pub fn receive(&mut self, now_us: u64, station: usize) -> Option<Rc<[u8]>> {
         let queue = &mut self.under_way[station];
         let heard = queue.front().is_some_and(|&(hears_us, _)| hears_us <= now_us);

@@ -1,10 +1,10 @@
-//! The referee: looks at the true motion at every physics step and knows nothing of what companions
-//! believe.
+//! The referee of a simulation: sees the true motion at every physics step, and nothing of what
+//! companions estimate or report but their progress.
 //!
 //! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the
-//! exact map; one that lasts counts once. While a vehicle takes off or lands, what lies below its
-//! centre is the floor it stands on and no wall. A wreck is an obstacle too: to touch it is a
-//! contact, to pass near it no violation.
+//! exact map; a contact that lasts counts once. While a vehicle takes off or lands, obstacle cells
+//! below its centre are the floor, no wall. A wreck is an obstacle too: to touch it is a contact,
+//! to pass near it no violation.
 
 use planner_core::Point;
 use planner_core::segment::point_clearance;
@@ -13,54 +13,54 @@ use planner_core::voxel::VoxelGrid;
 use crate::map::edt::ClearanceField;
 use crate::terrain::HeightGrid;
 
-/// Rounding of positions, metres: an overlap by less than this is no contact.
+/// Rounding of positions, metres: an overlap of less than this is no contact.
 const CONTACT_ROUNDING_M: f32 = 1e-3;
-/// Time without progress, while a path is left, that counts as a deadlock, seconds.
+/// Time without progress in flight that counts as a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
-/// Least movement along the path that counts as progress, metres.
+/// Least increase of arc length along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.1;
-/// Distance from its hover at which a vehicle that reports no progress has moved on, metres: more
-/// than it sways.
+/// Distance from its last place of progress at which a vehicle that reports no progress counts as
+/// moving, metres: more than it sways in hover.
 const OFF_HOVER_M: f32 = 1.0;
-/// Time between two recorded points, seconds.
+/// Time between two points of the recorded tracks and samples, seconds.
 const RECORD_EVERY_S: f64 = 0.2;
 
-/// Phase of a vehicle's flight, as the referee needs to know.
+/// Phase of a vehicle's flight, as far as the referee's rules differ by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// On the ground before or after its flight.
+    /// On the ground with motors off, before or after the flight.
     Grounded,
-    /// Between the ground and its path.
+    /// On the ground with motors on, or in the air off its path.
     TakeOffOrLanding,
-    /// On its path.
+    /// In the air on its path.
     Flying,
-    /// Falls without its motors.
+    /// Falls, its motors off.
     Falling,
-    /// Fell: an obstacle to the others from then on.
+    /// Lies on the ground after a fall: an obstacle to the others from then on.
     Wreck,
 }
 
-/// One vehicle at one step.
+/// What the referee sees of one vehicle at one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// Centre of the body, ENU metres.
     pub position: Point,
-    /// Phase of the vehicle.
+    /// Phase of the vehicle's flight.
     pub phase: Phase,
-    /// Whether it stands by order of a person.
+    /// Whether the vehicle stands still by command of operator or pilot.
     pub ordered: bool,
-    /// Arc length along its path, metres; without it any way flown is progress.
+    /// Arc length along its path, metres; `None`: moving by 1 m counts as progress instead.
     pub progress_m: Option<f32>,
 }
 
-/// Record of one time.
+/// Smallest distances of all vehicles since the sample before.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
     /// Seconds since the start of the simulation.
     pub t_s: f32,
-    /// Smallest distance of two centres, one of them off the ground; infinite without.
+    /// Smallest distance between two centres, not both on the ground, metres; else infinite.
     pub separation_m: f32,
-    /// Smallest distance of a flying centre to an obstacle; infinite without.
+    /// Smallest distance of a flying centre to an obstacle, metres; infinite if none was near.
     pub clearance_m: f32,
 }
 
@@ -71,8 +71,8 @@ struct WatchedVehicle {
     last: Option<Point>,
     flown_m: f64,
     in_contact: bool,
-    /// Place where the vehicle's distance to the nearest obstacle was last measured, and that
-    /// distance, metres.
+    /// Where the vehicle's distance to the nearest obstacle was last measured, and that distance,
+    /// metres.
     measured: Option<(Point, f32)>,
     best_progress_m: f32,
     progressed_at: Point,
@@ -81,12 +81,12 @@ struct WatchedVehicle {
     track: Vec<(f32, Point)>,
 }
 
-/// Counts what went wrong and remembers how near it came.
+/// Counts contacts, violations and deadlocks, and records the smallest distances.
 #[derive(Debug)]
 pub struct Referee<'a> {
     grid: VoxelGrid<'a>,
     field: &'a ClearanceField,
-    /// Uneven ground, of which the grid holds none.
+    /// Height of uneven ground, which the grid does not hold; `None` over level ground.
     pub terrain: Option<&'a HeightGrid>,
     safety_distance_m: f32,
     vehicles: Vec<WatchedVehicle>,
@@ -94,29 +94,29 @@ pub struct Referee<'a> {
     touching: Vec<bool>,
     recorded_s: f64,
     window: Sample,
-    /// Whether a standstill that ends was none: where faults strike, vehicles wait until it is
-    /// known what became of the one struck, and for their turn to fly around it.
+    /// Whether a deadlock that dissolves is taken back: where faults strike, vehicles wait until it
+    /// is known what became of the one struck, and for their turn to fly around it.
     pub waits_end: bool,
-    /// Spheres that are on no map: centre and radius, metres.
+    /// Spherical obstacles that are in no map: centre and radius, metres.
     pub obstacles: Vec<(Point, f32)>,
-    /// Bodies that reached into an obstacle.
+    /// Number of times that a body began to touch an obstacle.
     pub wall_contacts: u32,
-    /// Pairs that came nearer than the safety distance.
+    /// Number of times that a pair came nearer than the safety distance.
     pub violations: u32,
-    /// Vehicles that stood still in the air for too long.
+    /// Number of vehicles that made no progress in flight for 20 s.
     pub deadlocks: u32,
-    /// Smallest distance of a flying centre to an obstacle, metres.
+    /// Smallest distance of a flying centre to an obstacle in the whole flight, metres.
     pub min_clearance_m: f32,
-    /// Smallest distance of two centres, one of them off the ground, metres.
+    /// Smallest distance between two centres, not both on the ground, in the whole flight, metres.
     pub min_separation_m: f32,
-    /// Smallest distances over time.
+    /// Smallest distances over time, one sample each 0.2 s.
     pub samples: Vec<Sample>,
-    /// Incidents: seconds, vehicle, and text.
+    /// Contacts, violations and deadlocks: seconds, index of the vehicle, and text.
     pub incidents: Vec<(f64, usize, String)>,
 }
 
 impl<'a> Referee<'a> {
-    /// Watches vehicles with these ids and radii.
+    /// A referee for vehicles with these ids and radii (metres), in this order.
     pub fn new(
         grid: VoxelGrid<'a>,
         field: &'a ClearanceField,
@@ -158,7 +158,7 @@ impl<'a> Referee<'a> {
         }
     }
 
-    /// Checks all vehicles at one physics step.
+    /// Checks all vehicles at one physics step; each 0.2 s it records their positions.
     pub fn observe(&mut self, t_s: f64, seen: &[Observation]) {
         for (i, now) in seen.iter().enumerate() {
             self.watch_walls(i, t_s, now);
@@ -179,17 +179,17 @@ impl<'a> Referee<'a> {
         }
     }
 
-    /// Way flown by a vehicle, metres.
+    /// Length of the track that a vehicle has flown so far, metres.
     pub fn flown_m(&self, vehicle: usize) -> f64 {
         self.vehicles[vehicle].flown_m
     }
 
-    /// Recorded times and places of a vehicle.
+    /// Recorded track of a vehicle: times in seconds, positions in ENU metres.
     pub fn track(&self, vehicle: usize) -> &[(f32, Point)] {
         &self.vehicles[vehicle].track
     }
 
-    /// Whether a body in flight reaches into uneven ground: how high it is above it counts.
+    /// Whether a body in flight reaches into uneven ground; records its height above that too.
     fn reaches_ground(&mut self, place: &Point, radius_m: f32) -> bool {
         let Some(ground_m) = self.terrain.and_then(|terrain| terrain.height_at(&place.xy())) else {
             return false;
@@ -206,9 +206,9 @@ impl<'a> Referee<'a> {
         }
         let radius_m = self.vehicles[i].radius_m;
         let flying = now.phase == Phase::Flying;
-        // Only a distance that is a contact, or the smallest of its time, has to be exact.
+        // Only a clearance that means contact, or is the smallest of this sample, must be exact.
         let wanted = if flying { self.window.clearance_m.max(radius_m) } else { radius_m };
-        // A distance changes by no more than the way flown since it was measured.
+        // A clearance changes by no more than the distance flown since it was measured.
         let (at_least_m, at_most_m) = match self.vehicles[i].measured {
             Some((place, clearance_m)) => {
                 let moved_m = (now.position - place).norm() + CONTACT_ROUNDING_M;
@@ -248,7 +248,7 @@ impl<'a> Referee<'a> {
         }
     }
 
-    /// Whether a body on or near the floor touches something that is not below its centre.
+    /// Whether a body on or near the floor touches an obstacle cell whose top is above its centre.
     fn touches_beside(&self, position: &Point, radius_m: f32) -> bool {
         let shape = self.grid.shape();
         let reach = Point::repeat(radius_m);
@@ -316,7 +316,7 @@ impl<'a> Referee<'a> {
         self.min_separation_m = self.min_separation_m.min(self.window.separation_m);
     }
 
-    /// A wreck is no neighbour to keep the safety distance from, but an obstacle not to touch.
+    /// A vehicle need not keep the safety distance from a wreck; touching one is a wall contact.
     fn watch_wreck(&mut self, t_s: f64, flier: usize, wreck: usize, phase: Phase, apart_m: f32) {
         let pair = flier.max(wreck) * self.vehicles.len() + flier.min(wreck);
         let touches = apart_m < self.vehicles[flier].radius_m + self.vehicles[wreck].radius_m;
@@ -331,7 +331,7 @@ impl<'a> Referee<'a> {
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
-        // Progress does not fall: it is that along another path.
+        // Progress falls only because it now counts along another path.
         let anew =
             now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
         if let Some(progress_m) = anew {
@@ -368,7 +368,7 @@ fn no_progress() -> String {
     format!("no progress for {DEADLOCK_S} s")
 }
 
-/// Greatest clearance that is measured, metres.
+/// Greatest clearance to an obstacle that is measured exactly, metres.
 const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
 const NOTHING: Sample =
     Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };

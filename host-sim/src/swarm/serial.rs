@@ -1,29 +1,29 @@
-//! An emulated serial link, one direction: baud rate, latency, corruption and stalls.
+//! One direction of an emulated serial link: baud rate, latency, corruption and stalls.
 //!
-//! A byte takes ten bit times (8N1). What does not fit the transmit buffer is lost, as on a UART
-//! without flow control.
+//! A byte takes ten bit times (8N1). A write that does not fit the transmit buffer is lost, as on a
+//! UART without flow control.
 
 use std::collections::VecDeque;
 
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-/// Properties of a link.
+/// Properties of an emulated serial link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SerialConfig {
     /// Bits per second.
     pub baud: u32,
-    /// Time from the last bit sent to its byte being read, seconds.
+    /// Time from a byte's last bit to the moment the receiver can read it, seconds.
     pub latency_s: f64,
-    /// Probability that a byte arrives changed.
+    /// Probability that a byte arrives with one bit changed.
     pub corruption: f64,
-    /// Transmit buffer, bytes.
+    /// Size of the transmit buffer, bytes.
     pub buffer: usize,
 }
 
-/// Share of bytes lost, or of writes damaged, above which the link explains a failure.
+/// Share of bytes lost, or of writes damaged, above which the link is named as a cause of failure.
 const EXPLAINING_SHARE: f64 = 0.02;
-/// The usual rates of lines, bits per second.
+/// The usual baud rates, bits per second.
 const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
 
 /// One direction of a serial link; time in microseconds since the start of the simulation.
@@ -33,21 +33,21 @@ pub struct SerialLink {
     rng: Pcg32,
     busy_until_us: u64,
     bytes: VecDeque<u8>,
-    /// Arrival time and length of each write still under way.
+    /// Time of arrival (microseconds) and length of each write under way.
     writes: VecDeque<(u64, usize)>,
     stalled_until_us: u64,
-    /// Bytes that were to be sent.
+    /// Bytes given to [`Self::write`] so far.
     pub offered: u64,
-    /// Bytes lost to a full buffer.
+    /// Bytes lost so far because the transmit buffer was full.
     pub overrun: u64,
-    /// Writes, and those of which a byte was changed.
+    /// Number of writes so far, lost ones included.
     pub writes_sent: u64,
-    /// See `writes_sent`.
+    /// Number of writes so far of which a byte was changed.
     pub writes_damaged: u64,
 }
 
 impl SerialLink {
-    /// An idle link; `seed` and `stream` choose its corruption.
+    /// An idle link; `seed` and `stream` choose its sequence of random numbers.
     pub fn new(config: SerialConfig, seed: u64, stream: u64) -> Self {
         Self {
             config,
@@ -63,7 +63,8 @@ impl SerialLink {
         }
     }
 
-    /// Fault of the link over `lasted_s` seconds, if any, and a remedy.
+    /// What was wrong with the link in `lasted_s` seconds, and a remedy, as text; `None` if
+    /// nothing.
     pub fn describe_fault(&self, lasted_s: f64) -> Option<String> {
         let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         let lost = share(self.overrun, self.offered);
@@ -92,7 +93,7 @@ impl SerialLink {
         })
     }
 
-    /// Sends bytes.
+    /// Sends bytes as one write; all of them are lost if they do not fit the transmit buffer.
     pub fn write(&mut self, now_us: u64, data: &[u8]) {
         self.offered += data.len() as u64;
         self.writes_sent += 1;
@@ -118,7 +119,7 @@ impl SerialLink {
         }
     }
 
-    /// Moves what has arrived by now into `out` (cleared first).
+    /// Replaces the content of `out` by the bytes that have arrived by `now_us`.
     pub fn read(&mut self, now_us: u64, out: &mut Vec<u8>) {
         out.clear();
         while let Some((_, bytes)) = self.next_by(now_us) {
@@ -126,8 +127,9 @@ impl SerialLink {
         }
     }
 
-    /// Takes the next write whose last byte arrives by `until_us`: its time of arrival, which may
-    /// be in the future, and its bytes.
+    /// Takes the next write whose last byte arrives by `until_us`: its time of arrival and its
+    /// bytes. `until_us` may be in the future; `None` if there is none, or the link is stalled
+    /// then.
     pub fn next_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
         let &(arrives_us, length) = self.writes.front()?;
         if arrives_us > until_us || until_us < self.stalled_until_us {
@@ -137,7 +139,7 @@ impl SerialLink {
         Some((arrives_us.max(self.stalled_until_us), self.bytes.drain(..length).collect()))
     }
 
-    /// Sets the share of bytes that arrive corrupted.
+    /// Sets the probability that a byte arrives changed.
     pub fn set_corruption(&mut self, corruption: f64) {
         self.config.corruption = corruption;
     }
@@ -148,7 +150,7 @@ impl SerialLink {
     }
 }
 
-/// A uniform number in 0…1.
+/// A uniformly distributed random number from 0 to below 1.
 pub fn uniform_unit(rng: &mut Pcg32) -> f64 {
     f64::from(rng.next_u32()) / (f64::from(u32::MAX) + 1.0)
 }

@@ -1,6 +1,6 @@
-//! The step of the simulation.
+//! The time step of the simulation.
 
-/// Physics step, seconds; the autopilot's own step.
+/// Time step of the simulation, seconds: one physics step of the simulated autopilot.
 pub const STEP_S: f32 = 0.004;
-/// Physics step, microseconds.
+/// Time step of the simulation, microseconds.
 pub const STEP_US: u64 = 4_000;

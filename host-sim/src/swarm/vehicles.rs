@@ -1,5 +1,5 @@
-//! The vehicles of a simulation: what the scenario says of each becomes a simulated autopilot and a
-//! companion's settings.
+//! Makes the vehicles of a simulation: for each vehicle of the scenario a simulated autopilot and
+//! the settings of its companion.
 
 use companion::Config;
 use companion::config::REACHES_ALL_M;
@@ -15,15 +15,15 @@ use crate::flash::DeskFlash;
 use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
 use crate::scenario::Companion;
 
-/// Default range of a simulated radio, metres: a radio of this range reaches every vehicle.
+/// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
 const DEFAULT_RANGE_M: f32 = 500.0;
-/// Least radio range that a companion may be given, metres.
+/// Least radio range that a companion's settings may have, metres.
 const MIN_RANGE_M: f32 = 1.0;
 
-/// The vehicles of a mission, each on its pad, in the order of the scenario.
+/// The vehicles of a mission on their pads, in the order of the scenario.
 ///
 /// # Errors
-/// The configuration of a vehicle names what is wrong.
+/// Names the vehicle's setting that is wrong.
 pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicle>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
@@ -51,7 +51,7 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
                 system_id: vehicle.id,
                 autopilot: vehicle.personality,
                 world_origin: scenario.map.origin,
-                // EKF origin where the autopilot was switched on, unless the scenario says
+                // The EKF origin is where the autopilot was switched on, unless the scenario says
                 // otherwise: no two vehicles share it.
                 ekf_origin: vehicle
                     .ekf_origin
@@ -67,7 +67,7 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
                 ..autopilot::Config::default()
             };
             if vehicle.ekf_origin.is_none() {
-                // The receiver set it, with the error that its heights have.
+                // The GNSS receiver set this origin, so it has the receiver's height error.
                 config.ekf_origin.alt_m += f64::from(config.height_error_m());
             }
             let companion = companion_config(mission, vehicle.id)?;
@@ -91,17 +91,18 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
         .collect()
 }
 
-/// The settings of the companion of one vehicle: the mission file's, with the scenario's fence,
-/// method and radio range; the same whether it runs in a swarm simulation or alone.
+/// Settings of one vehicle's companion: those of the mission file, with the scenario's fence,
+/// method and radio range; the same in a swarm simulation and for a companion alone.
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().companion_config(id);
     let config =
         config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
-    // One plan may be flown by other rules and inside another fence than its mission file says.
+    // The same plan may be flown by another method and inside another fence than its file has.
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
-    // The operator knows how far the radio reaches.
+    // The operator sets this radio range; from 500 m on, radio silence is never explained by
+    // distance.
     let radio_range_m = match scenario.simulation.radio_range_m {
         range_m if range_m < DEFAULT_RANGE_M => range_m.max(MIN_RANGE_M),
         _ => REACHES_ALL_M,

@@ -1,5 +1,5 @@
-//! ESRI ASCII grids: six lines of a header, then heights row by row from the north. The format has
-//! no place for units: metres. A `.prj` beside the file says where its numbers are.
+//! Reads ESRI ASCII grids: a header, then heights row by row from the north. The format states no
+//! units: heights are metres. A `.prj` file beside the grid has its coordinate system.
 
 use std::path::Path;
 

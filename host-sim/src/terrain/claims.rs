@@ -1,18 +1,20 @@
-//! What a point cloud says of its own sizes, before its readers believe it: they take memory by it.
+//! Checks the sizes that a point cloud states of its parts before its readers allocate memory for
+//! them.
 //!
-//! LAS 1.4 specification, R15: the header, and records behind it of 54 bytes and behind the returns
-//! of 60; LAZ: a table of chunks, whose place stands before the returns or, where it could not, at
-//! the end of the file, and layers in each chunk.
+//! LAS 1.4 specification, R15: the header, variable length records behind it with headers of 54
+//! bytes, and extended ones behind the returns with headers of 60. LAZ: a table of chunks, whose
+//! offset stands before the returns or, where it could not be written there, at the end of the
+//! file, and layers in each chunk.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Most chunks of a compressed cloud: 64 MB of entries.
+/// Most chunks of a compressed cloud: 64 MB of table entries.
 const MAX_CHUNKS: u32 = 1 << 22;
-/// Number of the record that names the compressor.
+/// Record id of the variable length record that describes the LAZ compressor.
 const COMPRESSOR_RECORD: u64 = 22204;
 
-/// Whether no size that a reader would take memory for is beyond the file. It reads from the
-/// beginning again.
+/// Checks that no size for which a reader would take memory reaches beyond the file's end; the
+/// inner error says which does. Leaves the file at its beginning.
 pub(super) fn check_declared_sizes<R: Read + Seek>(
     file: &mut R,
 ) -> io::Result<Result<(), &'static str>> {
@@ -22,14 +24,15 @@ pub(super) fn check_declared_sizes<R: Read + Seek>(
     Ok(outcome)
 }
 
-/// Numbers of a file, at their places.
+/// Reads little-endian numbers at byte offsets of a file.
 struct Numbers<'a, R> {
     file: &'a mut R,
     length: u64,
 }
 
 impl<R: Read + Seek> Numbers<'_, R> {
-    /// A number of so many bytes; 0 beyond the end, which readers find themselves.
+    /// The number of `bytes` bytes at offset `at`; 0 beyond the end, which the cloud's readers
+    /// detect.
     fn read_number(&mut self, at: u64, bytes: u64) -> io::Result<u64> {
         if at.checked_add(bytes).is_none_or(|end| end > self.length) {
             return Ok(0);
@@ -40,8 +43,8 @@ impl<R: Read + Seek> Numbers<'_, R> {
         Ok(u64::from_le_bytes(number))
     }
 
-    /// The bytes of a chunk's first return, and its layers, as the record of the compressor has
-    /// them: none where chunks have no layers.
+    /// Length of a chunk's first return, bytes, and number of layers of a chunk, from the
+    /// compressor's record; `None` if its chunks have no layers.
     fn read_layers(&mut self) -> io::Result<Option<(u64, u64)>> {
         let (mut at, count) = (self.read_number(94, 2)?, self.read_number(100, 4)?);
         for _ in 0..count.min(self.length / 54) {
@@ -108,7 +111,7 @@ fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(
     let Some((first, layers)) = numbers.read_layers()? else { return Ok(Ok(())) };
     let mut at = returns_at + 8;
     while at < table_at {
-        // A return, a count, the size of each layer, the layers.
+        // A chunk: its first return, a count, the size of each layer, then the layers.
         let sizes_at = at + first + 4;
         at = sizes_at + 4 * layers;
         for layer in 0..layers {

@@ -1,7 +1,7 @@
-//! Point clouds: the highest return of a cell.
+//! Reads point clouds (LAS, LAZ): each cell of the grid gets the highest return in it.
 //!
-//! Cells hold four returns on average, so that few have none; those between others take the highest
-//! near them. Returns that are marked as noise or withheld do not count.
+//! Cells are so large that they hold four returns on average, so that few are empty; an empty cell
+//! between others gets the highest height near it. Returns classified as noise do not count.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
@@ -20,15 +20,15 @@ use super::{claims, guard};
 use crate::files;
 
 const FORMAT: &str = "a point cloud";
-/// Mean number of returns in a cell.
+/// Mean number of returns in a cell, from which the cell's side follows.
 const RETURNS_PER_CELL: f64 = 4.0;
-/// Least side of a cell, metres.
+/// Least side of a cell of the grid, metres.
 const MIN_CELL_M: f64 = 0.5;
-/// Most cells without returns that are bridged.
+/// Widest gap of empty cells, to either side, that is filled from cells with heights.
 const BRIDGED_CELLS: usize = 3;
-/// Returns read at a time.
+/// Number of returns decoded at a time.
 const RETURNS_PER_BATCH: u64 = 4096;
-/// Classes of returns that are errors: low points and high noise.
+/// Classification codes of returns that are errors: low points and high noise.
 const NOISE_CLASSES: [u8; 2] = [7, 18];
 
 pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
@@ -85,8 +85,8 @@ where
     Ok(grid)
 }
 
-/// Coordinate system of the file's numbers, and metres in a unit of height: heights without a unit
-/// of their own are in that of the places.
+/// The cloud's coordinate system, and metres in its unit of height: without a unit of their own,
+/// heights are in the unit of the coordinates.
 fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
     let record = |id: u16| {
         let found = header
@@ -114,7 +114,7 @@ fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
     Ok((crs, unit_m))
 }
 
-/// The grid that returns fall into.
+/// An empty grid over the cloud's extent, or over the frame's window.
 fn empty_grid(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
     let bounds = header.bounds();
     let (low, high) = ([bounds.min.x, bounds.min.y], [bounds.max.x, bounds.max.y]);
@@ -131,7 +131,7 @@ fn empty_grid(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGri
         .sqrt()
         .max(MIN_CELL_M);
     let cell_m = cell_m as f32;
-    // The last return is in a cell too.
+    // Half a cell more on each side, so that the last return is in a cell too.
     let half = Flat::repeat(cell_m / 2.0);
     let window =
         frame.window.map_or([low - half, high + half], |window| widened_window(window, cell_m));

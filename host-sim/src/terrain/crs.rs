@@ -1,4 +1,4 @@
-//! Coordinate systems: from a file's numbers to the mission frame and back.
+//! Coordinate systems: conversion of a file's coordinates to the mission frame and back.
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -8,12 +8,12 @@ use proj4rs::transform::transform;
 
 use super::error::{TerrainError, WARP_HINT};
 
-/// Metres in a foot.
+/// Metres in an international foot.
 pub(super) const FOOT_M: f64 = 0.3048;
-/// Metres in a foot of the US survey.
+/// Metres in a US survey foot.
 pub(super) const US_FOOT_M: f64 = 1200.0 / 3937.0;
 
-/// Coordinate system of a file's numbers.
+/// Coordinate system of a file's coordinates.
 #[derive(Debug)]
 pub(super) enum Crs {
     /// The file does not state one.
@@ -22,17 +22,17 @@ pub(super) enum Crs {
     Said(Box<System>),
 }
 
-/// A coordinate system.
+/// A coordinate system that a file states.
 #[derive(Debug)]
 pub(super) struct System {
     own: Proj,
     wgs84: Proj,
-    /// Metres in a unit of length across; none of degrees.
+    /// Metres in a unit of its horizontal coordinates; `None` if these are degrees.
     pub unit_m: Option<f64>,
 }
 
 impl System {
-    /// The system by its number in the EPSG register.
+    /// The system with this code in the EPSG register.
     pub(super) fn epsg(code: u16) -> Result<Self, TerrainError> {
         let name = format!("EPSG:{code}");
         let Some(found) = crs_definitions::from_code(code) else {
@@ -41,11 +41,11 @@ impl System {
         Self::proj(found.proj4, &name)
     }
 
-    /// Written out.
+    /// The system that well-known text (WKT) describes.
     pub(super) fn wkt(text: &str) -> Result<Self, TerrainError> {
         let name: String = text.split('"').nth(1).unwrap_or("an unnamed system").to_owned();
         let unusable = || TerrainError::system(&name);
-        // The system of heights stands beside that of places: only the latter is parsed.
+        // Only the horizontal system is parsed; the vertical one may stand beside it.
         let start = ["PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOGCS", "GEOGCRS", "GEODCRS"];
         let start = start.iter().find_map(|word| text.find(word)).ok_or_else(unusable)?;
         let proj = proj4wkt::wkt_to_projstring(up_to_closing_bracket(&text[start..]))
@@ -55,7 +55,7 @@ impl System {
 
     fn proj(definition: &str, name: &str) -> Result<Self, TerrainError> {
         let unusable = || TerrainError::system(name);
-        // A shift by a grid that is not here would be left out in silence.
+        // The library would silently leave out a datum shift by a grid file that it does not have.
         if ["+datum=NAD27", "+nadgrids=@", "+geoidgrids"]
             .iter()
             .any(|shift| definition.contains(shift))
@@ -95,7 +95,7 @@ impl System {
 }
 
 impl Crs {
-    /// Refuses what cannot be placed.
+    /// Refuses a file without a coordinate system, unless the mission's own coordinates are metres.
     pub(super) fn check(&self, metres: bool) -> Result<(), TerrainError> {
         match self {
             Self::Unsaid if !metres => Err(TerrainError::Nowhere(
@@ -106,8 +106,8 @@ impl Crs {
         }
     }
 
-    /// Metres in a unit of height, where the file gives heights no unit of their own: the unit
-    /// across, or metres beside degrees.
+    /// Metres in a unit of height if the file gives heights no unit of their own: the unit of its
+    /// horizontal coordinates, or metres if these are degrees.
     pub(super) fn height_unit_m(&self) -> f64 {
         match self {
             Self::Unsaid => 1.0,
@@ -115,7 +115,8 @@ impl Crs {
         }
     }
 
-    /// A place in the mission frame, metres; none where the system does not reach.
+    /// A file's coordinates as a place in the mission frame, metres; `None` outside the system's
+    /// domain.
     pub(super) fn to_mission(&self, origin: &Geodetic, place: [f64; 2]) -> Option<Flat> {
         match self {
             Self::Unsaid => Some(Flat::new(place[0] as f32, place[1] as f32)),
@@ -127,13 +128,13 @@ impl Crs {
         }
     }
 
-    /// The file's numbers of a place in the mission frame.
+    /// A place in the mission frame as the file's coordinates; `None` outside the system's domain.
     pub(super) fn of_mission(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
         match self {
             Self::Unsaid => Some([f64::from(place.x), f64::from(place.y)]),
             Self::Said(system) => {
-                // At the origin's altitude there, not on the plane that touches the earth at the
-                // origin.
+                // The place at the origin's altitude there, not on the plane that touches the earth
+                // at the origin: found in three iterations.
                 let mut up_m = 0.0;
                 let mut found = *origin;
                 for _ in 0..3 {
@@ -146,7 +147,7 @@ impl Crs {
     }
 }
 
-/// Metres in a unit, by its number in the EPSG register.
+/// Metres in the unit with this EPSG code.
 pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
     match code {
         9001 => Ok(1.0),
@@ -158,7 +159,7 @@ pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
     }
 }
 
-/// Metres in a unit of height, as well-known text says it: none where it says nothing.
+/// Metres in a unit of height, as well-known text states it; `None` if it states none.
 pub(super) fn wkt_height_unit_m(text: &str) -> Option<f64> {
     let start = ["VERT_CS", "VERTCS", "VERTCRS"].iter().find_map(|word| text.find(word))?;
     let part = up_to_closing_bracket(&text[start..]);
@@ -166,7 +167,7 @@ pub(super) fn wkt_height_unit_m(text: &str) -> Option<f64> {
     unit.split(',').nth(1)?.trim_matches([']', ' ']).parse().ok()
 }
 
-/// A text up to the bracket that closes its first one.
+/// The text up to the bracket that closes its first bracket.
 fn up_to_closing_bracket(text: &str) -> &str {
     let mut depth = 0;
     for (at, c) in text.char_indices() {

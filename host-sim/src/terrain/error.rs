@@ -1,50 +1,50 @@
-//! Reason why a file gives no heights.
+//! Reason why a file gives no heights of the ground.
 
 use thiserror::Error;
 
 use super::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted;
 
-/// Reason why a file gives no heights.
+/// Reason why a file gives no heights of the ground.
 #[derive(Debug, Error)]
 pub enum TerrainError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Read(#[from] std::io::Error),
-    /// The file is longer than is read.
+    /// The file is longer than [`MAX_BYTES`].
     #[error("cannot be read: it has {0} bytes, at most {MAX_BYTES} are read")]
     TooLong(u64),
-    /// The file's name says nothing about its format.
+    /// The file's name ends in none of the known formats.
     #[error("is in no known format: its name ends in none of .asc, .tif, .tiff, .las, .laz")]
     Format,
-    /// The file is not what its name says.
+    /// The file's content is not in the format of its name.
     #[error("is not {format}: {why}")]
     Malformed {
-        /// Format by the file's name.
+        /// Format that the file's name stands for.
         format: &'static str,
-        /// Fault of the file.
+        /// What is wrong with the content.
         why: String,
     },
-    /// The file's coordinate system cannot be used.
+    /// The file's coordinate system, or unit, cannot be used.
     #[error("is in {what}, which cannot be used; {hint}")]
     System {
-        /// Coordinate system that the file states.
+        /// The coordinate system or unit that the file states.
         what: String,
         /// Remedy.
         hint: &'static str,
     },
-    /// The file does not state its place.
+    /// The file states no coordinate system or no position; the text is a remedy.
     #[error("does not say where it is; {0}")]
     Nowhere(&'static str),
-    /// The file has too many cells, or the box would have.
+    /// The file has more cells than [`MAX_CELLS`], or the requested box would have.
     #[error("has {0} cells here; at most {MAX_CELLS} are held")]
     TooManyCells(u128),
-    /// The requested box has no height.
+    /// The file has no height in the requested box.
     #[error("has no height here: {0} lies elsewhere, or holds none")]
     Elsewhere(String),
 }
 
-/// Hint of an error about a coordinate system.
+/// Remedy for a coordinate system that cannot be used.
 pub(super) const WARP_HINT: &str =
     "convert it: gdalwarp -t_srs EPSG:32630, with your zone, or pdal translate";
 

@@ -1,8 +1,8 @@
-//! The field that vehicles follow, made of a height map: `field.bin`.
+//! Makes the height field that vehicles follow from a height map: `field.bin`.
 //!
-//! A node is the highest ground within [`READ_AROUND_SAMPLE_CELLS`] of a cell and of what a vehicle
-//! may be beside its path; then nodes are raised until none is steeper than vehicles climb and
-//! descend at cruise speed. All of the box must have heights.
+//! A node has the height of the highest ground within [`READ_AROUND_SAMPLE_CELLS`] cells of it and
+//! the distance that a vehicle may be beside its path. Then nodes are raised until no slope is
+//! steeper than vehicles climb and descend at cruise speed. The whole box must have heights.
 
 use planner_core::coverage::Flat;
 use planner_core::field::{self, FieldShape, HEIGHT_STEP_M, MAX_NODES};
@@ -10,59 +10,60 @@ use thiserror::Error;
 
 use super::grid::HeightGrid;
 
-/// Reach of heights read around a path, in cells: samples of the path are half a cell apart, and
-/// the nodes of a sample lie within one cell of the sample.
+/// How far from a point on a path heights matter to it, in cells: samples of the path are half a
+/// cell apart, and the nodes of a sample lie within one cell of the sample.
 pub const READ_AROUND_SAMPLE_CELLS: f32 = 1.5;
-/// Least side of a cell, metres.
+/// Least distance between two nodes, metres.
 const MIN_CELL_M: f32 = 2.0;
-/// Height steps by which neighbouring nodes may differ at the least: fewer would round the slope
-/// away.
+/// Least number of height steps by which neighbouring nodes must be allowed to differ: with fewer,
+/// rounding would distort the slope.
 const MIN_RISE_STEPS: f32 = 5.0;
 
-/// Reason why there is no field.
+/// Reason why no field can be made.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
-    /// The map has no height at this place, metres east and north.
+    /// The map has no height near this place, metres east and north.
     #[error("it has no height at [{0:.0}, {1:.0}], metres east and north of the origin")]
     Hole(f32, f32),
-    /// A height does not fit into the file.
+    /// This height, metres, does not fit into the file.
     #[error("a height of {0:.0} m is more than 3276 m from the mission's origin")]
     High(f32),
-    /// The box has no nodes.
+    /// The box cannot be covered with at most [`MAX_NODES`] nodes.
     #[error("the area is too large or too small for it")]
     Shape,
 }
 
-/// Inputs of a field, beside the heights.
+/// Inputs of a field besides the height map.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldConfig {
-    /// The box that is flown over, metres.
+    /// The box that is flown over: least and greatest corner, metres.
     pub area: [Flat; 2],
-    /// Greatest distance of a vehicle beside its path, metres.
+    /// Greatest distance of a vehicle from its path to the side, metres.
     pub reach_m: f32,
-    /// Metres up or down for each metre over ground, at most.
+    /// Steepest slope of the field, metres of height a metre over ground.
     pub slope: f32,
 }
 
 impl FieldConfig {
-    /// Distance beyond the box within which heights are read where nodes are `cell_m` apart,
-    /// metres.
+    /// How far around a node heights count for it, metres: `cell_m` is the distance of the nodes,
+    /// `own_cell_m` that of the map's cells.
     fn around_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
-        // A height map's cell holds what is within one of its cells.
+        // A height in a cell of the map may come from up to one cell beside it.
         READ_AROUND_SAMPLE_CELLS * cell_m + self.reach_m + own_cell_m
     }
 
-    /// Distance from node to node over a map of fine cells, metres.
+    /// Distance between nodes, metres, unless the map's cells are larger.
     fn least_cell_m(&self) -> f32 {
         let sides = self.area[1] - self.area[0];
         let rise = MIN_RISE_STEPS * HEIGHT_STEP_M * std::f32::consts::SQRT_2 / self.slope;
         let fits = (sides.x * sides.y / (MAX_NODES as f32 * 0.9)).sqrt();
-        // A long and narrow box has a border of nodes more.
+        // In a long and narrow box the nodes on the border count.
         let long = sides.amax() / (MAX_NODES as f32 / 8.0);
         MIN_CELL_M.max(rise).max(fits).max(long)
     }
 
-    /// The box of heights that a field needs, but for the map's cells that are read around any box.
+    /// The box in which the field needs heights, without the cells that a reader adds around any
+    /// box.
     pub fn window(&self) -> [Flat; 2] {
         let beyond =
             Flat::repeat((READ_AROUND_SAMPLE_CELLS + 1.0) * self.least_cell_m() + self.reach_m);
@@ -70,10 +71,10 @@ impl FieldConfig {
     }
 }
 
-/// The bytes of the field.
+/// Makes the field as bytes of its file.
 ///
 /// # Errors
-/// The map has a hole there, or heights that do not fit.
+/// The map has a hole in the window, or heights that do not fit into the file.
 pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldError> {
     let cell_m = config.least_cell_m().max(grid.cell_m());
     let [low, high] = config.area;
@@ -101,7 +102,7 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
             nodes_dm.push(node_dm as i16);
         }
     }
-    // Along one of the axes: a slope across both is steeper by the square root of two.
+    // Limit along one axis: a slope across both is steeper by the square root of two.
     let most = (config.slope * cell_m / std::f32::consts::SQRT_2 / HEIGHT_STEP_M + 1e-3) as i32;
     limit_slope(&mut nodes_dm, columns, most.clamp(1, i32::from(i16::MAX)));
     let mut bytes = vec![0; shape.encoded_len()];
@@ -109,8 +110,8 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Raises nodes until no two beside each other differ by more than `most`: a distance transform, in
-/// two passes.
+/// Raises nodes until no two neighbours in a row or column differ by more than `most` height steps:
+/// a distance transform in two passes.
 fn limit_slope(nodes_dm: &mut [i16], columns: usize, most: i32) {
     let raise = |nodes_dm: &mut [i16], own: usize, other: usize| {
         let least = (i32::from(nodes_dm[other]) - most).max(i32::from(i16::MIN)) as i16;

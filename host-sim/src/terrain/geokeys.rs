@@ -1,4 +1,4 @@
-//! The keys by which GeoTIFF, and point clouds before LAS 1.4, say where their numbers are.
+//! GeoKeys: how GeoTIFF, and point clouds before LAS 1.4, state their coordinate system.
 
 use super::crs::{Crs, System, unit_m};
 use super::error::{TerrainError, WARP_HINT};
@@ -10,24 +10,24 @@ const PROJECTED: u16 = 3072;
 const LENGTH_UNIT: u16 = 3076;
 const VERTICAL: u16 = 4096;
 const HEIGHT_UNIT: u16 = 4099;
-/// "Written out in other keys".
+/// Value of a key whose system is user-defined, by other keys.
 const OWN: u16 = 32767;
-/// Heights above sea level in metres, as countries and the earth have them.
+/// EPSG codes of vertical systems, national and global, with heights above sea level in metres.
 const METRES: [u16; 18] = [
     3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647,
     7837, 9274,
 ];
-/// Heights above sea level in feet, international and of the US survey.
+/// EPSG codes of vertical systems in feet: international here, US survey below.
 const FEET: [u16; 1] = [8228];
 const US_FEET: [u16; 1] = [6360];
 
-/// Values of the keys.
+/// The GeoKeys of a file: id and value.
 #[derive(Debug)]
 pub(super) struct GeoKeys(Vec<(u16, u16)>);
 
 impl GeoKeys {
-    /// The keys of the directory: four numbers, then four a key. Keys whose values stand elsewhere
-    /// are passed over: none of those used do.
+    /// Reads the key directory: four numbers, then four a key. Keys whose values stand in another
+    /// tag are skipped: none of those used do.
     pub(super) fn new(directory: &[u16]) -> Self {
         let entries = directory.chunks_exact(4).skip(1);
         Self(entries.filter(|entry| entry[1] == 0).map(|entry| (entry[0], entry[3])).collect())
@@ -37,12 +37,12 @@ impl GeoKeys {
         self.0.iter().find(|(own, _)| *own == key).map(|(_, value)| *value)
     }
 
-    /// Whether a raster's place is that of its first cell's middle.
+    /// Whether a raster's coordinates are those of its cells' centres, not corners.
     pub(super) fn is_pixel_point(&self) -> bool {
         self.get(RASTER) == Some(2)
     }
 
-    /// The coordinate system. One that is written out in keys is in `wkt` too, or not used.
+    /// The coordinate system. A user-defined one is read from `wkt`, and refused without it.
     pub(super) fn crs(&self, wkt: Option<&str>) -> Result<Crs, TerrainError> {
         let (projected, geographic) = (self.get(PROJECTED), self.get(GEOGRAPHIC));
         let system = match (self.get(MODEL), projected, geographic) {
@@ -67,7 +67,7 @@ impl GeoKeys {
         Ok(Crs::Said(Box::new(system)))
     }
 
-    /// Metres in a unit of height, where the keys say it.
+    /// Metres in a unit of height; `None` if the keys do not state it.
     pub(super) fn height_unit_m(&self) -> Result<Option<f64>, TerrainError> {
         if let Some(code) = self.get(HEIGHT_UNIT) {
             return unit_m(code).map(Some);

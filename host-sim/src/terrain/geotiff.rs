@@ -1,4 +1,4 @@
-//! GeoTIFF: one band of heights, in strips or tiles, raw, deflate or LZW.
+//! Reads GeoTIFF: one band of heights, in strips or tiles, raw, deflate or LZW.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
@@ -16,7 +16,7 @@ use super::raster::Raster;
 use crate::files;
 
 const FORMAT: &str = "a GeoTIFF";
-/// Longest strip or tile, bytes.
+/// Longest strip or tile that is decoded, bytes.
 const MAX_CHUNK: usize = 1 << 27;
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
@@ -106,12 +106,12 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     Ok(Raster { crs, columns, rows, corner, cell, heights_m })
 }
 
-/// A float's missing value is written in decimals.
+/// Whether a value means "no height"; as decimal text that marker may not equal its float exactly.
 fn is_missing_value(value: f64, missing: f64) -> bool {
     value == missing || value as f32 == missing as f32
 }
 
-/// Place of the first cell's corner, and the size of cells.
+/// Coordinates of the first cell's outer corner, and the sides of cells, in the file's units.
 fn georeference<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     points: bool,

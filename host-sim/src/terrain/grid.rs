@@ -1,36 +1,37 @@
-//! Heights in the mission frame: cells of a grid, each with one height or none.
+//! Heights of the ground in the mission frame: cells of a grid, each with one height or none.
 
 use planner_core::coverage::Flat;
 
 use super::error::TerrainError;
 use super::limits::MAX_CELLS;
 
-/// Heights of the ground. Cell (0, 0) has the least east and north.
+/// Heights of the ground in the mission frame. Cell (0, 0) is the south-western one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightGrid {
     low: Flat,
     cell_m: f32,
     size: [usize; 2],
-    /// Row by row, metres; NaN in holes.
+    /// Height of each cell, metres, row by row from the south; NaN: no height.
     heights_m: Vec<f32>,
-    /// Likewise, what the file has at the middle of each cell; empty where that is the same.
+    /// The file's own height at the centre of each cell, in that order; empty if it equals
+    /// `heights_m`.
     middles_m: Vec<f32>,
 }
 
-/// Content of the cells of a box.
+/// Greatest height in the cells of a box, and whether any cell has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heights {
-    /// The greatest height, metres, where there is one.
+    /// The greatest height, metres; `None` if no cell has a height.
     pub highest_m: Option<f32>,
-    /// Whether a cell has none, or the box is wider than the grid.
+    /// Whether a cell has no height, or the box reaches out of the grid.
     pub holes: bool,
 }
 
 impl HeightGrid {
-    /// A grid over a box, all holes.
+    /// A grid over the box from `low` to `high`, without any height.
     ///
     /// # Errors
-    /// It has more cells than are held, or the box is none.
+    /// The grid would have more than [`MAX_CELLS`] cells, or the box has no valid size.
     pub fn new([low, high]: [Flat; 2], cell_m: f32) -> Result<Self, TerrainError> {
         let sides = high - low;
         let sound = cell_m > 0.0 && cell_m.is_finite() && sides.x >= 0.0 && sides.y >= 0.0;
@@ -84,14 +85,14 @@ impl HeightGrid {
         self.heights_m.iter().filter(|height_m| !height_m.is_nan()).count()
     }
 
-    /// The lowest and the highest of all.
+    /// The lowest and the highest height, metres; `None` if no cell has a height.
     pub fn range_m(&self) -> Option<[f32; 2]> {
         let known = || self.heights_m.iter().copied().filter(|height_m| !height_m.is_nan());
         Some([known().reduce(f32::min)?, known().reduce(f32::max)?])
     }
 
-    /// The height at a place, metres: what the file has at the middle of the cell it is in; none in
-    /// holes and outside.
+    /// The height at a place, metres: that which the file has at the centre of the place's cell.
+    /// `None` where there is no height, and outside the grid.
     pub fn height_at(&self, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_of(place)?;
         match self.middles_m.get(row * self.size[0] + column) {
@@ -100,12 +101,13 @@ impl HeightGrid {
         }
     }
 
-    /// The heights so far are those at the middles; cells may be raised beyond them.
+    /// Keeps the heights so far as those at the cells' centres; cells may then be raised above
+    /// them.
     pub(super) fn keep_middles(&mut self) {
         self.middles_m.clone_from(&self.heights_m);
     }
 
-    /// Content of the cells that a box touches.
+    /// Greatest height in the cells that a box touches, and whether any of these has none.
     pub fn heights_in_box(&self, low: &Flat, high: &Flat) -> Heights {
         let index = |at: f32, from: f32| ((at - from) / self.cell_m).floor();
         let mut found = Heights::default();
@@ -113,7 +115,7 @@ impl HeightGrid {
         for axis in 0..2 {
             let (from, to) = (index(low[axis], self.low[axis]), index(high[axis], self.low[axis]));
             let most = self.size[axis] as f32 - 1.0;
-            // The last place of the grid is in its last cell.
+            // A place on the grid's far border counts as in the last cell.
             let over = high[axis] > self.bounds()[1][axis];
             found.holes |= from < 0.0 || over || from > most;
             if to < 0.0 || from > most || from > to {
@@ -136,7 +138,7 @@ impl HeightGrid {
         found
     }
 
-    /// The heights above another zero.
+    /// Heights above `zero_m` instead of above the present zero.
     pub fn relative_to(mut self, zero_m: f64) -> Self {
         for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;
@@ -150,17 +152,17 @@ impl HeightGrid {
         inside.then(|| [cell.x as usize, cell.y as usize])
     }
 
-    /// Raises the cell of a place to a height; whether the place is in the grid.
+    /// Raises the cell of a place to at least a height; `false` if the place is outside the grid.
     pub(super) fn raise_cell(&mut self, place: &Flat, height_m: f32) -> bool {
         let Some([column, row]) = self.cell_of(place) else { return false };
         let own = &mut self.heights_m[row * self.size[0] + column];
-        // The greater, and a hole takes any.
+        // `max` with NaN gives the other number, so a cell without height takes any.
         *own = own.max(height_m);
         true
     }
 
-    /// Gives holes that lie between cells with heights, at most `reach` away on both sides, the
-    /// greatest height so near.
+    /// Fills each hole that has cells with heights on both sides, at most `reach` cells away, with
+    /// the greatest height within that reach.
     pub(super) fn fill_holes(&mut self, reach: usize) {
         let before = self.clone();
         let [columns, rows] = self.size;

@@ -1,5 +1,5 @@
-//! The decoder of compressed point clouds panics on damaged bytes. Here that ends in an error,
-//! without a word of its own.
+//! Catches panics of the decoder of compressed point clouds, which panics on damaged bytes, and
+//! suppresses their message.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -9,7 +9,7 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Result of `decode`; none where it panics.
+/// The result of `decode`; `None` if it panics, without a panic message.
 pub(super) fn catch_panic<T>(decode: impl FnOnce() -> T) -> Option<T> {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -21,7 +21,7 @@ pub(super) fn catch_panic<T>(decode: impl FnOnce() -> T) -> Option<T> {
         }));
     });
     let outer = QUIET.replace(true);
-    // State that a panic leaves half done is dropped with the closure.
+    // What a panic leaves half done is dropped with the closure, so unwinding is safe.
     let outcome = catch_unwind(AssertUnwindSafe(decode));
     QUIET.set(outer);
     outcome.ok()

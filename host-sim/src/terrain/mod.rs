@@ -1,13 +1,13 @@
-//! Heights of the ground from files: ESRI grids (`.asc`), GeoTIFF, and point clouds (`.las`,
+//! Reads heights of the ground from files: ESRI grids (`.asc`), GeoTIFF, and point clouds (`.las`,
 //! `.laz`).
 //!
-//! Each becomes one [`HeightGrid`] in the mission frame. Units, missing cells and the coordinate
-//! system are what the file says; what it says and cannot be honoured is refused by name. A file
-//! that names no coordinate system is in metres about the mission's origin where the mission's own
-//! coordinates are, else it is refused.
+//! Each file becomes one [`HeightGrid`] in the mission frame. Units, missing cells and the
+//! coordinate system are those that the file states; what cannot be supported is refused by name. A
+//! file without a coordinate system is read as metres from the mission's origin if the mission's
+//! own coordinates are metres, else it is refused.
 //!
-//! Datums of plates (ETRS89, NAD83) are taken for WGS84, 1 to 2 m apart; those that need a grid of
-//! shifts are refused. Heights are above sea level as the file has them.
+//! Datums fixed to tectonic plates (ETRS89, NAD83) are taken for WGS84, 1 to 2 m apart; those that
+//! need a grid of datum shifts are refused. Heights are above sea level as in the file.
 
 mod asc;
 mod claims;
@@ -34,11 +34,11 @@ pub use self::grid::{HeightGrid, Heights};
 pub use self::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted_path;
 
-/// Reads a file of heights.
+/// Reads a file of heights into a grid in the mission frame.
 ///
 /// # Errors
-/// It cannot be read, is not what its name says, is in a coordinate system that is not honoured, or
-/// has no height here.
+/// The file cannot be read, is not what its name says, is in a coordinate system that is not
+/// supported, or has no height in the frame's window.
 pub fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     let grid = match ending.to_ascii_lowercase().as_str() {

@@ -1,8 +1,9 @@
-//! Rows of cells in a file's own coordinates, laid out in the mission frame.
+//! Heights of a file in its own coordinates, resampled to a grid in the mission frame.
 //!
-//! A cell of the grid has the height of the file's cell at its middle, or a greater one of a file's
-//! cell whose middle is in it. So no height is lost where the grids are turned against each other,
-//! and the highest in a box that is a cell wider each way is never less than in the file.
+//! A cell of the grid has the height of the file's cell at its centre, or a greater one of a file's
+//! cell whose centre is in it. So no height is lost where the grids are rotated against each other,
+//! and the greatest height in a box that is enlarged by one cell each way is never less than in the
+//! file.
 
 use planner_core::coverage::Flat;
 use planner_core::frames::Geodetic;
@@ -12,22 +13,22 @@ use super::error::TerrainError;
 use super::frame::{Frame, widened_window};
 use super::grid::HeightGrid;
 
-/// Heights as a file has them.
+/// Heights as a file has them, in its own coordinates.
 #[derive(Debug)]
 pub(super) struct Raster {
     pub crs: Crs,
     pub columns: usize,
     pub rows: usize,
-    /// The corner of the first cell, which is the north-western one.
+    /// Outer corner of the first cell, the north-western one, in the file's coordinates.
     pub corner: [f64; 2],
     /// Sides of a cell in the file's units, both positive.
     pub cell: [f64; 2],
-    /// Row by row from the north, metres; NaN in holes.
+    /// Height of each cell, metres, row by row from the north; NaN: no height.
     pub heights_m: Vec<f32>,
 }
 
 impl Raster {
-    /// The file's numbers of a place in cells from the north-western corner.
+    /// The file's coordinates of a point given in cells east and south of the north-western corner.
     fn file_coordinates(&self, column: f64, row: f64) -> [f64; 2] {
         [self.corner[0] + column * self.cell[0], self.corner[1] - row * self.cell[1]]
     }
@@ -86,7 +87,7 @@ impl Raster {
         Ok(grid)
     }
 
-    /// The height of the file's cell that a place is in.
+    /// The height of the file's cell at a place; `None` where it has none, and outside the file.
     pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_coordinates(self.crs.of_mission(origin, place)?);
         let inside =
@@ -96,8 +97,8 @@ impl Raster {
         (!height_m.is_nan()).then_some(height_m)
     }
 
-    /// A box that begins at the corner of one of the file's cells: where both grids lie alike their
-    /// cells are the same.
+    /// Moves the box's least corner to a corner of the file's cells, so that the cells of both
+    /// grids are the same where these are parallel.
     fn align_box(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
         let corner = self.crs.to_mission(origin, self.file_coordinates(0.0, self.rows as f64));
         let Some(corner) = corner.filter(|corner| corner.amax() < 1e6) else { return [low, high] };
@@ -109,7 +110,7 @@ impl Raster {
         [Flat::new(down(0), down(1)), high]
     }
 
-    /// The box around all cells.
+    /// The box in the mission frame around all cells of the file.
     fn bounds(&self, origin: &Geodetic) -> Option<[Flat; 2]> {
         let (columns, rows) = (self.columns as f64, self.rows as f64);
         let shares = || (0..=8).map(|k| f64::from(k) / 8.0);
@@ -120,7 +121,8 @@ impl Raster {
         places.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])
     }
 
-    /// Columns and rows that a box may touch, from and to; none where it touches none.
+    /// Ranges of the file's columns and rows that a box in the mission frame may touch; `None` if
+    /// none.
     fn touched_cells(
         &self,
         origin: &Geodetic,
@@ -138,7 +140,7 @@ impl Raster {
             [pick(f64::min, 0), pick(f64::max, 1)]
         })?;
         let range = |axis: usize, most: usize| {
-            // A line that is straight here is bent there, a little.
+            // A straight border there is slightly curved here: some cells more.
             let beyond = 2.0 + 0.01 * (to[axis] - from[axis]);
             let first = (from[axis] - beyond).floor().clamp(0.0, most as f64) as usize;
             let end = (to[axis] + beyond).ceil().clamp(0.0, most as f64) as usize;
@@ -147,7 +149,7 @@ impl Raster {
         Some([range(0, self.columns)?, range(1, self.rows)?])
     }
 
-    /// The shorter side of a cell, metres.
+    /// The shorter side of a cell of the file, metres in the mission frame.
     fn cell_m(&self, origin: &Geodetic, [column, row]: [f64; 2]) -> Option<f32> {
         let at =
             |column: f64, row: f64| self.crs.to_mission(origin, self.file_coordinates(column, row));

@@ -1,40 +1,39 @@
-//! How long to wait for an answer before asking again, and how many pieces to have under way at
+//! Decides when a request without an answer is sent again, and how many requests are under way at
 //! once.
 //!
 //! Source: RFC 6298 (retransmission timeout) and RFC 5681 (congestion window). A radio in the air
 //! gives files 250 bytes a second: four answers take it longer than any fixed time that suits a
 //! cable, and each request repeated too early is answered too, which makes the next answer later
-//! still. So the wait follows the round trips of this link, taken of requests that were sent once
-//! (Karn), and doubles where nothing comes; then half as many pieces are under way, until answers
-//! come in time.
+//! still. So the timeout follows the round trips of this link, measured on requests that were sent
+//! once (Karn). Where no answer comes it doubles and the window halves, until answers come in time.
 
 use std::time::{Duration, Instant as Clock};
 
-/// First and shortest timeout, seconds: a companion that plans answers later than one that rests.
+/// First and shortest timeout, seconds: a companion that is planning answers late.
 const MIN_TIMEOUT_S: f32 = 0.4;
 /// Longest timeout, seconds: MAVLink FTP servers recognise a repeated request for a few seconds,
 /// ours for at least three.
 const MAX_TIMEOUT_S: f32 = 2.0;
-/// Weights of a new round trip and of its deviation, and number of deviations added to the timeout
-/// (section 2).
+/// Weights of a new round trip time and of its deviation, and number of deviations added to the
+/// timeout (RFC 6298, section 2).
 const ROUND_TRIP_GAIN: f32 = 0.125;
 const DEVIATION_GAIN: f32 = 0.25;
 const DEVIATIONS: f32 = 4.0;
-/// Most requests under way at once: the companion keeps six.
+/// Most requests under way at once: the companion queues six.
 const MAX_UNDER_WAY: usize = 4;
 
 /// Retransmission timeout and window of one link.
 pub struct Retransmission {
-    /// The smoothed round trip and its deviation, seconds.
+    /// Smoothed round trip time and its deviation, seconds; `None` before the first one.
     round_trip: Option<(f32, f32)>,
     wait: Duration,
-    /// When it last doubled: requests that are sent together are late together.
+    /// When the timeout last doubled: requests sent before that do not double it again.
     doubled_at: Clock,
     window: usize,
 }
 
 impl Retransmission {
-    /// The state of a link on which no request was answered yet.
+    /// Timeout and window of a link on which no request was answered yet.
     pub fn new(now: Clock) -> Self {
         Self {
             round_trip: None,
@@ -44,13 +43,13 @@ impl Retransmission {
         }
     }
 
-    /// Number of pieces that may be under way at once.
+    /// Number of requests that may be under way at once.
     pub fn window(&self) -> usize {
         self.window
     }
 
-    /// Whether what was sent then is to be sent again now. If so the wait doubles, once for all
-    /// that was sent before.
+    /// Whether a request sent at `sent_at` has timed out. If so the timeout doubles and the window
+    /// halves, once for all requests sent before.
     pub fn is_over(&mut self, sent_at: Clock, now: Clock) -> bool {
         let over = now.saturating_duration_since(sent_at) > self.wait;
         if over && sent_at >= self.doubled_at {
@@ -61,7 +60,7 @@ impl Retransmission {
         over
     }
 
-    /// Takes the round trip time of a packet that was sent only once.
+    /// Adapts timeout and window to the round trip time of a request that was sent only once.
     pub fn note_round_trip(&mut self, time: Duration) {
         let time_s = time.as_secs_f32();
         let (smoothed_s, deviation_s) = match self.round_trip {

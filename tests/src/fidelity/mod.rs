@@ -1,15 +1,15 @@
-//! How nearly a simulated autopilot flies what a real one flew: recorded setpoints and commands are
-//! replayed into it, and where it believes to be is compared with the recorded *estimate*, from
+//! How closely a simulated autopilot flies what a real one flew: recorded setpoints and commands
+//! are replayed into it, and its estimated position is compared with the recorded *estimate*, from
 //! arming to disarming.
 //!
-//! Two things of a PX4 recording are no property of the autopilot. The wandering of its estimate
+//! Two things in a PX4 recording are no property of the autopilot. First, the drift of its estimate
 //! moves the vehicle: a replay imposes the recorded errors (estimate minus truth) on the simulated
-//! estimate, or those of another flight, or flies without any ([`Estimator`]). And the companion
-//! answered that wandering in the accelerations it sent: a replay either sends those, or what the
-//! same law sends beside the simulated vehicle ([`Correction`]).
+//! estimate, or those of another flight, or flies without any ([`Estimator`]). Second, the
+//! companion answered that drift in the accelerations it sent: a replay sends either those, or what
+//! the same control law gives for the simulated vehicle ([`Correction`]).
 //!
 //! The recordings are `data/flights/*.csv` of the shared data, described by the README beside them.
-//! Positions are NED metres about the vehicle's EKF origin, times are seconds of the wall clock.
+//! Positions are NED metres from the vehicle's EKF origin, times are seconds of the wall clock.
 
 mod read;
 mod recording;
@@ -21,10 +21,10 @@ use self::read::read;
 pub use self::recording::{Recording, Sample};
 use crate::shared_data;
 
-/// East and north.
+/// A horizontal vector, metres: east and north.
 type Across = Vector2<f64>;
 
-/// The recorded runs.
+/// Names of the recorded runs.
 pub const RUNS: [&str; 15] = [
     "a_demo",
     "a_lobby",
@@ -42,39 +42,39 @@ pub const RUNS: [&str; 15] = [
     "apx_rearm_lobby",
     "f_ppa",
 ];
-/// What is wrong with the simulated estimate in a replay.
+/// Which errors the simulated estimate has in a replay.
 #[derive(Clone, Copy, Debug)]
 pub enum Estimator<'a> {
-    /// Nothing.
+    /// No errors: the estimate is the truth.
     Perfect,
-    /// What was wrong with the recorded one.
+    /// The recorded errors of the same flight.
     Recorded,
-    /// What was wrong in another recorded flight at the same times: nothing of this one is known.
+    /// The errors recorded in another flight at the same times: independent of this one.
     Of(&'a Recording),
 }
 
-/// Whose estimate the accelerations of the replayed setpoints answer.
+/// Which vehicle's estimate the accelerations of the replayed setpoints correct for.
 ///
-/// The companion of the recordings added to each setpoint of PX4 an acceleration back to its
-/// reference, in proportion to what the *recorded* estimate was beside it. What a real estimator
-/// wandered is in those accelerations: replayed as they are, they push a vehicle that did not
-/// wander.
+/// The recorded companion added to each setpoint for PX4 an acceleration back to its reference, in
+/// proportion to the distance of the *recorded* estimate from it. So the drift of the real
+/// estimator is in those accelerations: replayed as they are, they push a vehicle that did not
+/// drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Correction {
-    /// The recorded one: the setpoints as they were sent.
+    /// The recorded vehicle's: the setpoints as they were sent.
     Recorded,
-    /// The simulated one: the same law about the vehicle that flies now. Nothing of the recorded
-    /// estimate is left.
+    /// The simulated vehicle's, by the same control law: no part of the recorded estimate is left.
     Simulated,
 }
 
-/// What a plain flight may differ by under the recorded errors, its setpoints as they were sent,
-/// RMS metres; `None` where a person or a failsafe took the vehicle.
+/// Allowed RMS difference of a flight's replay, metres, under the recorded errors and with the
+/// setpoints as they were sent; `None` for a flight in which a person or a failsafe took the
+/// vehicle.
 pub fn allowed_m(recording: &Recording) -> Option<f64> {
     match recording.run.as_str() {
         "a_demo" => Some(0.45),
         "a_lobby" | "x_rearm_lobby" => Some(0.30),
-        // Vehicle 2 landed from 24 m, past the speed at which its estimator said it sank.
+        // Vehicle 2 landed from 24 m, faster than its estimator reported it to sink.
         "f_ppa" => match recording.vehicle {
             1 => Some(0.45),
             2 => None,
@@ -87,10 +87,11 @@ pub fn allowed_m(recording: &Recording) -> Option<f64> {
     }
 }
 
-/// Reads the vehicles of a run; empty, with a line that says so, where the shared data are absent.
+/// Reads the flights of a run's vehicles; empty, with a printed line, if the shared data are
+/// absent.
 ///
 /// # Panics
-/// A recording that is there and cannot be read.
+/// A recording exists but cannot be read.
 pub fn recordings(run: &str) -> Vec<Recording> {
     let Some(path) = shared_data(&format!("flights/{run}.csv")) else { return Vec::new() };
     let vehicles = if run == "f_ppa" { 3 } else { 1 };
@@ -98,12 +99,12 @@ pub fn recordings(run: &str) -> Vec<Recording> {
 }
 
 impl Recording {
-    /// The estimates between arming and disarming.
+    /// The recorded estimates between arming and disarming.
     pub fn flown(&self) -> impl Iterator<Item = &Sample> {
         self.estimate.iter().filter(|s| (self.armed_s.0..=self.armed_s.1).contains(&s.t_s))
     }
 
-    /// Estimate less setpoint, at the times of the estimates in Follow counted from its start.
+    /// Recorded estimate minus setpoint, metres, at each estimate's time since the start of Follow.
     fn tracking(&self) -> Vec<(f64, Vector3<f64>)> {
         let mut later = self.setpoints.as_slice();
         let mut errors = Vec::new();
@@ -119,8 +120,8 @@ impl Recording {
         errors
     }
 
-    /// How differently another recorded flight of the same mission kept to its setpoints: RMS,
-    /// metres.
+    /// How differently this and another recorded flight of the same mission kept to their
+    /// setpoints: RMS, metres.
     pub fn spread(&self, other: &Self) -> f64 {
         let (own, others) = (self.tracking(), other.tracking());
         let (mut squares, mut n, mut at) = (0.0, 0_u32, 0);
@@ -136,17 +137,17 @@ impl Recording {
         (squares / f64::from(n)).sqrt()
     }
 
-    /// How far errors of the estimate alone move a replay: RMS, metres. So far a replay without
-    /// them is off the recording, however well the autopilot is simulated.
+    /// How far errors of the estimate alone move a replay: RMS, metres. A replay without these
+    /// errors is that far off the recording, however well the autopilot is simulated.
     pub fn moved(&self, errors: Estimator<'_>, correction: Correction) -> f64 {
         let [with, without] =
             [errors, Estimator::Perfect].map(|errors| self.replay(errors, correction));
         Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm())).rms
     }
 
-    /// How much the estimates of two flights erred alike across at the same times: coefficient of
-    /// correlation. PX4's SIH draws the noise of its sensors from `rand()` without a seed: it
-    /// repeats in another flight, unless threads drew in another order.
+    /// Correlation coefficient of the horizontal estimate errors of two flights at the same times.
+    /// PX4's SIH draws its sensor noise from `rand()` without a seed: the noise repeats in another
+    /// flight, unless threads draw in another order.
     pub fn err_alike(&self, other: &Self) -> f64 {
         let (own, others) = (self.errors(), other.errors());
         let mut later = others.as_slice();
@@ -169,7 +170,7 @@ impl Recording {
             .sqrt()
     }
 
-    /// Replays and compares.
+    /// Replays the flight, and compares the simulated with the recorded estimates.
     pub fn compare(&self, estimator: Estimator<'_>, correction: Correction) -> Comparison {
         let simulated = self.replay(estimator, correction);
         let pairs: Vec<_> = self.flown().zip(&simulated).collect();
@@ -188,12 +189,12 @@ impl Recording {
     }
 }
 
-/// Root mean square and maximum, metres; NaN where nothing was compared.
+/// RMS and maximum of differences, metres; NaN if nothing was compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Root of the mean square.
+    /// Root of the mean square, metres.
     pub rms: f64,
-    /// Greatest.
+    /// Greatest difference, metres.
     pub max: f64,
 }
 
@@ -209,15 +210,15 @@ impl Difference {
     }
 }
 
-/// Simulated against recorded.
+/// Differences between simulated and recorded estimates, by part of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// From arming to disarming.
+    /// Distance of the positions, from arming to disarming.
     pub whole: Difference,
-    /// While the mission followed its path.
+    /// Distance of the positions, while the mission followed its path.
     pub follow: Difference,
-    /// Height alone, from arming to the path.
+    /// Difference of the heights, from arming to the start of the path.
     pub lift_off: Difference,
-    /// Height alone, from the landing's command to disarming.
+    /// Difference of the heights, from the command to land to disarming.
     pub landing: Difference,
 }

@@ -1,4 +1,4 @@
-//! Reads a recorded flight: `data/flights/RUN.csv`, one row per setpoint, report or event.
+//! Reads a recorded flight from `data/flights/RUN.csv`: one row per setpoint, report or event.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use sim_autopilot::AutopilotKind;
 
 use super::recording::{Message, Recording, Sample, Setpoint};
 
-/// The numbers between a command's brackets, and what follows them.
+/// The parameters between a command's brackets, and the text after them.
 fn bracketed(text: &str) -> Option<([f32; 7], &str)> {
     let (inside, after) = text.split_once('[')?.1.split_once(']')?;
     let mut params = [0.0; 7];
@@ -25,7 +25,7 @@ fn message(text: &str) -> Option<Message> {
     let (from, rest) = text.split_once(" command ")?;
     let (params, after) = bracketed(rest)?;
     let command: u16 = rest.split_whitespace().next()?.parse().ok()?;
-    // What asks for streams changes no flight.
+    // Commands that fly the vehicle; requests for streams change no flight.
     let flies = matches!(command, 20 | 21 | 22 | 176 | 400);
     match from {
         "companion" if flies && !after.contains("/0") => {
@@ -38,9 +38,9 @@ fn message(text: &str) -> Option<Message> {
     }
 }
 
-/// What happens in a recording, line by line.
+/// State of reading the event rows of a recording.
 struct Events {
-    /// Commands wait for their acks: what was refused is not replayed.
+    /// Commands without an ack so far: only accepted ones are replayed.
     asked: Vec<(f64, Message)>,
     armed: bool,
 }
@@ -95,7 +95,7 @@ impl Events {
     }
 }
 
-/// One vehicle of a run.
+/// Reads the flight of one vehicle of a run.
 pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
     let text = std::fs::read_to_string(path).expect("a recording can be read");
     let mut recording = Recording {

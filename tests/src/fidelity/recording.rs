@@ -1,15 +1,15 @@
-//! A recorded flight.
+//! The data of a recorded flight.
 
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 use sim_autopilot::AutopilotKind;
 
-/// One recorded row that says where something was or shall be.
+/// Position and velocity of a vehicle at one time, estimated or true.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Seconds.
     pub t_s: f64,
-    /// NED about the EKF origin, metres.
+    /// Position in NED from the EKF origin, metres.
     pub position: Vector3<f64>,
     /// NED, m/s.
     pub velocity: Vector3<f64>,
@@ -27,30 +27,30 @@ pub(super) struct Setpoint {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Message {
-    /// System, component, command and its parameters.
+    /// COMMAND_LONG: sender's system and component, command number, and its parameters.
     Command(u8, u8, u16, [f32; 7]),
-    /// GUID_TIMEOUT.
+    /// PARAM_SET of GUID_TIMEOUT, seconds.
     GuidedTimeout(f32),
 }
 
-/// One vehicle's recorded flight.
+/// The recorded flight of one vehicle.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Name of the run.
     pub run: String,
-    /// System id.
+    /// MAVLink system id.
     pub vehicle: u8,
-    /// What flew it.
+    /// Which autopilot flew the vehicle.
     pub autopilot: AutopilotKind,
-    /// Its EKF origin.
+    /// EKF origin of the autopilot.
     pub origin: Geodetic,
-    /// What it believed.
+    /// Positions and velocities that the autopilot estimated.
     pub estimate: Vec<Sample>,
-    /// Where it was.
+    /// True positions and velocities.
     pub truth: Vec<Sample>,
-    /// First arming that held, and disarming, seconds.
+    /// When the vehicle armed for its flight, and when it disarmed, seconds.
     pub armed_s: (f64, f64),
-    /// From where the mission followed its path, and from where it landed, seconds.
+    /// When the mission began to follow its path, and when it began to land, seconds.
     pub follow_s: (f64, f64),
     pub(super) setpoints: Vec<Setpoint>,
     pub(super) messages: Vec<(f64, Message)>,

@@ -1,4 +1,4 @@
-//! Flies a recording's setpoints and commands again.
+//! Replays a recording's setpoints and commands into a simulated autopilot.
 
 use companion::link::frame::{self, Header};
 use mavlink::dialects::ardupilotmega::{
@@ -12,24 +12,24 @@ use sim_autopilot::{Autopilot, AutopilotKind, Config};
 use super::recording::{Message, Recording, Sample, Setpoint};
 use super::{Correction, Estimator};
 
-/// Simulated seconds for each second of the wall clock: PX4's SIH was recorded 0.4 to 1.1 % slow.
+/// Simulated seconds a second of the wall clock: PX4's SIH ran 0.4 to 1.1 % slow when recorded.
 const PX4_CLOCK: f64 = 0.9925;
 const STEP_S: f64 = 0.004;
-/// Simulated time before the first record, seconds: ArduCopter has booted and has its position by
-/// then.
+/// Simulated time before the first record, seconds: by then ArduCopter has booted and has a
+/// position.
 const WARM_UP_S: f64 = 8.0;
 const COMMAND_LONG: (u32, u8) = (76, 152);
-/// The law of the companion that was recorded (8314848, `guidance::correction`): acceleration for
-/// each metre and for each m/s beside the reference, 1/s² and 1/s, and its bound, m/s². Of the
-/// recorded estimate it gives the recorded accelerations to 0.02 m/s².
+/// Control law of the recorded companion (8314848, `guidance::correction`): acceleration for each
+/// metre and for each m/s off the reference, 1/s² and 1/s, and its bound, m/s². From the recorded
+/// estimate it gives the recorded accelerations to within 0.02 m/s².
 const HOLD_PER_S2: f64 = 3.0;
 const DAMP_PER_S: f64 = 1.5;
 const HOLD_MOST_MPS2: f64 = 1.5;
-/// Its reference changed speed by less, m/s².
+/// Bound on the acceleration of that companion's reference, m/s².
 const CHANGE_MOST_MPS2: f64 = 2.0;
 
 impl Recording {
-    /// Where it stood before it armed, by its estimate, NED.
+    /// Where the vehicle stood in the second before it armed, by its estimate, NED metres.
     fn start(&self) -> Vector3<f64> {
         let before = || {
             self.estimate.iter().filter(|s| s.t_s < self.armed_s.0 && s.t_s > self.armed_s.0 - 1.0)
@@ -50,8 +50,8 @@ impl Recording {
         }
     }
 
-    /// What the estimator had wrong, estimated minus true: ENU metres and m/s at the times of the
-    /// truth.
+    /// Errors of the recorded estimate, estimated minus true: ENU metres and m/s, at the times of
+    /// the recorded truth.
     pub fn errors(&self) -> Vec<(f64, Point, Point)> {
         let enu = |v: Vector3<f64>| Point::new(v.y as f32, v.x as f32, -v.z as f32);
         let mut errors = Vec::new();
@@ -72,8 +72,8 @@ impl Recording {
         errors
     }
 
-    /// The error of the position where the replay starts without one: as [`Self::start`] takes it,
-    /// or the first.
+    /// The position error that counts as none in the replay: the mean in the second before arming,
+    /// as for [`Self::start`], or the first one.
     fn zero(&self, errors: &[(f64, Point, Point)]) -> Point {
         let before =
             || errors.iter().filter(|e| e.0 < self.armed_s.0 && e.0 > self.armed_s.0 - 1.0);
@@ -82,11 +82,11 @@ impl Recording {
         if n > 0 { before().map(|e| e.1).sum::<Point>() / n as f32 } else { first }
     }
 
-    /// Flies the recorded setpoints and commands: estimates at the times of the recorded ones from
-    /// arming to disarming.
+    /// Flies the recorded setpoints and commands; returns the simulated estimates at the times of
+    /// the recorded ones, from arming to disarming.
     ///
     /// # Panics
-    /// None for a recording that was read.
+    /// Does not panic for a recording that [`super::recordings`] has read.
     pub fn replay(&self, estimator: Estimator<'_>, correction: Correction) -> Vec<Sample> {
         let errors = match estimator {
             Estimator::Perfect => Vec::new(),
@@ -105,7 +105,7 @@ impl Recording {
             (self.setpoints.iter().peekable(), self.messages.iter().peekable());
         let (mut sequence, mut buffer) = (0_u8, [0; 512]);
         let begin_s = self.armed_s.0 - 4.0;
-        // What was set before the part that is replayed.
+        // Messages before the replayed part set the autopilot up, so they are sent at once.
         while let Some((_, message)) = messages.next_if(|(t_s, _)| *t_s < begin_s) {
             feed_message(&mut autopilot, message, &mut sequence);
         }
@@ -149,9 +149,9 @@ fn ned(enu: &Point) -> Vector3<f64> {
     Vector3::new(f64::from(enu.y), f64::from(enu.x), -f64::from(enu.z))
 }
 
-/// Gives a setpoint the acceleration across that the recorded companion would have sent beside the
-/// simulated vehicle: the change of its reference's speed, and the way back to it. Where it sent
-/// none (on the ground, under a pilot) there is none.
+/// Replaces a setpoint's horizontal acceleration by what the recorded companion would send for the
+/// simulated vehicle: the change of its reference's speed, and the correction back to it. A
+/// setpoint without acceleration (on the ground, under a pilot) stays as it is.
 fn corrected(setpoint: &mut Setpoint, last: &Setpoint, autopilot: &Autopilot) {
     let [north, east, _] = setpoint.acceleration;
     if north == 0.0 && east == 0.0 {
@@ -208,7 +208,7 @@ fn feed_setpoint(autopilot: &mut Autopilot, setpoint: &Setpoint, sequence: &mut 
         time_boot_ms: (autopilot.time_us() / 1000) as u32,
         target_system: 1,
         target_component: 1,
-        // The companion knows no other.
+        // The recorded companion sends no other frame.
         coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
         type_mask: PositionTargetTypemask::from_bits_truncate(setpoint.mask),
         x: setpoint.position[0],

@@ -1,12 +1,12 @@
-//! Where the random numbers of forged frames come from.
+//! Sources of the random numbers from which frames are forged.
 
 use crate::meeting::dice::Dice;
 
-/// Where random numbers come from: a seed, or a fuzzer's bytes, which end.
+/// A source of random numbers: a seeded generator, or a fuzzer's bytes, which end.
 pub trait Entropy {
     /// The next bits.
     fn bits(&mut self) -> u64;
-    /// Whether there are no more.
+    /// Whether no random numbers are left.
     fn is_spent(&self) -> bool {
         false
     }

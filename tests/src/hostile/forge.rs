@@ -1,5 +1,5 @@
-//! Frames forged from random numbers: fields random and at their bounds, some of a message that
-//! would be believed.
+//! Forges frames from random numbers: fields are random or at their bounds, and some are set such
+//! that the companion believes the message.
 
 use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
@@ -15,7 +15,7 @@ use super::entropy::Entropy;
 use super::{Flight, ID, NEIGHBOUR, ORIGIN, intent};
 
 impl Flight {
-    /// Gives one forged frame.
+    /// Forges one frame of one of `messages`, and gives it to the companion on one of `links`.
     pub(super) fn forge(&mut self, entropy: &mut impl Entropy, links: &[Link], messages: &[u32]) {
         let head = entropy.bits();
         let pick = |shift: u32, count: u64| (head >> shift) % count;
@@ -26,7 +26,8 @@ impl Flight {
             0 | 1 => NEIGHBOUR,
             2 => ID,
             3 => 1 + pick(16, 5) as u8,
-            // Any but the mission's ground station: that only signing would show.
+            // Any sender but the mission's ground station: forging that could only be detected by
+            // signing.
             _ => pick(16, 255) as u8,
         };
         let component = match pick(24, 4) {
@@ -44,7 +45,8 @@ impl Flight {
         self.companion.handle_bytes(link, self.now, &out[..length]);
     }
 
-    /// Fields random or at their bounds, and some of a message that would be believed.
+    /// Fills a payload with random or extreme numbers, some replaced by believable ones; returns
+    /// its length.
     fn fill(&self, id: u32, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
         if id == TUNNEL_DATA::ID && how & 3 != 0 {
             return match self.over_area && how & 3 == 1 {
@@ -69,7 +71,7 @@ impl Flight {
         length
     }
 
-    /// An intent like those of the neighbour.
+    /// Fills a payload with an intent like those of the neighbour; returns its length.
     fn fill_intent(&self, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
         let mut intent = intent();
         let bits = entropy.bits();
@@ -95,11 +97,11 @@ impl Flight {
         length
     }
 
-    /// Overwrites what would be dropped at once.
+    /// Overwrites fields by which the companion would drop the message at once.
     fn make_believable(&self, id: u32, payload: &mut [u8; 255], how: u8) {
         let near = |shift: u32, how: u8| f32::from(how.rotate_left(shift)) * 0.01 - 1.28;
         match id {
-            // Near enough to be no jump, now and then.
+            // A position near the true one, so that it is no jump, in some of the messages.
             32 if how & 3 == 0 => {
                 payload[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
                 let geodetic = frames::enu_to_geodetic(&ORIGIN, &self.autopilot.position);
@@ -155,12 +157,12 @@ impl Flight {
     }
 }
 
-/// A number of about this size.
+/// A random number between −`size` and `size`.
 fn number(bits: u64, size: f32) -> f32 {
     (f32::from(bits as u16) / 32768.0 - 1.0) * size
 }
 
-/// Bytes of their payloads.
+/// Payload length of each message, bytes.
 const LENGTHS: [(u32, usize); 19] = [
     (0, 9),
     (1, 31),
@@ -182,9 +184,9 @@ const LENGTHS: [(u32, usize); 19] = [
     (245, 2),
     (253, 54),
 ];
-/// Commands that do something, and some that do not.
+/// Numbers of commands that a companion obeys, and of some that it does not.
 const COMMANDS: [u16; 12] = [20, 21, 176, 193, 246, 300, 400, 511, 512, 5004, 22, 0xFFFF];
-/// Numbers at their bounds.
+/// Numbers at the bounds of f32.
 const EDGES: [f32; 10] = [
     f32::NAN,
     f32::INFINITY,
@@ -198,7 +200,7 @@ const EDGES: [f32; 10] = [
     -0.0,
 ];
 
-/// A roster like those of the neighbour.
+/// Fills a payload with a roster report like those of the neighbour; returns its length.
 fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
     const ALL: [MemberStatus; 4] =
         [MemberStatus::Alive, MemberStatus::Lost, MemberStatus::Left, MemberStatus::Finished];
@@ -211,7 +213,8 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
         agrees: bits & 128 != 0,
     };
     let bits = entropy.bits();
-    // Rarely what lands the vehicle at once: the others gave it up, or are divisions ahead.
+    // Rarely what makes the vehicle land at once: the others have given it up, or are divisions
+    // ahead.
     let (about_it, ahead) = (bits >> 40 & 255 == 0, bits >> 48 & 255 == 0);
     let mut entry_of = |rank| {
         let drawn = entry(entropy.bits());

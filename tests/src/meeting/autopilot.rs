@@ -1,8 +1,8 @@
-//! A light autopilot: PX4 or ArduCopter as far as a companion sees it, and a vehicle with a lag and
-//! bounded acceleration.
+//! A light simulated autopilot: PX4 or ArduCopter as far as a companion sees it, and an airframe
+//! with a lag and bounded acceleration.
 //!
-//! It is not the simulated autopilot of `host-sim`, which is truer and slower. ENU metres, steps of
-//! [`STEP_S`].
+//! It is not the simulated autopilot of `host-sim`, which is more faithful and slower. ENU metres,
+//! steps of [`STEP_S`].
 
 mod flight;
 mod inbox;
@@ -19,13 +19,13 @@ use planner_core::frames::Geodetic;
 
 use crate::setpoints::SetpointCheck;
 
-/// Physics and telemetry advance by this, seconds.
+/// Time step of physics and telemetry, seconds.
 pub const STEP_S: f32 = 0.025;
-/// The pilot's mode: POSCTL.
+/// PX4's custom mode in which a pilot flies: POSCTL.
 const PX4_POSITION: u32 = 0x0003_0000;
-/// The pilot's mode: LOITER.
+/// ArduCopter's custom mode in which a pilot flies: LOITER.
 const ARDUPILOT_LOITER: u32 = 5;
-/// Setpoints older than this are lost, seconds (`COM_OF_LOSS_T`).
+/// Age of the last setpoint at which PX4 counts the stream as lost, seconds (`COM_OF_LOSS_T`).
 const PX4_LOSS_S: f32 = 1.0;
 
 /// What the autopilot does by itself after a loss of setpoints, or in a failsafe.
@@ -37,27 +37,27 @@ pub enum Failsafe {
     Return,
 }
 
-/// What a vehicle is caught by.
+/// What catches a vehicle: it holds the vehicle, or carries it off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Catch {
-    /// A wall: it goes nowhere but up and down.
+    /// A wall: the vehicle moves only up and down.
     Wall,
-    /// It rests on something, and moves no more.
+    /// A ledge: the vehicle rests on it and does not move any more.
     Ledge,
-    /// It hangs in something and swings.
+    /// A net: the vehicle hangs in it and swings.
     Net,
-    /// A wind stronger than it carries it off.
+    /// A wind too strong for the vehicle carries it off.
     Wind,
 }
 
-/// What flies the vehicle at this moment.
+/// What controls the vehicle at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flown {
     /// The companion, by setpoints.
     Setpoints,
     /// The autopilot, by a command of the companion: a landing or a take-off.
     Commanded,
-    /// The pilot, or the autopilot by itself.
+    /// The pilot, or the autopilot on its own decision.
     Other,
 }
 
@@ -69,31 +69,31 @@ struct Target {
     acceleration: Point,
 }
 
-/// One autopilot with its vehicle.
+/// One autopilot with its simulated vehicle.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
-    /// Which it is.
+    /// Which autopilot it is.
     pub kind: AutopilotKind,
     id: u8,
     mission_origin: Geodetic,
     ekf_origin: Geodetic,
-    /// Truth.
+    /// True position of the vehicle, ENU metres.
     pub position: Point,
-    /// Truth.
+    /// True velocity of the vehicle, ENU m/s.
     pub velocity: Point,
     acceleration: Point,
     home: Point,
     /// Custom mode of HEARTBEAT.
     pub mode: u32,
-    /// Motors on.
+    /// Whether the motors are on.
     pub armed: bool,
     critical: bool,
-    /// The companion asked for the mode of landing.
+    /// Whether the companion has commanded the mode of landing.
     landing_commanded: bool,
-    /// What a loss of setpoints leads to.
+    /// What the autopilot does after a loss of setpoints.
     pub on_loss: Failsafe,
     lost: bool,
-    /// Velocity that the pilot asks for.
+    /// Velocity that the pilot commands, ENU m/s.
     pub pilot: Point,
     target: Option<Target>,
     takeoff_z: Option<f32>,
@@ -101,21 +101,21 @@ pub struct Autopilot {
     lifted_at: Option<Instant>,
     grounded_since: Option<Instant>,
     armed_at: Instant,
-    /// What it is caught by, and where.
+    /// What holds the vehicle, and where; `None`: it is free.
     caught: Option<(Catch, Point)>,
     guid_timeout_s: f32,
     streams: BTreeSet<u16>,
     sequence: u8,
     framer: Framer,
     phase: u64,
-    /// What it was sent.
+    /// Checks the setpoints that the autopilot received.
     pub check: SetpointCheck,
-    /// Times it was armed.
+    /// Number of times it was armed.
     pub armings: u32,
 }
 
 impl Autopilot {
-    /// On its pad, disarmed. `phase` shifts its streams in time.
+    /// A disarmed vehicle on its pad. `phase` shifts its telemetry streams in time.
     pub fn new(
         kind: AutopilotKind,
         id: u8,
@@ -157,12 +157,12 @@ impl Autopilot {
         }
     }
 
-    /// Off the ground.
+    /// Whether the vehicle is off the ground, as the land detector has it.
     pub fn is_airborne(&self) -> bool {
         self.airborne
     }
 
-    /// What flies it.
+    /// What controls the vehicle now.
     pub fn flown(&self) -> Flown {
         if self.mode == self.kind.setpoint_mode() {
             if self.takeoff_z.is_some() { Flown::Commanded } else { Flown::Setpoints }
@@ -173,30 +173,30 @@ impl Autopilot {
         }
     }
 
-    /// Where the last setpoint asked it to be.
+    /// Position of the last setpoint; `None` without one.
     pub fn asked(&self) -> Option<Point> {
         self.target?.position
     }
 
-    /// The pilot's switch.
+    /// The pilot takes over by the mode switch, and flies with `velocity`.
     pub fn take_over(&mut self, velocity: Point) {
         self.enter(if self.kind == AutopilotKind::Px4 { PX4_POSITION } else { ARDUPILOT_LOITER });
         self.pilot = velocity;
     }
 
-    /// The pilot gives Offboard or Guided back; PX4 only while setpoints come.
+    /// The pilot switches back to Offboard or Guided; PX4 accepts that only while setpoints arrive.
     pub fn give_back(&mut self, now: Instant) {
         if self.kind == AutopilotKind::ArduPilot || self.age_s(now) < 0.5 {
             self.enter(self.kind.setpoint_mode());
         }
     }
 
-    /// The pilot lands it.
+    /// The pilot switches to the mode of landing.
     pub fn pilot_lands(&mut self) {
         self.enter(self.kind.land_mode());
     }
 
-    /// A failsafe of its own.
+    /// The autopilot enters a failsafe of its own.
     pub fn fail(&mut self, how: Failsafe) {
         self.enter(match how {
             Failsafe::Land => self.kind.land_mode(),
@@ -206,19 +206,19 @@ impl Autopilot {
         self.critical = true;
     }
 
-    /// From now on something keeps it where it is.
+    /// From now on something holds the vehicle where it is.
     pub fn catch(&mut self, how: Catch) {
         self.caught = Some((how, self.position));
     }
 
-    /// Whether something keeps it where it is.
+    /// Whether something holds the vehicle.
     pub fn is_caught(&self) -> bool {
         self.caught.is_some()
     }
 
     fn enter(&mut self, mode: u32) {
         if mode != self.mode {
-            // What was sent before was not followed.
+            // The setpoints sent in the mode before were not followed.
             self.check.restart();
         }
         (self.mode, self.critical, self.lost, self.landing_commanded) = (mode, false, false, false);
@@ -229,7 +229,7 @@ impl Autopilot {
         self.target.map_or(f32::INFINITY, |target| (now - target.at).as_secs_f32())
     }
 
-    /// One step of flight and telemetry; what it reports goes to `out`.
+    /// One step of flight and telemetry; the messages that it sends are appended to `out`.
     pub fn step(&mut self, now: Instant, floor_z: f32, out: &mut Vec<u8>) {
         if self.kind == AutopilotKind::Px4
             && self.mode == px4::OFFBOARD

@@ -1,13 +1,13 @@
-//! Random numbers of a scene: SplitMix64, so that a seed is a scene for ever.
+//! Random numbers of a scene: SplitMix64, so that a seed gives the same scene for ever.
 
 use planner_core::Point;
 
-/// The generator.
+/// A seeded SplitMix64 generator.
 #[derive(Clone, Debug)]
 pub struct Dice(u64);
 
 impl Dice {
-    /// From a seed.
+    /// A generator that starts from a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03)
     }
@@ -21,27 +21,27 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// In `low..high`.
+    /// A uniformly distributed random number from `low` to below `high`.
     pub fn real(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * (self.bits() >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 
-    /// In `0..count`.
+    /// A random whole number from 0 to below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         (self.bits() >> 33) as usize % count.max(1)
     }
 
-    /// True with this probability.
+    /// Whether a random event of this probability occurs.
     pub fn chance(&mut self, share: f32) -> bool {
         self.real(0.0, 1.0) < share
     }
 
-    /// In a box.
+    /// A random point in the box from `low` to `high`.
     pub fn point(&mut self, low: Point, high: Point) -> Point {
         Point::new(self.real(low.x, high.x), self.real(low.y, high.y), self.real(low.z, high.z))
     }
 
-    /// A direction.
+    /// A random unit vector, uniformly distributed.
     pub fn direction(&mut self) -> Point {
         loop {
             let at = self.point(Point::new(-1.0, -1.0, -1.0), Point::new(1.0, 1.0, 1.0));

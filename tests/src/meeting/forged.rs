@@ -1,4 +1,4 @@
-//! Messages of a vehicle whose reports are wrong.
+//! Forges the messages of a vehicle that lies in its reports.
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
@@ -11,7 +11,7 @@ use planner_core::frames::{self, Geodetic};
 use super::packet::ORIGIN;
 use super::scene::Lie;
 
-/// ENU metres and metres per second.
+/// Position and velocity of a report, ENU metres and m/s.
 pub(super) fn place_of(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
     let place = Geodetic {
         lat_deg: f64::from(data.lat) * 1e-7,
@@ -22,7 +22,7 @@ pub(super) fn place_of(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
     (frames::geodetic_to_enu(&ORIGIN, &place), frames::swap_enu_ned(&(cm * 0.01)))
 }
 
-/// The frame with the lie in it; none where it does not concern it.
+/// The frame with the lie in its data; `None` if the lie is about other data.
 pub(super) fn forge(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
     let header =
         Header { system: frame.system, component: frame.component, sequence: frame.sequence };

@@ -1,4 +1,4 @@
-//! One vehicle of a meeting: its companion, its autopilot, and what it has heard.
+//! One vehicle of a meeting: its companion, its autopilot, and what it has received from others.
 
 use companion::link::frame::Framer;
 use companion::{Companion, Config, Instant, RosterEntry, State};
@@ -12,19 +12,20 @@ use super::packet::{ORIGIN, Packet};
 use super::scene::{self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_M, Scene, VEHICLES, WAYPOINTS};
 use crate::setpoints::{Limits, SetpointCheck};
 
-/// No vehicle leaves this box, metres: minimum and maximum corner.
+/// Fence that no vehicle may leave, metres: lowest and highest corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
-/// A vehicle that has heard no other vehicle for so long is deaf, seconds: it has stopped, and
+/// Time without any message after which a vehicle counts as deaf, seconds: it has stopped, and
 /// lands after 20 s.
 const DEAF_S: f32 = 20.0;
-/// A vehicle that is faster is not stopped, m/s.
+/// Speed above which a vehicle does not count as stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
-/// Speed of a setpoint, m/s: nominal, and what it may run over where it catches up.
+/// Speed limit of setpoints, m/s: the nominal speed, with what a setpoint that catches up may
+/// exceed it by.
 const SPEED_MPS: f32 = 2.2;
 
 type Mate = Companion<VEHICLES, WAYPOINTS, GATES>;
 
-/// A vehicle with its companion.
+/// A vehicle of a meeting with its companion.
 pub(super) struct Member {
     pub(super) companion: Mate,
     pub(super) autopilot: Autopilot,
@@ -36,11 +37,11 @@ pub(super) struct Member {
     pub(super) hears: bool,
     pub(super) bytes: Vec<u8>,
     pub(super) commands: u8,
-    /// Stops by the safety filter so far, and since when the last one lasts.
+    /// Number of stops by the safety filter, and since when the last one lasts (`stopped_since`).
     pub(super) stops: u32,
     pub(super) stopped_since: Option<Instant>,
     pub(super) longest_stop_s: f32,
-    /// How often it found its path blocked.
+    /// Number of times that its companion found its path blocked.
     pub(super) blocked: u32,
 }
 
@@ -104,7 +105,8 @@ impl Member {
         }
     }
 
-    /// A stop by the filter lasts until nobody is waited for, or the vehicle flies.
+    /// Updates the length of the longest stop by the filter: one ends when the companion waits for
+    /// no vehicle any more, or the vehicle flies again.
     pub(super) fn note_stops(&mut self, now: Instant) {
         let stops = self.companion.filter_stop_count();
         if core::mem::replace(&mut self.stops, stops) != stops {

@@ -1,8 +1,8 @@
-//! Meetings: two to six whole companions, each with a light autopilot, on a radio that loses and
-//! delays.
+//! Simulates meetings: two to six whole companions, each with a light autopilot, on a radio that
+//! loses and delays frames.
 //!
-//! A meeting follows from its seed. [`fly`] flies it and says what went wrong; [`oracle`] is the
-//! judge. Nothing here uses the safety filter's code.
+//! A meeting follows from its seed. [`fly`] simulates it and returns what went wrong, as judged by
+//! [`oracle`]. Nothing here uses the safety filter's code.
 
 pub mod autopilot;
 pub mod dice;
@@ -33,9 +33,10 @@ use self::planner::around;
 use self::scene::{Scene, What, floor_z, landing};
 use crate::setpoints::SetpointStats;
 
-/// After everything has happened and all stand, this much is still flown, seconds.
+/// Time for which a meeting goes on after its last event and with all vehicles at rest, seconds.
 const AFTERMATH_S: f32 = 3.0;
-/// A landing keeps this much more than the safety distance from what is below, metres.
+/// Horizontal distance beyond the safety distance within which a vehicle counts as above another
+/// one, metres.
 const LANDING_DRIFT_M: f32 = 1.0;
 const STEP_MS: u64 = 25;
 
@@ -47,7 +48,7 @@ struct World<'a> {
     trace: Option<Vec<String>>,
 }
 
-/// Flies a meeting; with `traced` the outcome says what happened.
+/// Simulates a meeting; with `traced` the outcome has a log of what happened.
 pub fn fly(scene: &Scene, traced: bool) -> Outcome {
     let mut world = World::new(scene, traced);
     let mut oracle = Oracle::new(scene.vehicles.len());
@@ -151,7 +152,7 @@ impl<'a> World<'a> {
             What::PilotLands if airborne && member.autopilot.flown() == Flown::Other => {
                 member.autopilot.pilot_lands();
             }
-            // A dead companion's ArduCopter stays in Guided.
+            // The autopilot of a dead companion may still be in Guided (ArduCopter).
             What::PilotLands if airborne && member.dead => member.autopilot.pilot_lands(),
             What::Fails(how) if airborne => member.autopilot.fail(how),
             What::PilotTakes(_) | What::PilotReturns | What::PilotLands | What::Fails(_) => {}
@@ -163,7 +164,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// A command of the ground station; it is not lost.
+    /// Sends a vehicle a command of the ground station, without loss or delay.
     fn command(&mut self, vehicle: usize, command: MavCmd, param1: f32) {
         let member = &mut self.members[vehicle];
         if member.dead {
@@ -320,7 +321,8 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Whether a vehicle can neither go away nor land: something holds it over another one.
+    /// Whether a vehicle can neither move away nor land, since something holds it above another
+    /// one.
     fn is_caught_above_another(&self, i: usize) -> bool {
         let own = &self.members[i];
         let place = own.autopilot.position;

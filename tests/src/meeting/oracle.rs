@@ -1,12 +1,12 @@
 //! The judge of a meeting. It computes the sets of the safety filter by their definition, from the
-//! messages that a vehicle received and from the truth, and none of it with the companion's code.
+//! messages that a vehicle received and from true motion, without any of the companion's code.
 //!
-//! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by what the
-//!   vehicle lags. In a landing the column to the floor.
-//! - *A neighbour's set*: heard within 1 s, the points it reports from its last position, as far as
-//!   its speed takes it in its age + 0.1 s and in a stop after that; off these points, its
-//!   velocity, widened by ½·a·age²; older, a ball. A column to the floor while it climbs, descends
-//!   or lands.
+//! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by the vehicle's
+//!   lag. In a landing the column to the floor.
+//! - *A neighbour's set*: if heard within 1 s, the points that it reports from its last position
+//!   on, as far as its speed takes it in its age + 0.1 s and in a stop after that; off these
+//!   points, its velocity, widened by ½·a·age²; if older, a ball. A column to the floor while it
+//!   climbs, descends or lands.
 //!
 //! A violation of the safety distance is a failure if a stop of each vehicle, begun at the first
 //! step at which its sets came too near, would have kept the distance.
@@ -17,46 +17,46 @@ use planner_core::Point;
 use super::autopilot::STEP_S;
 use super::scene::{CRUISE_MPS, SAFETY_M};
 
-/// Braking along a path, m/s².
+/// Deceleration of a stop along a path, m/s².
 const ACCEL: f32 = 1.5;
-/// The jerk of a stop by the safety filter, m/s³.
+/// Jerk of a stop by the safety filter, m/s³.
 const JERK: f32 = 8.0;
-/// What a real vehicle lags its setpoint, as time, seconds.
+/// Time by which a vehicle lags behind its setpoint, seconds.
 const LAG_S: f32 = 0.35;
-/// Latest time at which a neighbour's points are believed, seconds.
+/// Greatest age at which a neighbour's reported points are believed, seconds.
 const FRESH_S: f32 = 1.0;
-/// A silent neighbour's ball grows so long, seconds.
+/// Age up to which the ball of a silent neighbour grows, seconds.
 const GROWS_S: f32 = 3.0;
-/// Sets that come apart for no longer than this stay one approach, steps.
+/// Steps for which sets may be apart within one approach.
 const GAP_STEPS: usize = 40;
-/// A stop has to keep this much more than the distance to count as one that would have kept it,
+/// Margin over the safety distance by which a stop must have kept it to count as one that would,
 /// metres.
 const SURE_M: f32 = 0.05;
 
-/// What a vehicle last heard of another.
+/// What a vehicle last received from another one.
 #[derive(Clone, Debug, Default)]
 pub struct Heard {
-    /// Place, velocity, sender's clock and when it came, seconds.
+    /// Position, velocity, the sender's clock (ms), and when it was received, seconds.
     pub position: Option<(Point, Point, u32, f32)>,
-    /// Intent.
+    /// The last intent received.
     pub intent: Option<Intent>,
 }
 
-/// A neighbour's set.
+/// Where a vehicle can be: segments widened by a radius.
 #[derive(Clone, Debug, Default)]
 pub struct Set {
     segments: Vec<(Point, Point)>,
     radius_m: f32,
 }
 
-/// How far a vehicle goes at this speed: `before_s`, then a stop.
+/// Distance that a vehicle covers from this speed: `before_s` at that speed, then a stop, metres.
 fn reach(speed: f32, before_s: f32) -> f32 {
     speed * before_s + speed * speed / (2.0 * ACCEL) + speed * ACCEL / (2.0 * JERK)
 }
 
-/// Distance between two segments.
+/// Distance between two segments, metres.
 pub fn distance(p: (Point, Point), q: (Point, Point)) -> f32 {
-    // Alternating projections settle fast enough on segments: the distance is convex.
+    // Alternating projections: the distance is convex, so they converge fast enough on segments.
     let onto = |at: Point, (from, to): (Point, Point)| {
         let along = to - from;
         let length_sq = along.norm_squared();
@@ -78,7 +78,7 @@ pub fn distance(p: (Point, Point), q: (Point, Point)) -> f32 {
     least
 }
 
-/// Where a neighbour can be, by what was heard of it.
+/// Where a neighbour can be, by what was received from it; `None` without a position.
 pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
     let (position, velocity, _, at_s) = heard.position?;
     let age_s = now_s - at_s;
@@ -122,7 +122,7 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
     Some(set)
 }
 
-/// Where a vehicle that brakes now can be.
+/// Where a vehicle that begins to stop now can be.
 pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> Set {
     let speed = velocity.norm();
     let mut segments = vec![(position, position)];
@@ -135,7 +135,7 @@ pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> S
 }
 
 impl Set {
-    /// Distance to another set.
+    /// Distance to another set, metres.
     pub fn distance(&self, other: &Self) -> f32 {
         let pairs = self.segments.iter().flat_map(|p| other.segments.iter().map(move |q| (*p, *q)));
         pairs.map(|(p, q)| distance(p, q)).fold(f32::INFINITY, f32::min)
@@ -144,40 +144,40 @@ impl Set {
     }
 }
 
-/// A vehicle at a step.
+/// What the judge sees of a vehicle at one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// Truth.
+    /// True position, ENU metres.
     pub position: Point,
-    /// Truth.
+    /// True velocity, ENU m/s.
     pub velocity: Point,
-    /// Off the ground.
+    /// Whether the vehicle is off the ground.
     pub airborne: bool,
-    /// Its companion can stop it.
+    /// Whether its companion controls it, and so could stop it.
     pub own: bool,
-    /// It lands by its autopilot, as its companion commanded.
+    /// Whether it lands by its autopilot, at its companion's command.
     pub lands: bool,
-    /// It has heard no other vehicle for so long that it has to come down where it is.
+    /// Whether it has heard no other vehicle for so long that it has to land where it is.
     pub deaf: bool,
 }
 
-/// Two vehicles that came too near.
+/// An approach of two vehicles below the safety distance.
 #[derive(Clone, Copy, Debug)]
 pub struct Violation {
-    /// Indices.
+    /// Indices of both vehicles.
     pub pair: (usize, usize),
-    /// When they were nearest, seconds.
+    /// When the vehicles were nearest, seconds.
     pub at_s: f32,
-    /// Their distance then, metres.
+    /// Their distance at that time, metres.
     pub least_m: f32,
-    /// When the sets of each first came too near, seconds.
+    /// When the sets of each vehicle first came too near in this approach, seconds; `None`: never.
     pub warned_s: [Option<f32>; 2],
-    /// The distance that stops from there would have kept.
+    /// Smallest distance if each vehicle had stopped from its `warned_s` on, metres.
     pub kept_m: f32,
 }
 
 impl Violation {
-    /// Whether a stop would have kept the safety distance.
+    /// Whether stops would have kept the safety distance, so that the filter failed.
     pub fn is_failure(&self) -> bool {
         self.kept_m >= SAFETY_M + SURE_M
     }
@@ -189,23 +189,23 @@ struct Approach {
     last: usize,
 }
 
-/// Watches a meeting.
+/// Watches and judges a meeting.
 #[derive(Debug)]
 pub struct Oracle {
     count: usize,
     tracks: Vec<Vec<Seen>>,
     approaches: Vec<Option<Approach>>,
-    /// For each pair that is too near: since when, warned since when, and the nearest step and
-    /// distance.
+    /// For each pair that is too near: when its sets came too near, the step at which it was
+    /// nearest, and that distance.
     near: Vec<Option<Near>>,
-    /// What went wrong.
+    /// Approaches below the safety distance that have ended.
     pub violations: Vec<Violation>,
     touching: Vec<bool>,
-    /// Touches: seconds, the vehicle that moved, the other, metres.
+    /// Touches: seconds, index of the vehicle that moved toward the other, the other's, metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
-    /// Touches of a vehicle that was carried off unheard: no message puts it there.
+    /// Touches of a vehicle that was carried off unheard: no message places it there.
     pub unforeseen: usize,
-    /// The smallest distance of two vehicles, one of them off the ground.
+    /// Smallest distance between two vehicles, not both on the ground, metres.
     pub least_m: f32,
 }
 
@@ -216,15 +216,15 @@ struct Near {
     least_m: f32,
 }
 
-/// Centres nearer than this touch: twice the hull's radius.
+/// Distance of centres below which two vehicles touch, metres: twice the hull's radius.
 pub const TOUCH_M: f32 = 0.6;
-/// A vehicle that comes nearer at less does not move toward the other, m/s.
+/// Closing speed below which a vehicle does not count as moving toward the other, m/s.
 const TOWARD_MPS: f32 = 0.15;
-/// Too near ends this far beyond, metres.
+/// Distance beyond the safety distance at which an approach ends, metres.
 const APART_M: f32 = 0.1;
 
 impl Oracle {
-    /// Watches `count` vehicles.
+    /// A judge of `count` vehicles.
     pub fn new(count: usize) -> Self {
         Self {
             count,
@@ -239,7 +239,8 @@ impl Oracle {
         }
     }
 
-    /// Takes a step in; `heard` is what vehicle a heard of vehicle b.
+    /// Judges one step; `heard(a, b)` is what vehicle a received from b. Sets are judged only with
+    /// `judge_sets`.
     pub fn observe(
         &mut self,
         seen: &[Seen],
@@ -259,8 +260,8 @@ impl Oracle {
                     self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
                 }
                 if a < b {
-                    // Carried off unheard, by its pilot or its autopilot, it is nowhere that its
-                    // companion's silence allows.
+                    // A vehicle carried off unheard by its pilot or autopilot is where its
+                    // companion's silence does not allow it.
                     let carried = |from: usize, to: usize| {
                         heard(from, to).position.is_some_and(|(place, _, _, at_s)| {
                             now_s - at_s > GROWS_S
@@ -283,7 +284,7 @@ impl Oracle {
         floor_z: &impl Fn(&Point) -> f32,
     ) {
         let Some((position, ..)) = heard.position else { return };
-        // Nothing reaches further.
+        // No set reaches further.
         if (position - own.position).xy().norm() > 15.0 {
             return;
         }
@@ -351,27 +352,28 @@ impl Oracle {
         }
     }
 
-    /// Where a vehicle would be if it had begun to stop at `warned`.
+    /// Position of a vehicle at `step` if it had begun to stop at `warned`, on the path that it
+    /// flew.
     fn stopped(&self, vehicle: usize, warned: Option<usize>, step: usize) -> Point {
         let track = &self.tracks[vehicle];
         let Some(warned) = warned.filter(|warned| *warned < step) else {
             return track[step].position;
         };
         if track[warned..=step].iter().any(|seen| !seen.own || (seen.deaf && seen.lands)) {
-            // Somebody else took it: its companion could not have stopped it. Nor could a vehicle
-            // stay up for good that hears no other vehicle any more.
+            // A pilot or failsafe flew it, so its companion could not have stopped it. Nor could a
+            // vehicle that hears no other any more stay up for good.
             return track[step].position;
         }
         let speed = track[warned].velocity.norm();
         let time_s = (step - warned) as f32 * STEP_S;
         let before_s = 0.1 + LAG_S;
         let braked_s = (time_s - before_s).max(0.0);
-        // The time that jerk costs goes at full speed.
+        // The jerk of the stop costs half a ramp at full speed.
         let ramp_s = ACCEL / (2.0 * JERK);
         let brakes_s = (braked_s - ramp_s).clamp(0.0, speed / ACCEL);
         let gone_m = speed * (time_s.min(before_s) + braked_s.min(ramp_s)) + speed * brakes_s
             - 0.5 * ACCEL * brakes_s * brakes_s;
-        // Along what it flew: it would have left it nowhere.
+        // The stop would have been on the path that it flew.
         let mut left_m = gone_m;
         for pair in track[warned..=step].windows(2) {
             let part = (pair[1].position - pair[0].position).norm();
@@ -404,7 +406,7 @@ impl Oracle {
         });
     }
 
-    /// Ends the meeting.
+    /// Ends the meeting: approaches that still last are judged.
     pub fn finish(&mut self) {
         for a in 0..self.count {
             for b in a + 1..self.count {

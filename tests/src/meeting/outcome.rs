@@ -1,65 +1,65 @@
-//! How meetings ended: one, in a line, and many, counted.
+//! How meetings ended: one in a line, and many as counts.
 
 use companion::State;
 
 use super::oracle::Violation;
 use crate::setpoints::SetpointStats;
 
-/// How a meeting ended.
+/// How one meeting ended.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Its seed.
+    /// Seed of the meeting.
     pub seed: u64,
-    /// Its geometry.
+    /// Geometry of the meeting, one of `KINDS` or `PASSINGS`.
     pub kind: &'static str,
-    /// Whether the vehicles shared a plan.
+    /// Whether the vehicles flew one common plan.
     pub on_plan: bool,
-    /// Whether a vehicle's reports were wrong.
+    /// Whether one vehicle lied in its reports.
     pub lies: bool,
-    /// Vehicles.
+    /// Number of vehicles.
     pub vehicles: usize,
-    /// Times at which two vehicles were nearer than the safety distance.
+    /// Approaches of two vehicles below the safety distance.
     pub violations: Vec<Violation>,
-    /// Touches by own motion: seconds, the vehicle that moved, the other, metres.
+    /// Touches: seconds, index of the vehicle that moved toward the other, the other's, metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
-    /// Touches of a vehicle that was carried off unheard.
+    /// Number of touches of a vehicle that was carried off unheard.
     pub unforeseen: usize,
-    /// Indices of vehicles that were not on the ground at the end, and their states.
+    /// Indices of the vehicles not on the ground at the end, and their companions' states.
     pub stuck: Vec<(usize, State)>,
-    /// Smallest distance, metres.
+    /// Smallest distance of two vehicles, metres.
     pub least_m: f32,
-    /// When it was over, seconds.
+    /// When the meeting ended, seconds.
     pub ended_s: f32,
-    /// Setpoints of all vehicles.
+    /// Statistics of the setpoints of all vehicles.
     pub setpoints: SetpointStats,
-    /// Setpoints that were not fit: vehicle, seconds, what.
+    /// Setpoints unfit to be flown: vehicle, seconds, and why.
     pub unfit: Vec<(usize, f64, String)>,
-    /// Vehicles that landed at their goals.
+    /// Number of vehicles that landed at their goals.
     pub arrived: usize,
-    /// How often the safety filter stopped one.
+    /// Number of stops by the safety filter, of all vehicles.
     pub filter_stops: u32,
-    /// For how long at most, seconds.
+    /// Longest stop by the safety filter, seconds.
     pub longest_stop_s: f32,
-    /// How often one vehicle found its path blocked, at most.
+    /// Greatest number of times that one vehicle found its path blocked.
     pub most_blocked: u32,
-    /// What happened, if that was asked for.
+    /// Log of what happened, if that was requested.
     pub trace: Vec<String>,
 }
 
 impl Outcome {
-    /// Violations that a stop would have prevented.
+    /// The approaches that a stop would have prevented.
     pub fn failures(&self) -> impl Iterator<Item = &Violation> {
         self.violations.iter().filter(|violation| violation.is_failure())
     }
 
-    /// Whether a rule was broken: of an honest meeting, or of one with a liar.
+    /// Whether the meeting broke a rule; a meeting with a liar may have vehicles too near.
     pub fn is_bad(&self) -> bool {
         let near = !self.lies && self.failures().next().is_some();
         near || !self.touches.is_empty() || !self.stuck.is_empty()
     }
 }
 
-/// One line about a meeting.
+/// One line of text about a meeting.
 pub fn line(outcome: &Outcome) -> String {
     let Outcome { seed, kind, vehicles, ended_s, least_m, arrived, .. } = outcome;
     let plan = if outcome.on_plan { "on plan" } else { "off plan" };
@@ -85,26 +85,26 @@ pub fn line(outcome: &Outcome) -> String {
     line
 }
 
-/// Counts over many meetings.
+/// Counts over many meetings; in arrays, those without a liar, then those with one.
 #[derive(Clone, Debug, Default)]
 pub struct Summary {
-    /// Meetings without a liar, and with one.
+    /// Number of meetings.
     pub meetings: [usize; 2],
-    /// Of those: too near although a stop would have kept apart.
+    /// Meetings with vehicles too near although a stop would have kept them apart.
     pub too_near: [usize; 2],
-    /// Too near, and no stop would have helped.
+    /// Meetings with vehicles too near, where no stop would have helped.
     pub unavoidable: [usize; 2],
-    /// Touches by own motion.
+    /// Meetings with a touch by a vehicle's own motion.
     pub touches: [usize; 2],
-    /// With a touch of a vehicle that was carried off unheard.
+    /// Meetings with a touch of a vehicle that was carried off unheard.
     pub unforeseen: usize,
-    /// Somebody had not landed in the end.
+    /// Meetings with a vehicle that had not landed at the end.
     pub stuck: [usize; 2],
-    /// Vehicles, and those that landed at their goals.
+    /// Number of vehicles, and of those that landed at their goals.
     pub arrived: (usize, usize),
 }
 
-/// Counts.
+/// Counts the outcomes of meetings.
 pub fn summary(outcomes: &[Outcome]) -> Summary {
     let mut sum = Summary::default();
     for outcome in outcomes {
@@ -123,7 +123,7 @@ pub fn summary(outcomes: &[Outcome]) -> Summary {
 }
 
 impl Summary {
-    /// Whether a rule was broken.
+    /// Whether a rule was broken: also if over 5 % of honest meetings were unavoidably too near.
     pub fn is_bad(&self) -> bool {
         self.too_near[0] > 0
             || self.touches != [0; 2]

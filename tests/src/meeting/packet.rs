@@ -1,4 +1,4 @@
-//! Frames on the radio, and where the meetings are.
+//! Frames on the radio of a meeting, and the meetings' origin.
 
 use companion::Instant;
 use companion::link::intent::Intent;
@@ -8,7 +8,7 @@ use planner_core::frames::Geodetic;
 /// Origin of the mission frame.
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
-/// What a radio frame says, for the judge.
+/// Content of a radio frame, decoded for the judge.
 #[derive(Clone, Debug)]
 pub(super) enum Said {
     Position(Point, Point, u32),
@@ -16,7 +16,7 @@ pub(super) enum Said {
     Other,
 }
 
-/// A frame on its way.
+/// A frame on its way to a receiver.
 pub(super) struct Packet {
     pub(super) at: Instant,
     pub(super) from: usize,

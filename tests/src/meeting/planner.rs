@@ -1,4 +1,4 @@
-//! The planner of detours: in the open, with nothing around but vehicles.
+//! A planner of detours in the open, where vehicles are the only obstacles.
 
 use planner_core::Point;
 use planner_core::detour::{DetourRequest, KeepOutZone, ZoneKind};
@@ -7,7 +7,8 @@ use planner_core::flight::Path;
 use super::oracle;
 use super::scene::Plan;
 
-/// A way around in the open: straight, or past one or two points beside and above.
+/// A detour in the open around the zones in `keep`: straight, or past one or two points beside and
+/// above; `None` if none is clear.
 pub(super) fn around(request: &DetourRequest, keep: &[KeepOutZone], own: &Plan) -> Option<Plan> {
     let last = own.path.waypoints().last()?.position;
     let ground = last - Point::new(0.0, 0.0, request.descent_m);

@@ -1,5 +1,4 @@
-//! Random meetings: which vehicle flies from where to where, by which plan, and what happens to
-//! them.
+//! Random meetings: where each vehicle flies, by which plan, and what else happens to it.
 
 mod happenings;
 mod passing;
@@ -21,12 +20,13 @@ use self::ways::{KINDS, Shape, fits, flight, pads, way};
 use super::autopilot::{Catch, Failsafe};
 use super::dice::Dice;
 
-/// No vehicle departs later, seconds.
+/// Latest departure of a vehicle, seconds.
 const LATEST_S: f32 = 40.0;
-/// A meeting in which something catches a vehicle is over by then, seconds after its start.
+/// Time limit of a meeting in which something catches a vehicle, seconds after its start.
 const CAUGHT_LIMIT_S: f32 = 360.0;
 
-/// Height of the ground below a place: a platform under each pad and goal that is not on the floor.
+/// Height of the ground below a place, metres: the platform under a pad or goal above the floor,
+/// else 0.
 pub fn floor_z(vehicles: &[Vehicle], place: &Point) -> f32 {
     let mut floor = 0.0_f32;
     for vehicle in vehicles {
@@ -39,19 +39,19 @@ pub fn floor_z(vehicles: &[Vehicle], place: &Point) -> f32 {
     floor
 }
 
-/// Where a plan ends, on the ground.
+/// Where a plan ends on the ground; `None` for an empty path.
 pub fn landing(plan: &Plan) -> Option<Point> {
     plan.path.waypoints().last().map(|w| w.position - Point::new(0.0, 0.0, plan.descent_m))
 }
 
-/// The scene of a seed.
+/// The scene that follows from a seed.
 pub fn scene(seed: u64) -> Scene {
-    // A draw that leaves one vehicle alone is no meeting.
+    // Draws again if only one vehicle found a path: that is no meeting.
     (0..).find_map(|draw| drawn(seed, draw)).expect("some draw has room for two")
 }
 
-/// The scene of a seed in which something catches a vehicle, at any time of its flight, and nothing
-/// else happens.
+/// The scene of a seed in which something catches one vehicle in its flight, and nothing else
+/// happens.
 pub fn caught(seed: u64) -> Scene {
     let mut scene = scene(seed);
     let mut dice = Dice::new(seed ^ 0xCA06);
@@ -61,7 +61,7 @@ pub fn caught(seed: u64) -> Scene {
     let how = [Catch::Wall, Catch::Ledge, Catch::Net, Catch::Wind][dice.below(4)];
     scene.happenings.push(Happening { at_s, vehicle, what: What::Caught(how) });
     scene.happenings.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-    // Those that waited for it, one after the other, fly around it or land.
+    // Vehicles that wait for the caught one fly around it or land, one after the other.
     scene.limit_s = CAUGHT_LIMIT_S;
     scene.liar = None;
     scene

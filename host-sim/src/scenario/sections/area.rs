@@ -1,4 +1,4 @@
-//! `[area]`, and the scenario of a coverage mission around it.
+//! Reads the scenario of a coverage mission: `[area]`, and the tables that depend on it.
 
 use std::path::Path;
 
@@ -24,23 +24,23 @@ use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 
-/// Time after which a flight over an area is given up unless the scenario says otherwise, seconds:
-/// batteries last for less.
+/// Time limit of a simulated flight over an area if the scenario gives none, seconds: longer than a
+/// battery lasts.
 const DEFAULT_AREA_TIME_LIMIT_S: f32 = 3600.0;
 
-/// Cell of the level ground where there is no map, metres.
+/// Cell of the level ground that a coverage mission has in place of a map, metres.
 const LEVEL_GROUND_CELL_M: f32 = 1.0;
-/// Extent up to which coordinates given as metres are taken for degrees, metres.
+/// Extent in metres up to which an area in "metres" is refused: its numbers must be degrees.
 const MAX_DEGREES_EXTENT_M: f64 = 0.5;
 
-/// Meaning of the numbers of a polygon.
+/// Whether the numbers of a polygon are degrees or metres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Coordinates {
     Wgs84,
     Metres,
 }
 
-/// The scenario of a coverage mission.
+/// Reads the scenario of a coverage mission.
 pub(in crate::scenario) fn coverage(
     text: Text<'_>,
     root: &Table<'_>,
@@ -54,7 +54,7 @@ pub(in crate::scenario) fn coverage(
     let mut unsupported = Vec::new();
     let mut vehicles =
         read_vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
-    // Errors of goals missions that coverage missions do not have.
+    // These keys are unsupported in missions with goals, but not here.
     unsupported.retain(|error| !FLOWN_KEYS.iter().any(|key| error.why.ends_with(key)));
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
@@ -111,10 +111,10 @@ pub(in crate::scenario) fn coverage(
     })
 }
 
-/// Keys of a vehicle that only a coverage mission acts on.
+/// Keys of a vehicle that only coverage missions support.
 const FLOWN_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
 
-/// Pads have to be so far apart, however high they lie: no vehicle climbs through another one.
+/// Refuses pads less than `apart_m` apart horizontally: no vehicle may climb through another one.
 fn check_pads(
     text: Text<'_>,
     vehicles: &[Vehicle],
@@ -137,7 +137,7 @@ fn check_pads(
     Ok(())
 }
 
-/// No vehicle starts as high as pictures are taken, or higher.
+/// Refuses a vehicle that starts at or above the height at which pictures are taken.
 fn check_heights(
     text: Text<'_>,
     vehicles: &[Vehicle],
@@ -155,7 +155,7 @@ fn check_heights(
     Err(text.with_hint(&spans.start, why, ORIGIN_HINT))
 }
 
-/// `[mission]` of a coverage mission: it has no goals.
+/// Reads `[mission]` of a coverage mission, which has no goals.
 fn read_coverage_mission(
     table: &Table<'_>,
     vehicles: &[(Vehicle, VehicleSpans)],
@@ -176,7 +176,7 @@ fn read_coverage_mission(
     Ok(mission)
 }
 
-/// The area, and the file of the ground below it.
+/// Reads the area, and which file has the heights of the ground below it, if any.
 fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)> {
     let (polygons, coordinates, source) = read_polygons(table, folder)?;
     let given = table.get("origin").map(|v| read_geodetic(&v)).transpose()?;
@@ -229,7 +229,7 @@ fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFi
     Ok((area, terrain))
 }
 
-/// The polygons of the table, what their numbers are, and where they stand.
+/// Reads the area's polygons, whether they are in degrees or metres, and where they stand.
 fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, Span)> {
     let (file, polygon) = (table.get("file"), table.get("polygon"));
     let words = [
@@ -282,8 +282,8 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
     Ok((polygons, coordinates, span))
 }
 
-/// One ring: `[[x, y], …]` is metres unless `coordinates` says else, `[{ lat_deg, lon_deg }, …]` is
-/// degrees.
+/// Reads one ring: `[[x, y], …]` counts as metres unless `coordinates` says otherwise,
+/// `[{ lat_deg, lon_deg }, …]` is degrees.
 fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
     let items = value.items()?;
     let degrees = items.first().is_some_and(Value::is_table);
@@ -316,7 +316,7 @@ fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
     Ok((ring, if degrees { Coordinates::Wgs84 } else { Coordinates::Metres }))
 }
 
-/// The rings in the mission frame, checked.
+/// Converts the rings to the mission frame, and refuses rings that form no area.
 fn rings_in_mission_frame(
     table: &Table<'_>,
     source: &Span,
@@ -350,7 +350,7 @@ fn rings_in_mission_frame(
                     geodetic_to_enu(origin, &place).xy()
                 }
             };
-            // Two that f32 or the user makes one are one.
+            // Vertices that are equal up to rounding, or were given twice, become one.
             let repeats = vertices[begin..]
                 .last()
                 .is_some_and(|last: &Flat| (place - last).amax() < SAME_VERTEX_M);
@@ -387,7 +387,7 @@ fn rings_in_mission_frame(
     }
 }
 
-/// Reason why rings that do not cross still form no area, and a remedy.
+/// Reason why rings that do not cross still form no area, and a remedy; `None` if they do.
 fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
     let of = |kind: RingKind| {
         let indices = 0..area.rings().len();
@@ -403,7 +403,7 @@ fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
     })
 }
 
-/// Description of an area's fault, for a person.
+/// Text about an area's fault, which names the ring or vertex.
 fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -> String {
     use core_area::AreaError as E;
     let ring = |index: u16| {
@@ -478,7 +478,7 @@ fn read_pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>)
     Ok([item(a)?, item(b)?])
 }
 
-/// Height of the pictures; footprint and spacings.
+/// Reads the height of the pictures, and footprint, lane and waypoint distance.
 fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)> {
     let height = table.get("height_m");
     let gsd = table.get("gsd_m");
@@ -508,7 +508,7 @@ fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spac
     let front = table.f32("overlap_front", 0.7, 0.0..=0.95)?;
     let footprint = match camera {
         Some(camera) => camera.footprint(height_m).map_err(|error| spacing_error(table, &error))?,
-        // Without a camera the spacings are what one picture shows.
+        // Without a camera, the given spacings are taken as the footprint of a picture.
         None => match (&lane, &waypoint) {
             (Some((lane_m, _)), Some((waypoint_m, _))) => {
                 Footprint { along_m: *waypoint_m, across_m: *lane_m }

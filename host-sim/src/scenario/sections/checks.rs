@@ -1,4 +1,4 @@
-//! What must hold between the tables of a scenario.
+//! Checks between several tables of a scenario.
 
 use planner_core::Point;
 use sim_autopilot::Estimator;
@@ -7,15 +7,15 @@ use crate::margins;
 use crate::scenario::reader::{Result, Span, Table, Text};
 use crate::scenario::{Deconfliction, Mission, Mode, Roadmap, Simulation, Vehicle};
 
-/// Places that errors about a vehicle point at.
+/// Where the keys of a vehicle stand in the scenario, for errors.
 pub(super) struct VehicleSpans {
     pub(super) start: Span,
     pub(super) goal: Option<Span>,
     pub(super) table: Span,
 }
 
-/// Where estimates err as recorded, separation and, with a roadmap, its margin must leave room for
-/// it.
+/// With `estimator = "recorded"`, refuses a separation, and a safety margin if there is a roadmap,
+/// that leave no room for the estimates' errors.
 pub(super) fn check_margins(
     text: Text<'_>,
     span: &Span,
@@ -69,7 +69,8 @@ pub(super) fn check_apart(
     Ok(())
 }
 
-/// Vehicles land below their goals: two goals too near would put two vehicles too near for good.
+/// Refuses goals nearer than the safety distance: vehicles that land below them would stay too
+/// near.
 pub(super) fn check_goals_apart(
     table: &Table<'_>,
     mission: &Mission,
@@ -96,7 +97,7 @@ pub(super) fn check_goals_apart(
     Ok(())
 }
 
-/// No vehicle starts or lands outside the geofence.
+/// Refuses a vehicle's start, or a goal, outside the geofence.
 pub(super) fn check_inside(
     table: &Table<'_>,
     vehicles: &[(Vehicle, VehicleSpans)],
@@ -117,7 +118,7 @@ pub(super) fn check_inside(
     }
 }
 
-/// Place of a goal in the scenario.
+/// Where a goal stands in the scenario, for errors.
 fn goal_span(table: &Table<'_>, index: usize) -> Span {
     let Some(goals) = table.get("goals") else {
         return table.get("goals_file").map_or(table.span.clone(), |v| v.span);

@@ -1,4 +1,4 @@
-//! The tables of how a mission is flown: deconfliction, simulation, faults.
+//! Reads the tables of how a mission is flown: deconfliction, simulation, faults.
 
 use companion::config::SAFETY_DISTANCE_M;
 use planner_core::deconflict::Method;
@@ -8,13 +8,13 @@ use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
-/// The table of a mission in which vehicles deviate from their paths by `stray_m` together, unless
-/// it says otherwise.
+/// Reads `[deconfliction]`. The default of `separation_m` is the safety distance and `stray_m`, by
+/// which two vehicles together deviate from their paths, metres.
 pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods =
         [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.one_of("method", Method::Priority, &methods)?;
-    // Companions refuse a distance of 0.
+    // A safety distance of 0 is refused by companions.
     let safety_distance_m = table.f32("safety_distance_m", SAFETY_DISTANCE_M, 0.01..=1000.0)?;
     let separation_m = table.f32(
         "separation_m",
@@ -26,7 +26,7 @@ pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deco
     Ok(deconfliction)
 }
 
-/// The table of a mission that is given up after `limit_s`, unless it says otherwise.
+/// Reads `[simulation]`; `limit_s` is the default of `time_limit_s`, seconds.
 pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
     let simulation = Simulation {
         wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,

@@ -1,4 +1,4 @@
-//! The ground below an area: `terrain` and `terrain_tolerance_m` of `[area]`.
+//! Reads the ground below an area: `terrain` and `terrain_tolerance_m` of `[area]`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,12 +16,12 @@ use crate::scenario::reader::{Result, Span, Table, Text};
 use crate::scenario::{Mission, Simulation, Vehicle};
 use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError};
 
-/// Greatest difference between a pad's given height and the ground, on which the pad lies, metres.
+/// Greatest difference between a start's given height and the ground below it, metres.
 const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
-/// Extent of paths beside lanes and around corners, metres.
+/// How far beside lanes and around corners paths may lead, metres.
 const AROUND_LANES_M: f32 = 5.0;
 
-/// Content of the table about the ground.
+/// The file of heights that `[area]` names, not yet read.
 pub(super) struct TerrainFile {
     path: PathBuf,
     span: Span,
@@ -30,7 +30,8 @@ pub(super) struct TerrainFile {
 }
 
 impl TerrainFile {
-    /// The terrain by `[area]`; `metres` where its coordinates are.
+    /// The file of heights that `[area]` names, if any; `metres`: the area's coordinates are
+    /// metres.
     pub(super) fn from_table(
         table: &Table<'_>,
         folder: &Path,
@@ -74,7 +75,7 @@ impl TerrainFile {
         }
     }
 
-    /// The ground at the origin, metres above sea level.
+    /// Height of the ground at the origin, metres above sea level.
     pub(super) fn altitude_m(&self, text: Text<'_>, origin: &Geodetic) -> Result<f64> {
         let grid = self.read(text, origin, [Flat::repeat(-1.0), Flat::repeat(1.0)])?;
         let height_m = grid.height_at(&Flat::zeros());
@@ -88,7 +89,7 @@ impl TerrainFile {
         })
     }
 
-    /// Lays the area above the ground, and the vehicles on it.
+    /// Reads the heights; sets the area's heights above them, and puts the vehicles on the ground.
     pub(super) fn apply_terrain(
         &self,
         text: Text<'_>,
@@ -102,7 +103,7 @@ impl TerrainFile {
             [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)],
             |[low, high], place| [low.inf(place), high.sup(place)],
         );
-        // Lanes may begin beyond the border, by the margin and half of what a picture shows.
+        // Lanes may begin outside the border, by the margin and half a footprint.
         let beyond =
             Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
         let own: Vec<Vehicle> = vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();

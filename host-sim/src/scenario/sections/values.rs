@@ -1,13 +1,13 @@
-//! Values that several tables have.
+//! Reads values that several tables of a scenario have.
 
 use planner_core::Point;
 
 use crate::scenario::reader::{Result, Value};
 
-/// Most vehicles of a swarm: the system ids there are.
+/// Highest MAVLink system id of a vehicle.
 pub(super) const MAX_ID: u64 = 250;
 
-/// Three numbers.
+/// Reads a point given as three numbers: east, north, up in metres.
 pub(super) fn read_point(value: &Value<'_>) -> Result<Point> {
     value.triple().map(|[x, y, z]| Point::new(x as f32, y as f32, z as f32))
 }

@@ -1,8 +1,8 @@
-//! Assignment beside the crate `lapjv`, on the same f32 matrices: uniform reals, and small integers
-//! full of ties.
+//! Times our assignment beside the crate `lapjv`, on the same f32 cost matrices: uniform reals, and
+//! small integers full of ties.
 //!
 //! Both are run alternately, so that a slow spell of the machine strikes both, and the medians are
-//! compared. Each run of ours includes the check of the input; each run of theirs the allocation it
+//! compared. A run of ours includes its check of the input, a run of theirs the allocation that it
 //! cannot do without.
 
 use std::hint::black_box;
@@ -14,7 +14,7 @@ use crate::row::Row;
 
 const LARGEST: usize = 1000;
 
-/// One row for N = 10, 100, 1000 and each kind of matrix, microseconds.
+/// Two rows, one for each kind of matrix, for N = 10, 100 and 1000; times in microseconds.
 pub fn rows() -> Vec<Row> {
     let mut ws = Box::new(AssignmentWorkspace::<LARGEST>::new());
     let mut rows = Vec::new();
@@ -47,8 +47,8 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
             theirs.push(start.elapsed());
             let their_total: f64 =
                 columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
-            // Theirs sums prices in f32 and may miss the optimum by that rounding; ours must never
-            // be worse.
+            // `lapjv` sums prices in f32 and may miss the optimum by their rounding; ours must
+            // never cost more.
             assert!(
                 result.total <= their_total + 1e-9 * their_total,
                 "seed {seed}: not the optimum"
@@ -71,7 +71,8 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
     }
 }
 
-/// Uniform in [1, 100), from a seeded SplitMix64.
+/// A random cost matrix, values uniform in [1, 100) from a seeded SplitMix64; integers are rounded
+/// down.
 fn random_costs(n: usize, kind: Kind, seed: u64) -> Vec<f32> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mut unit = || {

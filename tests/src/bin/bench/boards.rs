@@ -1,4 +1,5 @@
-//! Ten emulated boards fly the demo twice, once beside eight busy processes: the same flight.
+//! Ten emulated boards fly the demo twice, once while eight processes keep the machine busy: both
+//! flights must be the same.
 
 use std::process::{Command, Stdio};
 
@@ -8,10 +9,10 @@ use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::{scenario, swarm};
 
-/// Processes that keep this machine busy.
+/// Number of processes that keep this machine busy during the second flight.
 const BUSY: usize = 8;
 
-/// Flies, compares and prints.
+/// Flies the demo on boards twice, compares both flights and prints how long they took.
 pub fn run() -> Result<()> {
     let Some(program) = board::program("flockmate") else { return Ok(()) };
     let folder = tempfile::tempdir()?;

@@ -1,15 +1,16 @@
-//! Coverage beside the public C++ BINPAT, on its kind of area: five vertices, 300 by 150 m, lanes
-//! of 10 m.
+//! Times our coverage planner beside the public C++ BINPAT, on its kind of area: five vertices, 300
+//! by 150 m, lanes of 10 m.
 //!
 //! `--binpat DIR` is a checkout of cvar-upm/multi_uav_planning_binpat; `tests/peers/binpat.cpp`
 //! times it. Both are run alternately. Both do the same work: from the vertices to the flights,
-//! written out as points with heights (place, layer, both ends of every lane, home). For the loss,
-//! each vehicle has flown ten waypoints of its route, 90 m, and stands there; the first one is
-//! lost. What each has not flown is divided among the rest from where they stand, and written out.
+//! written out as points with heights (start, layer, both ends of every lane, home). For the loss
+//! of a vehicle, each has flown ten waypoints of its route, 90 m, and stands there; then the first
+//! one is lost. The remaining lanes are divided among the others from where they stand, and written
+//! out.
 //!
 //! What differs: theirs cuts the path anywhere, ours between waypoints. Theirs layers flights by
-//! the way to and from their part, ours by the time of all. Theirs also compares the new longest
-//! flight with the old one.
+//! the path to and from their part, ours by the time of the whole flight. Theirs also compares the
+//! new longest flight with the old one.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -33,22 +34,22 @@ use planner_core::flight::WaypointRange;
 
 use crate::row::Row;
 
-/// Random areas of which the costs are compared.
+/// Number of random areas on which the methods' costs are compared.
 const AREAS: u64 = 1000;
-/// Runs of each round, of which the median counts.
+/// Runs in each round; their median counts.
 const RUNS: usize = 301;
-/// Rounds of ours and theirs in turn.
+/// Rounds, each of our runs and then theirs; the median of the rounds counts.
 const ROUNDS: usize = 5;
 const LANES: usize = 512;
 const VEHICLES: usize = 32;
 const VERTICES: [[f32; 2]; 5] =
     [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 
-/// Plan and replanning at 3 and 10 vehicles; POWELL at 3, beside what it may take; the costs of all
-/// methods.
+/// Rows for a plan and for planning after a loss, with 3 and 10 vehicles; for POWELL with 3, beside
+/// the time it may take; and for the costs of all methods.
 ///
 /// # Errors
-/// Theirs cannot be built or run.
+/// The C++ program cannot be built or run.
 pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     let peer = checkout.map(build).transpose()?;
@@ -98,9 +99,9 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The largest costs of the methods on random convex areas for 2 to 10 vehicles: shares of the
-/// areas beside what they must be, and the median gap of POWELL to the best division beside what it
-/// may be.
+/// Compares the greatest costs of the methods on random convex areas for 2 to 10 vehicles. Rows:
+/// the share of areas for which a relation holds, beside the share required, and POWELL's median
+/// gap to the best division, beside the gap allowed.
 fn costs() -> Vec<Row> {
     let costs = Costs::of(0..AREAS);
     println!("coverage: {costs:?}");
@@ -117,7 +118,7 @@ fn costs() -> Vec<Row> {
             n: costs.areas,
         }
     };
-    // At no gap at all the ratio is still a number.
+    // With a gap of 0 the ratio would be infinite.
     let gap = f64::from(costs.gaps[2]).max(0.01);
     let name = "coverage, gap of POWELL to exact, median".to_owned();
     vec![
@@ -136,7 +137,7 @@ fn costs() -> Vec<Row> {
     ]
 }
 
-/// Builds our driver around their headers.
+/// Compiles `tests/peers/binpat.cpp` with the headers of the checkout; returns the program.
 fn build(checkout: &Path) -> Result<tempfile::TempPath> {
     let program = tempfile::NamedTempFile::new()?.into_temp_path();
     let include = checkout.join("planning_binpat/include");
@@ -162,7 +163,7 @@ fn theirs_us(program: &Path, vehicles: usize) -> Result<[f64; 2]> {
     times.try_into().map_err(|_| anyhow::anyhow!("the C++ BINPAT printed {text:?}"))
 }
 
-/// What plans are made from and into.
+/// Input and workspaces of our plans of the area, and the flights as points.
 struct Desk {
     vertices: Vec<Flat>,
     rings: [Ring; 1],
@@ -193,7 +194,7 @@ impl Desk {
         }
     }
 
-    /// The whole plan: from the vertices to the routes.
+    /// One whole plan: from the vertices to the flights as points.
     fn plan(&mut self) {
         let area = Area::new(black_box(&self.vertices), &self.rings).expect("an area");
         let mut transit = Transit::<8>::empty();
@@ -210,7 +211,7 @@ impl Desk {
     }
 }
 
-/// Every flight as points: place, its layer, the lanes, its layer, home.
+/// Writes every flight as points: start, up to its layer, the lanes, its layer, home.
 fn write_out(work: &Work<'_, LANES, 8>, plan: &Plan<VEHICLES>, points: &mut Vec<[f32; 3]>) {
     points.clear();
     let Heights { mission_m, layer_m } = work.heights;
@@ -248,7 +249,7 @@ fn ours_us(vehicles: usize) -> [f64; 2] {
     let mut desk = Desk::new(vehicles);
     let plan_us = median_us(|| desk.plan());
     let transit = Transit::<8>::empty();
-    // Each of them has flown ten waypoints and stands at the tenth.
+    // Each vehicle has flown ten waypoints of its route and stands at the tenth.
     let mut done = Vec::new();
     for route in &desk.plan.routes {
         let flown = WaypointRange { first: route.first, end: (route.first + 10).min(route.end) };

@@ -1,9 +1,10 @@
-//! Simulated autopilots beside the recorded ones: recorded setpoints replayed, estimates compared.
+//! Compares simulated autopilots with recorded ones: replays recorded setpoints, compares
+//! estimates.
 //!
-//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded
-//! errors of the estimate, the setpoints as they were sent, "theirs" what is allowed. Flights in
-//! which a person or a failsafe took the vehicle are printed and not rated: each error of theirs
-//! adds up in what follows.
+//! In these rows "ours" is the difference of the positions from arming to disarming (RMS, metres),
+//! for the setpoints as they were sent and under the recorded errors of the estimate; "theirs" is
+//! what is allowed. Flights in which a person or a failsafe took the vehicle are printed and not
+//! rated: each such error adds up in what follows.
 
 use flockmate_tests::fidelity::{
     Comparison, Correction, Difference, Estimator, RUNS, Recording, allowed_m, recordings,
@@ -16,14 +17,14 @@ const HEADER: &str = "RMS / greatest difference, metres. Setpoints as they were 
 \n\"closed\": accelerations as the recorded companion would have sent them beside the simulated vehicle; \"without\" errors; \
 \nand by how much the errors move a replay of the setpoints as they were sent";
 
-/// Flights of the same mission, by run and vehicle.
+/// Pairs of recorded flights of the same mission, by run and index of the vehicle.
 const TWINS: [[(&str, usize); 2]; 3] = [
     [("a_demo", 0), ("f_ppa", 0)],
     [("a_lobby", 0), ("x_rearm_lobby", 0)],
     [("ap_b_lobby", 0), ("apx_rearm_lobby", 0)],
 ];
 
-/// A row a plain flight; prints what makes it up.
+/// One row for each rated flight; prints the differences of every recorded flight.
 pub fn rows() -> Vec<Row> {
     println!("{HEADER}");
     println!(
@@ -68,8 +69,9 @@ pub fn rows() -> Vec<Row> {
     rows
 }
 
-/// PX4's plain flights under the errors of each flight that lasts as long: how alike both erred,
-/// how far the replay is off the recording, and how far these errors move it.
+/// Replays each of PX4's rated flights under the estimate errors of every other flight that lasts
+/// as long; prints the correlation of both flights' errors, how far the replay is off the
+/// recording, and how far these errors move it.
 fn print_others() {
     println!(
         "under the errors of another flight: correlation of the errors; off the recording; moved by them"

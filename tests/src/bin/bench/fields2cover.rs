@@ -1,5 +1,5 @@
-//! Coverage beside Fields2Cover 2.1: its test fields, 12 and 13, and fields with obstacles: those
-//! of its tests, and ours in its test fields.
+//! Compares our lanes with those of Fields2Cover 2.1: on its test fields, 12 and 13, on fields with
+//! obstacles from its tests, and on its test fields with obstacles of ours.
 //!
 //! `--fields2cover DIR` is a checkout of Fields2Cover/Fields2Cover; `tests/peers/fields2cover.cpp`
 //! is built with it, once. The same fields in metres, lane angle (ours of least width) and lane
@@ -13,7 +13,7 @@
 //! `length for what is swept` divides both lengths by the share of the field that lies beside a
 //! lane, no further than half its width.
 //!
-//! Our lanes are longer by what photographs slanted borders whole; theirs end at the border.
+//! Our lanes are longer, as they photograph slanted borders whole; theirs end at the border.
 
 mod routes;
 mod same_lanes;
@@ -38,16 +38,17 @@ use planner_core::coverage::transit::Transit;
 use self::routes::{Best, Obstacles, Place};
 use crate::row::Row;
 
-/// Runs of each field, of which the median counts.
+/// Runs of each field; their median time counts.
 const RUNS: usize = 11;
 const VERTICES: usize = 1024;
-/// At most 3 % longer than theirs.
+/// Least ratio of Fields2Cover's length to ours: ours may be at most 3 % longer.
 const LENGTH: f64 = 0.971;
-/// What is compiled of theirs: neither its route planner, which needs OR-tools, nor what draws.
+/// Folders of Fields2Cover's sources that are compiled: without route planner (OR-tools) and
+/// drawing.
 const SOURCES: [&str; 5] =
     ["types", "route_planning", "swath_generator", "objectives", "decomposition"];
 const LEFT_OUT: [&str; 3] = ["route_planner_base.cpp", "Path.cpp", "pp_obj"];
-/// Fields, lane widths in metres.
+/// File, lane width in metres and coordinates of each field.
 const FIELDS: [(&str, f32, &str); 4] = [
     ("fields2cover_test.json", 10.0, "wgs84"),
     ("fields2cover_test_2_cell.json", 10.0, "wgs84"),
@@ -55,11 +56,11 @@ const FIELDS: [(&str, f32, &str); 4] = [
     ("13.json", 1.0, "metres"),
 ];
 
-/// Outer ring and obstacles of a field of its tests: their corners, and by how much they are
-/// scaled.
+/// A field of Fields2Cover's tests: corners of its outer ring and its obstacles, and their scale to
+/// metres.
 type Rings = (&'static [&'static [[f32; 2]]], f32);
 
-/// `route_planner_base_test.cpp` and `visualizer_test.cpp`.
+/// The field of Fields2Cover's `route_planner_base_test.cpp` and `visualizer_test.cpp`.
 const TWO_SQUARES: Rings = (
     &[
         &[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]],
@@ -68,7 +69,8 @@ const TWO_SQUARES: Rings = (
     ],
     30.0,
 );
-/// `n_swath_modified_test.cpp`, in metres as large as a field.
+/// The field of Fields2Cover's `n_swath_modified_test.cpp`, scaled to the size of a field in
+/// metres.
 const TWO_SLOTS: Rings = (
     &[
         &[[0.0, 0.0], [4.0, 0.0], [4.0, 5.0], [0.0, 4.0]],
@@ -77,7 +79,7 @@ const TWO_SLOTS: Rings = (
     ],
     50.0,
 );
-/// `data/test_ring.json`, likewise.
+/// The field of Fields2Cover's `data/test_ring.json`, scaled to the size of a field in metres.
 const RING: Rings = (
     &[
         &[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]],
@@ -85,20 +87,20 @@ const RING: Rings = (
     ],
     20.0,
 );
-/// Name, lane width in metres, field.
+/// Name, lane width in metres and rings of each field with obstacles.
 const WITH_OBSTACLES: [(&str, f32, Rings); 4] = [
     ("two squares, its lanes of 5 m", 5.0, TWO_SQUARES),
     ("two squares, its lanes of 3 m", 3.0, TWO_SQUARES),
     ("two slots", 5.0, TWO_SLOTS),
     ("ring", 5.0, RING),
 ];
-/// Side of the squares that are put into fields without obstacles, of the square root of the
-/// field's area.
+/// Side of the square obstacles put into fields without any, as a share of the square root of the
+/// area of the field's bounding box.
 const OBSTACLE_SHARE: f32 = 0.12;
-/// Places of an edge at which it is looked whether it is inside.
+/// Number of points of an edge that are tested for being inside a field.
 const EDGE_STEPS: u8 = 50;
 
-/// One outer ring with its obstacles.
+/// An outer ring and the obstacles in it.
 struct Field {
     vertices: Vec<Flat>,
     rings: Vec<Ring>,
@@ -119,8 +121,8 @@ impl Field {
         self.rings.push(Ring { end: self.vertices.len() as u16, kind });
     }
 
-    /// The same with up to three squares, in a row through its middle across its longer side, that
-    /// lie inside.
+    /// The field with up to three square obstacles in a row through its middle: those that lie
+    /// inside with some space around them.
     fn with_squares(&self) -> Self {
         let mut field = Self { vertices: self.vertices.clone(), rings: self.rings.clone() };
         let outer = self.vertices.clone();
@@ -130,7 +132,8 @@ impl Field {
         for [east, north] in [[0.3, 0.35], [0.5, 0.5], [0.68, 0.6]] {
             let middle =
                 Flat::new(low.x + east * (high.x - low.x), low.y + north * (high.y - low.y));
-            // Its surroundings too: no corridor between it and the border.
+            // The tested square is twice as wide, so that a corridor is left between obstacle and
+            // border.
             let square = |half: f32| {
                 [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
                     .map(|[x, y]| middle + Flat::new(half * x, half * y))
@@ -165,7 +168,7 @@ impl Field {
         Obstacles::new(self.obstacles().map(|ring| ring.iter().copied().map(wide).collect()))
     }
 
-    /// Corners of the obstacles.
+    /// The corners of each obstacle.
     fn obstacles(&self) -> impl Iterator<Item = &[Flat]> {
         self.rings
             .windows(2)
@@ -173,7 +176,7 @@ impl Field {
     }
 }
 
-/// Whether a ring holds a place, by no code of the planner.
+/// Whether a ring contains a point; shares no code with the planner.
 fn ring_holds(ring: &[Flat], at: &Flat) -> bool {
     let mut inside = false;
     for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
@@ -184,7 +187,7 @@ fn ring_holds(ring: &[Flat], at: &Flat) -> bool {
     inside
 }
 
-/// A way over a field.
+/// Our route over a field: lengths, planning time, and number of legs that cross an obstacle.
 struct Way {
     lanes_m: f64,
     total_m: f64,
@@ -197,10 +200,10 @@ fn wide(at: Flat) -> Place {
     [f64::from(at.x), f64::from(at.y)]
 }
 
-/// Length and time for each field; without a checkout none.
+/// Rows of length and time for each field; none without a checkout.
 ///
 /// # Errors
-/// Theirs cannot be built or run.
+/// The C++ program cannot be built or run.
 pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let Some(checkout) = checkout else {
         println!(
@@ -229,7 +232,7 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The rows of a field.
+/// The rows of one field: lengths and times of our routes and of its shortest one.
 fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec<Row>> {
     let (first, angle) = ours(field, lane_m, MAX_ORDER_CHANGES_ON_BOARD)?;
     let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
@@ -296,7 +299,7 @@ fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
     Ok(fields)
 }
 
-/// Our way, and the angle of its lanes from east to the left, radians.
+/// Our route, and the angle of its lanes, radians counter-clockwise from east.
 fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
@@ -336,7 +339,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     Ok((way, f64::from(found.lane_direction().y).atan2(f64::from(found.lane_direction().x))))
 }
 
-/// Whether a leg comes into an obstacle: looked at every centimetre.
+/// Whether a leg enters an obstacle; tests a point every centimetre.
 fn crosses(field: &Field, from: &Flat, to: &Flat) -> bool {
     let steps = ((to - from).norm() / 0.01).ceil().max(1.0) as usize;
     field.obstacles().any(|ring| {
@@ -344,7 +347,7 @@ fn crosses(field: &Field, from: &Flat, to: &Flat) -> bool {
     })
 }
 
-/// Its best ways: in one cell, and by cells.
+/// Fields2Cover's best routes: over the field as one cell, and over a decomposition into cells.
 fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Vec<Best>> {
     let mut input = format!("{angle} {lane_m}\n");
     let mut from = 0;
@@ -369,7 +372,7 @@ fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Vec<
     Ok(best.into_iter().flatten().collect())
 }
 
-/// Builds our driver with their sources.
+/// Compiles our driver with Fields2Cover's sources; returns the program's path.
 fn build(checkout: &Path, folder: &Path) -> Result<PathBuf> {
     let source = checkout.join("src/fields2cover");
     let mut sources = Vec::new();

@@ -1,5 +1,5 @@
-//! `cargo xtask bench`: our times beside those of the programs we are compared to, measured
-//! alternately in one run.
+//! `cargo xtask bench`: our times beside those of the programs that we compare ourselves to,
+//! measured alternately in one run.
 //!
 //! Prints a table; `--out FILE` writes the rows as JSON,
 //! `[{ "name", "ours", "theirs", "ratio", "required", "unit", "n" }]`.

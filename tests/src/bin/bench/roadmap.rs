@@ -1,17 +1,17 @@
-//! Roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, all pairs, OctoMap's
-//! `castRay`.
+//! Times our roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, over all
+//! pairs, with OctoMap's `castRay`.
 //!
 //! Both get the same map (the built-in building at 0.25 m, for theirs written as `.bt`), the same
 //! ten starts and goals, 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run
-//! alternately. Loading the map is in neither time: they hold an octree, we the voxel grid. All
-//! else is: random nodes, the index of nodes, neighbours, rays, and the graph both ways with the
-//! lengths of its edges (theirs an adjacency list, ours the roadmap file with its CRC-32 and a list
-//! of lengths beside it). Nothing is kept from one repeat to the next. Checking the file as a
-//! reader does is in neither time: theirs is read by nobody else.
+//! alternately. Loading the map is in neither time: theirs holds an octree, ours the voxel grid.
+//! Both times include random nodes, the index of nodes, neighbours, rays, and the graph in both
+//! directions with the lengths of its edges (theirs an adjacency list, ours the roadmap file with
+//! its CRC-32 and a list of lengths beside it). Nothing is kept from one repeat to the next.
+//! Checking the file as a reader does is in neither time: nobody reads theirs.
 //!
 //! `roadmap_s of plan` is what `host-sim plan` reports for the same building, on two cores, for
-//! vehicles of 0.3 m without a safety margin: beside the above, starts and goals are checked and
-//! every edge gets its clearance, which theirs has not.
+//! vehicles of 0.3 m without a safety margin: in addition to the above, starts and goals are
+//! checked and every edge gets its clearance, which theirs has not.
 //!
 //! Ten A*: both search each pair by itself. The matrix: theirs is a hundred A*, ours
 //! [`cost_matrix`].
@@ -42,13 +42,13 @@ const NODES: usize = 2300;
 const EDGE_MIN_M: f32 = 0.5;
 const EDGE_MAX_M: f32 = 8.0;
 const VEHICLES: usize = 10;
-/// Rounds of one run of theirs and [`REPEATS`] of ours on one core and on two.
+/// Rounds, each of one run of theirs and [`REPEATS`] of ours on one core and on two.
 const ROUNDS: usize = 9;
 const REPEATS: usize = 3;
-/// Capacities of the default board.
+/// Workspace with the capacities of the default board.
 type BoardWorkspace = Workspace<4096, 4096>;
 
-/// What the baseline prints.
+/// The JSON line that the baseline program prints.
 #[derive(Deserialize)]
 struct Theirs {
     nodes: usize,
@@ -62,8 +62,8 @@ struct Theirs {
     matrix_search_ms: f64,
 }
 
-/// A row for the roadmap on one core and on two, for ten A* and for the 10 × 10 cost matrix,
-/// milliseconds.
+/// Rows for the roadmap (in `host-sim plan`, on one core, on two), for ten A* and for the 10 × 10
+/// cost matrix, milliseconds.
 pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     let map = building::building_map(building::DEFAULT_SEED, RESOLUTION_M)?;
     let dir = tempfile::tempdir()?;
@@ -114,7 +114,7 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     Ok(all
         .into_iter()
         .map(|(name, value, required, n, times)| {
-            // Of each round by itself: a slow spell of the machine strikes both.
+            // One ratio a round: a slow spell of the machine strikes both programs.
             let ratios = theirs
                 .iter()
                 .zip(times.chunks(REPEATS))
@@ -133,8 +133,8 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         .collect())
 }
 
-/// What a user waits for: `host-sim plan`'s map and roadmap with all their parts, of the same
-/// building, for ten vehicles whose safety margin is 0.
+/// Times of map and roadmap as a user of `host-sim plan` waits for them, with all parts, in the
+/// same building, for ten vehicles without a safety margin.
 fn planned() -> Result<Timing> {
     let mut text = format!(
         "[map]\nfile = \"builtin:building\"\nresolution_m = {RESOLUTION_M}\n\
@@ -144,7 +144,7 @@ fn planned() -> Result<Timing> {
     let terminals = terminals();
     let (starts, goals) = terminals.split_at(VEHICLES);
     for (i, goal) in goals.iter().enumerate() {
-        // Those of the ninth and tenth are above others.
+        // The goals of the ninth and tenth vehicle would be above others, so they are moved aside.
         let x = if i < 8 { goal.x } else { goal.x + 2.0 };
         text += &format!("[{x}, {}, {}], ", goal.y, goal.z);
     }
@@ -161,7 +161,7 @@ fn planned() -> Result<Timing> {
     Ok(Mission::prepare(scenario::parse(&text, "bench.toml")?, &Progress::hidden())?.timing)
 }
 
-/// Where the time goes, medians.
+/// Prints the median time of each part of `host-sim plan`'s map and roadmap.
 fn print_parts(whole: &[Timing]) {
     let part = |value: fn(&Timing) -> f64| median(whole.iter().map(|t| value(t) * 1e3).collect());
     println!(
@@ -175,7 +175,7 @@ fn print_parts(whole: &[Timing]) {
     );
 }
 
-/// The starts and the goals as files for the other program; the first file is the map.
+/// Writes starts and goals to the second and third file, for the other program.
 fn write_terminals(files: &[PathBuf; 3], terminals: &[Point]) -> Result<()> {
     for (file, points) in files[1..].iter().zip(terminals.chunks(VEHICLES)) {
         let mut out = std::fs::File::create(file)?;
@@ -186,7 +186,7 @@ fn write_terminals(files: &[PathBuf; 3], terminals: &[Point]) -> Result<()> {
     Ok(())
 }
 
-/// What both built last.
+/// Prints the sizes of the roadmaps that both programs built last.
 fn print_sizes(theirs: &[Theirs], ours: &Ours<'_>) {
     let Some(last) = theirs.last() else { return };
     println!(
@@ -203,7 +203,7 @@ fn print_sizes(theirs: &[Theirs], ours: &Ours<'_>) {
     );
 }
 
-/// Ten starts in the lobby, ten goals in the corridors above.
+/// Ten starts in the building's lobby, then ten goals in the corridors above.
 fn terminals() -> Vec<Point> {
     let along = |i: usize| 8.5 + 2.5 * i as f32;
     let starts = (0..VEHICLES).map(|i| Point::new(along(i), 4.0, 1.5));
@@ -263,7 +263,7 @@ impl<'a> Ours<'a> {
         }
     }
 
-    /// Builds the roadmap again; milliseconds.
+    /// Builds the roadmap file once, on all threads or on one; returns the milliseconds it took.
     fn build(&mut self, seed: u64, threads: bool) -> Result<f64> {
         let config = Config {
             nodes: NODES,
@@ -318,7 +318,8 @@ impl<'a> Ours<'a> {
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 
-    /// The lengths of the edges, ten labelled A*, then the cost matrix; milliseconds of each.
+    /// Computes the lengths of the edges, ten labelled A* and the cost matrix; milliseconds of
+    /// each.
     fn search(&mut self) -> Result<[f64; 3]> {
         let view = RoadmapView::parse(&self.bytes).map_err(named)?;
         let start = Instant::now();
@@ -346,7 +347,7 @@ impl<'a> Ours<'a> {
         Ok([measured, labelled, start.elapsed()].map(|time| time.as_secs_f64() * 1e3))
     }
 
-    /// Pairs in the range of lengths: what Algorithm 1 casts a ray for.
+    /// Number of node pairs within the range of lengths, for each of which Algorithm 1 casts a ray.
     fn rays(&self) -> usize {
         let range = EDGE_MIN_M * EDGE_MIN_M..=EDGE_MAX_M * EDGE_MAX_M;
         let near = |k: usize, l: usize| {

@@ -1,11 +1,11 @@
-//! One step of `priority` deconfliction in instructions, the worst of ten thousand random cases.
+//! Instructions of one step of `priority` deconfliction, in the worst of ten thousand random cases.
 //!
 //! The bench runs itself under valgrind's callgrind, which counts the instructions of
-//! [`priority_step`] alone and writes the count down each time it returns: every case is counted,
-//! so the worst is the worst. In these rows "ours" is that worst case, "theirs" what a step may
-//! cost. It is this machine's instruction set; a board's differs by a small factor.
+//! [`priority_step`] alone and writes the count down each time it returns. So every case is counted
+//! by itself. In these rows "ours" is the worst case, "theirs" what a step may cost. It is this
+//! machine's instruction set; a board's differs by a small factor.
 //!
-//! The cases are those that a board is measured with ([`StepCase`]); half of them are made to be
+//! The cases are those that a board is measured with ([`StepCase`]); half of them are chosen to be
 //! hard.
 
 use std::hint::black_box;
@@ -20,10 +20,10 @@ use rand_pcg::Pcg32;
 use crate::row::Row;
 
 const SEED: u64 = 1;
-/// The function whose instructions are counted, as callgrind calls it.
+/// The function whose instructions are counted, by its name in callgrind.
 const COUNTED: &str = "bench::steps::priority_step";
 
-/// A row for ten neighbours and one for thirty-two, thousands of instructions.
+/// Rows for ten and for thirty-two neighbours, in thousands of instructions.
 pub fn rows() -> Result<Vec<Row>> {
     [(10, 20.0), (32, 60.0)].map(|(neighbours, limit)| row(neighbours, limit)).into_iter().collect()
 }
@@ -49,7 +49,7 @@ fn row(neighbours: usize, limit: f64) -> Result<Row> {
     })
 }
 
-/// Instructions of each case.
+/// Number of instructions of each case.
 fn counted(neighbours: usize) -> Result<Vec<u64>> {
     let dir = tempfile::tempdir()?;
     let file = dir.path().join("counts");
@@ -64,19 +64,19 @@ fn counted(neighbours: usize) -> Result<Vec<u64>> {
         .context("valgrind does not start")?;
     ensure!(status.success(), "valgrind: {status}");
     let counts = std::fs::read_to_string(&file)?;
-    // One block for each return; a last one, at the end of the process, counts nothing.
+    // Each return of the function writes one block; the last block, at the process's end, is 0.
     let totals = counts.lines().filter_map(|line| line.strip_prefix("summary: "));
     Ok(totals.filter_map(|count| count.trim().parse().ok()).filter(|&count| count > 0).collect())
 }
 
-/// What is counted.
+/// The function whose instructions are counted: one step of deconfliction.
 #[inline(never)]
 fn priority_step(case: &StepCase) -> Advice {
-    // Not the last thing done, or the call would be a jump and callgrind would not see the return.
+    // As the last thing done, the call would be a jump, and callgrind would not see the return.
     black_box(case.advise(Method::Priority))
 }
 
-/// Every case once.
+/// Runs every case once: what the bench runs under callgrind.
 pub fn run(neighbours: usize) {
     let mut rng = Pcg32::seed_from_u64(SEED);
     for number in 0..STEP_CASES {

@@ -1,9 +1,9 @@
-//! The swarm simulation beside the clock: simulated seconds for each second on one core.
+//! Speed of the swarm simulation: simulated seconds a second of the clock, on one core.
 //!
-//! In these rows "ours" is the time [`swarm::fly`] took, "theirs" the time that passed in it, and
-//! the ratio how many times faster than the clock it ran. The simulation is one thread, so this is
-//! one core, whatever the machine has. Planning and the map's distance field are not in it; how
-//! long they took is printed. A flight that is not complete and clean is an error.
+//! In these rows "ours" is the time that [`swarm::fly`] took, "theirs" the time simulated in it,
+//! and the ratio how many times faster than the clock it ran. The simulation is one thread, so this
+//! is one core, whatever the machine has. Planning and the map's distance field are not in it; how
+//! long they took is printed. A flight that is not complete is an error.
 
 use std::path::Path;
 use std::time::Instant;
@@ -21,21 +21,22 @@ use crate::row::Row;
 
 const DEMO: &str = include_str!("../../../../host-sim/scenarios/demo.toml");
 
-/// Flights of the demo; the median counts.
+/// Number of flights of the demo; the median time counts.
 const DEMO_FLIGHTS: usize = 3;
 const MANY: usize = 200;
-/// Outer size of the large swarm's ground, metres, and its resolution.
+/// Size of the ground of the large swarm, metres, and the edge of its cells.
 const GROUND_M: [f32; 3] = [120.0, 120.0, 16.0];
 const RESOLUTION_M: f32 = 0.5;
-/// Lanes side by side along y, and their spacing, metres: in each a train of [`TRAIN`] vehicles.
+/// Number of lanes side by side along y, and their spacing, metres: in each a train of [`TRAIN`]
+/// vehicles.
 const LANES: usize = 20;
 const LANE_M: f32 = 5.5;
 const TRAIN: usize = MANY / LANES;
-/// From one start to the next in a lane, and from each start to its goal, metres.
+/// Distance between two starts in a lane, and from each start to its goal, metres.
 const GAP_M: f32 = 8.0;
 const WAY_M: f32 = 36.0;
 
-/// A row for the demo's ten vehicles, one for two hundred on open ground, seconds.
+/// A row for the demo's ten vehicles and one for two hundred on open ground; times in seconds.
 pub fn rows() -> Result<Vec<Row>> {
     let mut flights =
         (0..DEMO_FLIGHTS).map(|_| fly(DEMO, "demo.toml")).collect::<Result<Vec<_>>>()?;
@@ -61,7 +62,7 @@ fn row(name: &str, took_s: f64, simulated_s: f64, required: f64, n: usize) -> Ro
     }
 }
 
-/// Plans and flies; seconds that the flight took and that passed in it.
+/// Plans and simulates a flight; returns the seconds that it took, and those simulated.
 fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
     let scenario = scenario::parse(text, name).context("the scenario of a bench")?;
     let began = Instant::now();
@@ -93,13 +94,13 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
     Ok((took_s, flight.simulated_s))
 }
 
-/// A floor with pillars between the lanes.
+/// Map of a floor with pillars between the lanes.
 fn ground() -> Result<OccupancyMap> {
     let cells = |metres: f32| (metres / RESOLUTION_M) as u32;
     let shape =
         GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
     let mut map = OccupancyMap::all_unknown(shape, "ground")?;
-    // One metre wide, in every second gap between two lanes, 20 m apart.
+    // Pillars are one metre wide, 20 m apart, in every second gap between two lanes.
     let pillar = |x: f32, y: f32| {
         (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0)
     };
@@ -120,7 +121,7 @@ fn lane_m(lane: usize) -> f32 {
     7.0 + LANE_M * lane as f32
 }
 
-/// Trains that fly east, side by side.
+/// Scenario of two hundred vehicles that fly east in trains, side by side.
 fn many(map: &Path) -> String {
     let place = |i: usize, way_m: f32, z: f32| {
         format!("[{:?}, {:?}, {z:?}]", 4.0 + GAP_M * (i % TRAIN) as f32 + way_m, lane_m(i / TRAIN))

@@ -1,7 +1,8 @@
-//! Every public call of planner-core and companion: its work bound, the most instructions seen on
-//! the emulated board, and the bytes it is lent. Written as the table of docs/worst-case.md.
+//! Measures every public call of planner-core and companion: the bound on its work, the most
+//! instructions counted on the emulated board, and the bytes it is lent; writes them as the table
+//! of docs/worst-case.md.
 //!
-//! The program `calls` counts, in QEMU with `-icount shift=0`; the bounds are in
+//! The board's program `calls` counts, in QEMU with `-icount shift=0`; the bounds are in
 //! [`flockmate_tests::bounds`].
 
 use std::fs;
@@ -11,7 +12,8 @@ use flockmate_tests::{board, bounds, workspace};
 
 use crate::row::Row;
 
-/// What a step may cost by deconfliction alone and in all, thousands of instructions.
+/// Row name, call, and its limit in thousands of instructions: deconfliction alone, and whole
+/// steps.
 const LIMITS: [(&str, &str, f64); 6] = [
     ("board advise", "deconflict::advise, priority", 60.0),
     ("board control step, all speak", "Companion::handle_timeout, 32 speak", 75.0),
@@ -21,7 +23,7 @@ const LIMITS: [(&str, &str, f64); 6] = [
     ("board control step, else", "Companion::handle_timeout, else", 75.0),
 ];
 
-/// Writes the table; rows for what has a limit.
+/// Writes the table to the page; returns rows for the calls that have a limit.
 pub fn rows() -> Result<Vec<Row>> {
     let Some(program) = board::program("calls") else { return Ok(Vec::new()) };
     let calls = bounds::counted(&program)?;

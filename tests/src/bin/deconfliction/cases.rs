@@ -1,5 +1,5 @@
-//! The meetings: maps of corridors and open halls, which vehicles swap places, and the disturbances
-//! each is flown under.
+//! The meetings: maps of corridors and open halls, which vehicles swap places, and under which
+//! disturbances each meeting is flown.
 
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
@@ -11,23 +11,23 @@ use planner_core::Point;
 use planner_core::voxel::GridShape;
 
 const CRUISE_MPS: f32 = 2.0;
-/// Edge of a map cell, metres.
+/// Edge of a cell of most maps, metres.
 const RESOLUTION_M: f32 = 0.25;
-/// The same where a doorway of 1.6 m is to be cut, metres.
+/// Edge of a map cell in the map with a doorway 1.6 m wide, metres.
 const DOORWAY_RESOLUTION_M: f32 = 0.2;
-/// Height of starts and goals over the floor's top, metres.
+/// Height of starts and goals above the top of the floor, metres.
 const HEIGHT_M: f32 = 1.5;
-/// The gusts of every case: what a mission is planned for.
+/// TOML of the gusts of every case: those that missions are planned for.
 pub const GUSTS: &str = "gust_mps = 3.0\n";
 
-/// A map and the vehicles that fly on it: planned once a seed, flown once for each disturbance and
-/// method.
+/// A map and the vehicles that fly on it: planned once for each seed, flown once for each
+/// disturbance and method.
 pub struct Meeting {
-    /// What is flown, one row of the table each: the name, and more lines of `[simulation]` and
-    /// `[[faults]]`.
+    /// Disturbances under which it is flown, a row of the table each: name, and further TOML lines
+    /// of `[simulation]` and `[[faults]]`.
     pub cases: Vec<(&'static str, &'static str)>,
-    /// The vehicle that faults strike when it has taken off; `None`: another with each seed,
-    /// somewhere on its way.
+    /// Id of the vehicle that faults strike when it has taken off; `None`: a different vehicle for
+    /// each seed, somewhere on its path.
     struck: Option<u8>,
     map: PathBuf,
     vehicles: Vec<(Point, Point)>,
@@ -38,15 +38,15 @@ pub struct Meeting {
     sampling: &'static str,
     safety_distance_m: f32,
     time_limit_s: f32,
-    /// Seeds flown at most.
+    /// Most seeds with which this meeting is flown.
     pub seeds_most: u64,
-    /// Whether the best order is looked for beside ours.
+    /// Whether the plan's makespan is compared with that of the best order found by a search.
     pub has_ideal: bool,
 }
 
 impl Meeting {
-    /// The vehicle that the faults of the cases strike, and which share of its flight it has behind
-    /// it then.
+    /// Id of the vehicle that the faults of the cases strike, and the share of its flight after
+    /// which they do.
     pub fn strikes(&self, seed: u64) -> (u8, f32) {
         match self.struck {
             Some(id) => (id, 0.0),
@@ -56,12 +56,12 @@ impl Meeting {
         }
     }
 
-    /// Whether more than twenty meet.
+    /// Whether more than twenty vehicles meet.
     pub fn is_large(&self) -> bool {
         self.vehicles.len() > 20
     }
 
-    /// The scenario's text, flown with `method` under the disturbances of one case.
+    /// TOML of the scenario: flown with `method` under the disturbances `simulation` of one case.
     pub fn scenario(&self, method: &str, simulation: &str, seed: u64) -> String {
         let mut text = format!(
             "seed = {seed}\n[map]\nfile = {:?}\nresolution_m = {}\n",
@@ -98,17 +98,17 @@ impl Meeting {
     }
 }
 
-/// Every case comes calm but for the gusts, with radio losses and with late radio.
+/// Disturbances of most meetings: gusts alone, gusts and radio loss, gusts and radio delay.
 const THREE: [&str; 3] =
     [GUSTS, "gust_mps = 3.0\nradio_loss = 0.3\n", "gust_mps = 3.0\nradio_delay_s = 0.3\n"];
 
-/// Radios that fail for good.
+/// Disturbances by a radio that fails for good: it only hears, only sends, or does neither.
 const FAILED: [&str; 3] = [
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\ndirection = \"tx\"\n",
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\ndirection = \"rx\"\n",
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\n",
 ];
-/// The pilot stops a vehicle and keeps it where it is.
+/// Disturbance by a pilot, who takes over a vehicle and holds it where it is.
 const STOPPED: &str =
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"pilot-takeover\"\n";
 
@@ -116,7 +116,7 @@ fn three(names: [&'static str; 3]) -> Vec<(&'static str, &'static str)> {
     names.into_iter().zip(THREE).collect()
 }
 
-/// What most meetings have in common; no map and nobody yet.
+/// Settings that most meetings share; without a map, vehicles and cases.
 fn indoors() -> Meeting {
     Meeting {
         cases: Vec::new(),
@@ -135,7 +135,7 @@ fn indoors() -> Meeting {
     }
 }
 
-/// All meetings; maps go to `dir`.
+/// All meetings; their maps are written to `dir`.
 pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     let z = RESOLUTION_M + HEIGHT_M;
     let ends = [Point::new(1.5, 2.0, z), Point::new(28.5, 2.0, z)];
@@ -157,7 +157,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         has_ideal: true,
         ..indoors()
     };
-    // High enough to fly over a vehicle that lies somewhere on the floor.
+    // High enough to fly over a vehicle that lies on the floor.
     let radios = Meeting {
         cases: [
             "radio only hears, crossing",
@@ -186,7 +186,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         nodes: 700,
         ..indoors()
     };
-    // As near each other as the hundred.
+    // The vehicles start as near to each other as the hundred below.
     let forty = Meeting {
         cases: vec![("circle, 40, 3 m apart", GUSTS)],
         map: hall(dir, 30.0, "yard.bt")?,
@@ -203,7 +203,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         vehicles: circle(100, 60.0, 66.0),
         nodes: 1500,
         edge_max_m: 9.0,
-        // Evenly spread: between pads 3.8 m apart a way in and out leads only straight ahead.
+        // Evenly spread nodes: between pads 3.8 m apart, only straight paths lead in and out.
         sampling: "halton",
         safety_distance_m: 3.0,
         time_limit_s: 900.0,
@@ -220,7 +220,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         vehicles: vec![
             (Point::new(3.0, 3.0, z), Point::new(14.0, 3.0, z)),
             (Point::new(14.0, 6.0, z), Point::new(3.0, 6.0, z)),
-            // Takes off and lands in the doorway.
+            // This vehicle takes off and lands in the doorway.
             (Point::new(8.2, 4.4, z), Point::new(8.6, 4.4, z)),
         ],
         resolution_m: DOORWAY_RESOLUTION_M,
@@ -233,7 +233,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         vehicles: vec![
             (Point::new(3.0, 3.0, z), Point::new(14.0, 3.0, z)),
             (Point::new(14.0, 6.0, z), Point::new(3.0, 6.0, z)),
-            // The others wait for it to leave the doorway: that is the short way.
+            // The others wait for it to leave the doorway, on their shortest path.
             (Point::new(8.4, 4.4, z), Point::new(14.0, 8.0, z)),
         ],
         map: doorway.map.clone(),
@@ -246,9 +246,10 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, forty, hundred])
 }
 
-/// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are
-/// on the left. The vehicle in front crosses straight to the far goal, the one behind turns left to
-/// the near one: so everybody crosses the way of everybody else from another arm.
+/// Start and goal of two vehicles in each arm, at 13 m and at 9.5 m from the middle; starts are on
+/// the right of the arm's axis, goals on the left. The vehicle in front crosses straight to the far
+/// goal, the one behind turns left to the near one. So each vehicle crosses the paths of all
+/// vehicles from other arms.
 fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
     let place = |arm: usize, along: f32, left: f32| {
         let (x, y) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][arm % 4];
@@ -260,7 +261,8 @@ fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
     front.chain(behind).collect()
 }
 
-/// A map of `size`, solid but for what `free` says of cell centres; its floor is one cell thick.
+/// Writes a map of `size` that is solid except for cells whose centre is `free`; floor and ceiling
+/// are one cell thick.
 fn carve(
     dir: &Path,
     name: &str,
@@ -282,7 +284,7 @@ fn carve(
     Ok(path)
 }
 
-/// 30 m × 3 m, with one side room off its middle.
+/// Map of a corridor, 30 m × 3 m, with one side room at its middle.
 fn corridor(dir: &Path) -> Result<PathBuf> {
     carve(dir, "corridor.bt", RESOLUTION_M, Point::new(30.5, 8.5, 3.5), |p| {
         let corridor = (0.25..30.25).contains(&p.x) && (0.5..3.5).contains(&p.y);
@@ -291,21 +293,21 @@ fn corridor(dir: &Path) -> Result<PathBuf> {
     })
 }
 
-/// Two rooms of 8 m × 9 m with a doorway 1.6 m wide and 2.2 m high between them, and the long way
-/// round through a passage 3 m wide.
+/// Map of two rooms of 8 m × 9 m, joined by a doorway 1.6 m wide and 2.2 m high, and by a detour
+/// through a passage 3 m wide.
 fn doorway(dir: &Path) -> Result<PathBuf> {
     carve(dir, "doorway.bt", DOORWAY_RESOLUTION_M, Point::new(17.0, 13.6, 3.6), |p| {
         let rooms = (0.2..16.8).contains(&p.x) && (0.2..9.2).contains(&p.y);
         let wall = (8.2..8.6).contains(&p.x) && !(3.6..5.2).contains(&p.y);
         let ends = (0.2..3.2).contains(&p.x) || (13.8..16.8).contains(&p.x);
         let passage = (10.0..13.0).contains(&p.y) && (0.2..16.8).contains(&p.x);
-        // Low: no vehicle flies over one that stands in it.
+        // The lintel is low, so that no vehicle can fly over one in the doorway.
         let lintel = (8.2..8.6).contains(&p.x) && p.z > 2.4;
         (rooms && !wall && !lintel) || passage || (ends && (9.0..10.2).contains(&p.y))
     })
 }
 
-/// Two corridors 4 m wide that cross at (15, 15).
+/// Map of two corridors 4 m wide that cross at (15, 15).
 fn crossing_map(dir: &Path, name: &str, height_m: f32) -> Result<PathBuf> {
     carve(dir, name, RESOLUTION_M, Point::new(30.0, 30.0, height_m), |p| {
         let across = |v: f32| (13.0..17.0).contains(&v);
@@ -314,7 +316,7 @@ fn crossing_map(dir: &Path, name: &str, height_m: f32) -> Result<PathBuf> {
     })
 }
 
-/// An open hall of twice `half_m` a side; low, so that everybody meets at one height.
+/// Map of an open hall of side 2 · `half_m`, so low that all vehicles meet at one height.
 fn hall(dir: &Path, half_m: f32, name: &str) -> Result<PathBuf> {
     carve(dir, name, RESOLUTION_M, Point::new(2.0 * half_m, 2.0 * half_m, 3.5), |_| true)
 }

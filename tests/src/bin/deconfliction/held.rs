@@ -1,9 +1,9 @@
-//! Reason why a vehicle that nothing struck landed short of its goal: by the truth, on the map, by
-//! a search of its own.
+//! Finds out why a vehicle without a fault landed short of its goal: by true positions, on the map,
+//! with a search of its own.
 //!
-//! Places of a lattice are joined where the map leaves the vehicle its clearance and everything
-//! that lies on the ground is further away than the safety distance. Neither the roadmap nor the
-//! companion is asked.
+//! The search joins points of a lattice if the map leaves the vehicle its required clearance
+//! between them and every vehicle on the ground is further away than the safety distance. It uses
+//! neither the roadmap nor the companion.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -14,40 +14,41 @@ use planner_core::Point;
 use planner_core::segment::segment_is_clear;
 use serde::Serialize;
 
-/// From one place of the lattice to the next, metres.
+/// Distance of neighbouring lattice points, metres.
 const LATTICE_M: f32 = 0.5;
-/// The ends of the way are joined to places so near, metres.
+/// Distance within which both ends of the path are joined to lattice points, metres.
 const JOIN_M: f32 = 1.0;
-/// A vehicle this much above where it came to rest is still in the air, metres.
+/// Height above its final position from which on a vehicle counts as in the air, metres.
 const ALOFT_M: f32 = 1.0;
-/// A vehicle whose radio fails may come so far along its path unheard, metres.
+/// How far along its path a vehicle whose radio fails may come unheard, metres.
 const STRETCH_M: f32 = 6.0;
-/// Room that is kept beside that, beyond the safety distance, metres.
+/// Distance kept from that stretch beyond the safety distance, metres.
 const BESIDE_M: f32 = 0.4;
-/// Spacing of the places that are compared with where it lies, metres.
+/// Spacing of the points of the path that a silent vehicle's final position is compared with,
+/// metres.
 const FINE_M: f32 = 0.05;
-/// Spacing of the places where it may lie, metres.
+/// Spacing of the points at which a silent vehicle may lie, metres.
 const STEP_M: f32 = 0.5;
 
-/// What held a vehicle up.
+/// What kept a vehicle from its goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Cause {
-    /// The vehicle struck lies at its goal.
+    /// The struck vehicle lies at the goal of the other.
     AtGoal,
-    /// The vehicle struck lies on the only route.
+    /// The struck vehicle lies on the only route to the goal.
     OnlyRoute,
-    /// It was silent, and for all that the others can know it lies at the goal.
+    /// The struck vehicle was silent, and as far as others can know it may lie at the goal.
     MayBeAtGoal,
-    /// The same, on the only route.
+    /// The struck vehicle was silent, and as far as others can know it may lie on the only route.
     MayBeOnRoute,
-    /// Others that lie or stand leave no way, the vehicle struck or not.
+    /// Vehicles that lie or stand block every route, even without the struck one.
     Others,
-    /// There was a way.
+    /// A route was free: nothing kept the vehicle from its goal.
     WayLeft,
 }
 
 impl Cause {
-    /// All of them.
+    /// All causes, in the order of their numbers.
     pub const ALL: [Self; 6] = [
         Self::AtGoal,
         Self::OnlyRoute,
@@ -71,18 +72,18 @@ impl fmt::Display for Cause {
     }
 }
 
-/// A vehicle that was struck: its index, when, and whether it fell silent.
+/// The vehicle that a fault struck.
 #[derive(Clone, Copy, Debug)]
 pub struct Struck {
-    /// Its index.
+    /// Its index in the order of the scenario.
     pub index: usize,
-    /// When, seconds of the simulation.
+    /// When the fault struck, seconds of simulated time.
     pub at_s: f32,
-    /// Whether nobody hears it from then on.
+    /// Whether no other vehicle hears it from then on.
     pub silent: bool,
 }
 
-/// What held up vehicle `held`.
+/// Why vehicle `held` landed short of its goal.
 pub fn cause(
     mission: &Mission,
     plan: &SwarmPlan,
@@ -127,10 +128,11 @@ pub fn cause(
     if search.finds(&with(&may)) { Cause::WayLeft } else { Cause::MayBeOnRoute }
 }
 
-/// A place, and how far to stay away from it, metres.
+/// A point, and the distance to keep from it, metres.
 type Ball = (Point, f32);
 
-/// When a vehicle that landed short began to descend, and where; one that never rose, where it is.
+/// When a vehicle that landed short began its last descent, and where; its last point if it never
+/// rose.
 fn gave_up(track: &[(f32, Point)]) -> Option<(f32, Point)> {
     let (_, rest) = track.last()?;
     track.iter().rev().find(|(_, place)| place.z > rest.z + ALOFT_M).or(track.last()).copied()
@@ -141,7 +143,7 @@ fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
     track.get(after).or(track.last()).map(|(_, place)| *place)
 }
 
-/// How far a silent vehicle lies beside its path, and how far along it from where it was last
+/// How far a silent vehicle lies beside its path, and how far along its path from where it was last
 /// heard, metres.
 pub fn lies(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2]> {
     let track = &flight.tracks[struck.index];
@@ -158,7 +160,8 @@ pub fn lies(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2
     Some([rest.1, rest.0 - heard.0])
 }
 
-/// On the ground below the path as far as it may come, unheard, from where it was last heard.
+/// Points on the ground below the path, as far as the vehicle may come unheard from where it was
+/// last heard.
 fn may_lie(plan: &SwarmPlan, flight: &Flight, struck: Struck, radius_m: f32) -> Vec<Ball> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
@@ -177,7 +180,7 @@ fn may_lie(plan: &SwarmPlan, flight: &Flight, struck: Struck, radius_m: f32) -> 
         .collect()
 }
 
-/// A way from `from` over `over` down to `ground`.
+/// A search for a path from `from` to `over`, with a descent from there to `ground`.
 struct Search<'a> {
     mission: &'a Mission,
     required_m: f32,
@@ -195,7 +198,7 @@ impl Search<'_> {
         if self.goal_held(balls) {
             return false;
         }
-        // What is too near already may be flown off from.
+        // From an obstacle that is too near already, the vehicle may fly away.
         let here =
             |&(place, radius_m): &Ball| (place, radius_m.min((place - self.from).norm() - 1e-3));
         let balls: Vec<Ball> = balls.iter().map(here).collect();

@@ -1,9 +1,9 @@
-//! How early the last vehicle could land: a search over orders, with straight paths and paths of
-//! two legs at right angles.
+//! How early the last vehicle could land: a search over the order of the vehicles, with straight
+//! paths and paths of two legs at right angles.
 //!
-//! It is no planner: it knows the open map and looks at 152 orders, in each of which every vehicle
-//! takes the path that lands it first. Separation, speeds, climbs and the schedule's rules are
-//! those of the mission.
+//! This is no planner: it works in an open map only, and tries 152 orders, in each of which every
+//! vehicle takes the path that lands it first. Separation, speeds, climbs and the schedule's rules
+//! are those of the mission.
 
 use host_sim::capacity::WAYPOINTS;
 use host_sim::mission::{Mission, SwarmPlan};
@@ -14,21 +14,22 @@ use planner_core::segment::segment_is_clear;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// Orders looked at.
+/// Number of orders tried.
 const ORDERS: u64 = 152;
 
-/// When the last vehicle lands by the schedule, seconds after the start.
+/// When the last vehicle lands by three schedules, seconds after the start.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Landings {
-    /// If everybody flew alone.
+    /// If each vehicle flew alone.
     pub alone_s: f32,
-    /// As planned.
+    /// By the mission's plan.
     pub planned_s: f32,
-    /// As found here.
+    /// By the best order that this search found.
     pub ideal_s: f32,
 }
 
-/// The schedule of a plan beside that of flights alone and the best found here.
+/// The last landing by `plan`, by `alone`, and by the best order; `None` if a flight has no path
+/// here.
 pub fn landings(mission: &Mission, plan: &SwarmPlan, alone: &SwarmPlan) -> Option<Landings> {
     let last =
         |plan: &SwarmPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
@@ -41,8 +42,8 @@ fn landed_s(mission: &Mission, flight: &Flight<WAYPOINTS>) -> f32 {
     flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps
 }
 
-/// The flights of a vehicle: straight, or with a corner where one coordinate of start and goal is
-/// that of each.
+/// Possible flights of a vehicle: straight, or with one corner at right angles, where the map is
+/// clear.
 fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<WAYPOINTS>>> {
     let waypoints = flight.path.waypoints();
     let (from, to) = (waypoints.first()?.position, waypoints.last()?.position);

@@ -1,5 +1,5 @@
-//! The deconfliction suite: meetings that are hard, flown over many seeds with each method. Prints
-//! one line per case and method; `cargo xtask bench --only deconfliction` runs it.
+//! The deconfliction suite: hard meetings of vehicles, flown over many seeds with each method.
+//! Prints one line per case and method; `cargo xtask bench --only deconfliction` runs it.
 //!
 //! Every meeting is a map made here, written as OctoMap and read back like any other, and a
 //! scenario's text, so that each can be flown again alone. A meeting is planned once a seed; every
@@ -26,18 +26,18 @@ use cases::Meeting;
 use held::{Cause, Struck};
 
 const METHODS: [&str; 2] = ["priority", "algorithm2"];
-/// A separation at which nobody is in anybody's way, metres.
+/// A separation so small that no vehicle waits for another one, metres.
 const ALONE_M: f32 = 1e-3;
-/// From the beginning of a simulation to the first vehicle at its height, seconds.
+/// Time from the beginning of a simulation to the first vehicle at the top of its climb, seconds.
 const STARTED_S: f32 = 8.0;
 
 #[derive(Parser)]
 #[command(about = "Hard meetings of vehicles, flown over many seeds")]
 struct Args {
-    /// Seeds flown of each case.
+    /// Number of seeds flown of each case.
     #[arg(long, value_name = "N", default_value_t = 100)]
     seeds: u64,
-    /// The first seed.
+    /// The first seed; the others follow.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     first: u64,
     /// Only the cases whose name contains this.
@@ -46,51 +46,53 @@ struct Args {
     /// Only the methods whose name contains this.
     #[arg(long, value_name = "NAME", default_value = "")]
     method: String,
-    /// Leave out meetings of more than twenty.
+    /// Leave out meetings of more than twenty vehicles.
     #[arg(long)]
     small: bool,
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<std::path::PathBuf>,
-    /// Keep the maps and the scenarios that went wrong in this directory.
+    /// Keep the maps, and the scenarios of incomplete flights, in this directory.
     #[arg(long, value_name = "DIR")]
     keep: Option<std::path::PathBuf>,
 }
 
-/// What one method did in one case, over all seeds.
+/// Results of one method in one case, over all seeds.
 #[derive(Clone, Debug, Serialize)]
 struct Row {
     name: &'static str,
     method: &'static str,
     seeds: u64,
-    /// Missions that ended complete and clean.
+    /// Number of missions that ended complete and clean.
     complete: u64,
-    /// Missions for which no plan was found.
+    /// Number of missions for which no plan was found.
     unplanned: u64,
     violations: u32,
     wall_contacts: u32,
     deadlocks: u32,
-    /// Vehicles that no fault struck and that landed short of their goals, for want of a way.
+    /// Number of vehicles without a fault that did not reach their goals.
     held_up: usize,
-    /// Why those were held up, by their causes in the order of [`Cause::ALL`].
+    /// Causes of these, counted in the order of [`Cause::ALL`].
     held_up_by: [usize; Cause::ALL.len()],
-    /// How far silent vehicles lie at most: beside their path, and along it from where they were
-    /// last heard, metres.
+    /// Greatest distance of silent vehicles on the ground: beside their path, and along it from
+    /// where they were last heard, metres.
     lies_m: [f32; 2],
-    /// Smallest separation seen, metres.
+    /// Smallest distance of two vehicles seen, metres.
     min_separation_m: f64,
-    /// Mean share by which flights, from take-off to landing, take longer than alone.
+    /// Mean excess of the flight time, from take-off to landing, over that of the flight alone, as
+    /// a share.
     extra_flight: f64,
-    /// Mean share by which the last landing is later than if everybody flew alone, all at once.
+    /// Mean excess of the last landing's time over that if each vehicle flew alone, all at once, as
+    /// a share.
     extra_makespan: f64,
-    /// The same share by the schedule alone.
+    /// As `extra_makespan`, by the times of the plan's schedule.
     #[serde(skip_serializing_if = "Option::is_none")]
     planned_makespan: Option<f64>,
-    /// The same of the best schedule that a search over orders with straight and square paths
-    /// finds.
+    /// As `extra_makespan`, by the best schedule that a search over orders with straight and square
+    /// paths finds.
     #[serde(skip_serializing_if = "Option::is_none")]
     ideal_makespan: Option<f64>,
-    /// What went wrong: seed, seconds, vehicle and what.
+    /// Errors of the flights: seed, seconds, vehicle and text.
     #[serde(skip)]
     incidents: Vec<String>,
     #[serde(skip)]
@@ -169,7 +171,7 @@ fn print(row: &Row) {
     }
 }
 
-/// The rows of a meeting: its cases, each with both methods.
+/// Flies all cases of a meeting with both methods over all seeds; one row each.
 fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
     let seeds: Vec<u64> = (args.first..args.first + args.seeds.min(meeting.seeds_most)).collect();
     let flown: Vec<Vec<Row>> = seeds
@@ -212,7 +214,7 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
     Ok(sums)
 }
 
-/// Rows without a seed.
+/// Empty rows of a meeting: one for each case and method, without a seed.
 fn rows(meeting: &Meeting) -> Vec<Row> {
     let row = |name, method| Row {
         name,
@@ -237,7 +239,7 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
     meeting.cases.iter().flat_map(|&(name, _)| METHODS.map(|method| row(name, method))).collect()
 }
 
-/// All cases of a meeting with one seed.
+/// Flies all cases of a meeting with one seed.
 fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<Row>> {
     let mut rows = rows(meeting);
     rows.iter_mut().filter(|row| row.method.contains(only)).for_each(|row| row.seeds = 1);
@@ -277,7 +279,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
         let is_struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
         row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !is_struck(v)).count();
         if simulation.contains("[[faults]]") && method == METHODS[0] {
-            // Whom no other vehicle hears is where it was struck, or further along its path.
+            // A vehicle that no other hears may lie where it was struck, or further along its path.
             let silent = simulation.contains("radio-cut") && !simulation.contains("\"rx\"");
             let struck = Struck { index: usize::from(struck) - 1, at_s: at_s.parse()?, silent };
             explain(row, &mission, &plan, &flight, struck);
@@ -295,7 +297,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
     Ok(rows)
 }
 
-/// Notes what held up each vehicle that landed short of its goal, and where the one struck lies.
+/// Adds to a row why each vehicle landed short of its goal, and where a silent struck vehicle lies.
 fn explain(
     row: &mut Row,
     mission: &Mission,
@@ -315,7 +317,7 @@ fn explain(
     }
 }
 
-/// The vehicle that faults strike, and when: what a scenario says of it.
+/// Id of the vehicle that faults strike, and when, in seconds as text for the scenario.
 fn strike(meeting: &Meeting, plan: &SwarmPlan, alone: &MissionResult, seed: u64) -> (u8, String) {
     let (id, share) = meeting.strikes(seed);
     let index = usize::from(id) - 1;
@@ -331,7 +333,7 @@ fn parsed(
     seed: u64,
     dir: &Path,
 ) -> Result<scenario::Scenario> {
-    // Map files are named by their whole path, so the name only serves errors.
+    // The scenario names its map by an absolute path, so `name` only serves error messages.
     let name = dir.join("case.toml").display().to_string();
     Ok(scenario::parse(&meeting.scenario(method, simulation, seed), &name)?)
 }

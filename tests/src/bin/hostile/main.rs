@@ -1,4 +1,4 @@
-//! Forged frames for companions in flight; `cargo xtask bench --only hostile --n N` gives N of
+//! Gives forged frames to companions in flight; `cargo xtask bench --only hostile --n N` gives N of
 //! them.
 
 use std::time::Instant;
@@ -9,7 +9,7 @@ use flockmate_tests::hostile;
 #[derive(Parser)]
 #[command(about = "Forged frames for companions in flight")]
 struct Args {
-    /// Forged frames.
+    /// Number of forged frames.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     n: u64,
     /// The first seed.

@@ -1,5 +1,5 @@
-//! Random meetings of whole companions, judged by the truth; `cargo xtask bench --only meetings`
-//! runs ten thousand.
+//! Simulates random meetings of whole companions, judged by the true motion;
+//! `cargo xtask bench --only meetings` runs ten thousand.
 
 use std::time::Instant;
 
@@ -8,23 +8,23 @@ use flockmate_tests::meeting::{self, Outcome, scene};
 use flockmate_tests::setpoints::SetpointStats;
 use rayon::prelude::*;
 
-/// So many meetings with setpoints that are not fit are named.
+/// Most meetings with setpoints unfit to be flown that are listed.
 const UNFIT: usize = 10;
 
 #[derive(Parser)]
 #[command(about = "Random meetings of whole companions")]
 struct Args {
-    /// Meetings.
+    /// Number of meetings.
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     n: u64,
-    /// The first seed; alone with --trace: this one only.
+    /// The first seed; with --trace the only one.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
     /// Print what happens in one meeting.
     #[arg(long)]
     trace: bool,
-    /// Two vehicles that pass at exactly the scheduled separation, instead: nobody is to be
-    /// stopped.
+    /// Fly two vehicles that pass each other at exactly the scheduled separation instead: none may
+    /// be stopped.
     #[arg(long)]
     passing: bool,
     /// Only meetings of this geometry.
@@ -32,7 +32,7 @@ struct Args {
     kind: Option<String>,
 }
 
-/// Flies one meeting and prints what happened.
+/// Flies one meeting, and prints its plans and what happened.
 fn trace(scene: &scene::Scene) {
     let scene::Scene { kind, delay_s, loss, liar, .. } = scene;
     println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");

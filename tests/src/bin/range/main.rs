@@ -1,8 +1,8 @@
-//! The demo with a radio that does not reach far; `cargo xtask bench --only range` flies twenty
-//! seeds of each range.
+//! Flies the demo with radios of short range; `cargo xtask bench --only range` flies twenty seeds
+//! of each range.
 //!
-//! Where vehicles lose one another they may land short of their goals, but they touch nothing, come
-//! near nobody, and each names why.
+//! Vehicles that lose each other may land short of their goals; but none may touch anything or come
+//! too near another one, and each must log why it landed.
 
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -14,7 +14,8 @@ use host_sim::swarm::{self, Flight};
 use rayon::prelude::*;
 
 const DEMO: &str = include_str!("../../../../host-sim/scenarios/demo.toml");
-/// Ranges, metres, and how many of twenty are complete at least; the last is the demo's own.
+/// Radio ranges, metres, and how many of twenty flights must be complete; the last is the demo's
+/// own range.
 const RANGES: [(f32, usize); 5] = [(5.0, 10), (8.0, 17), (12.0, 19), (20.0, 20), (500.0, 20)];
 
 #[derive(Parser)]
@@ -26,17 +27,17 @@ struct Args {
     /// Only this range, metres.
     #[arg(long, value_name = "METRES")]
     range: Option<f32>,
-    /// Strike each seed so often: a vehicle fails near the place where the radio no longer reaches
-    /// it.
+    /// Fly each seed N times with a fault: a vehicle fails near the place where it leaves the radio
+    /// range of the others.
     #[arg(long, value_name = "N", default_value_t = 0)]
     strikes: usize,
     /// The first seed of the strikes.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     from: u64,
-    /// The same strikes, but everybody hears everybody.
+    /// The same faults, but every vehicle hears every other one.
     #[arg(long)]
     heard: bool,
-    /// Only this seed, with what the companions said.
+    /// Only this seed, with the log of the companions.
     #[arg(long, value_name = "SEED")]
     seed: Option<u64>,
 }
@@ -68,7 +69,7 @@ fn main() -> Result<()> {
             for vehicle in
                 result.vehicles.iter().filter(|v| v.goal.is_some() && !(v.reached && v.landed))
             {
-                // What it said when it gave up its goal.
+                // The reason that the vehicle logged when it gave up its goal.
                 let said = log
                     .iter()
                     .rfind(|e| e.vehicle == Some(vehicle.id) && e.text.contains("→ Land: "));
@@ -100,7 +101,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Vehicles that fail at the edge of the range, by the truth.
+/// Flies missions in which a vehicle fails at the edge of the radio range, judged by true motion.
 fn strike(args: &Args) -> Result<()> {
     let of_seed = |seed: u64| -> Result<Vec<Outcome>> {
         let mut edge = Edge::new(seed)?;

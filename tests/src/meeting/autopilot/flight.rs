@@ -1,4 +1,4 @@
-//! How the vehicle flies: what the controllers ask for, and what comes of it.
+//! Motion of the vehicle: the acceleration that the controllers demand, and what follows from it.
 
 use companion::Instant;
 use companion::autopilot::AutopilotKind;
@@ -8,19 +8,18 @@ use planner_core::Point;
 
 use super::{ARDUPILOT_LOITER, Autopilot, Catch, PX4_POSITION, STEP_S};
 
-/// Slowest setpoint with which PX4 looks for the ground, m/s.
+/// Sink speed of the setpoint above which PX4's land detector can detect the ground, m/s.
 const MIN_SINK_MPS: f32 = 0.275;
-/// Half of the way that a vehicle in a net swings, metres, and its phase by time, 1/s: up to 0.7
-/// m/s.
+/// Amplitude of the swing of a vehicle in a net, metres, and its angular speed, 1/s: up to 0.7 m/s.
 const SWING_M: f32 = 0.25;
 const SWING_PER_S: f32 = 2.8;
-/// How fast the wind carries a vehicle off, m/s.
+/// Speed at which the wind carries a vehicle off, m/s.
 const WIND_MPS: f32 = 0.7;
-/// Height over home that a return climbs to, metres.
+/// Height above home to which a return climbs, metres.
 const RETURN_M: f32 = 6.0;
 
 impl Autopilot {
-    /// The acceleration that its controllers ask for.
+    /// The acceleration that its controllers demand in the present mode.
     fn wanted(&self, now: Instant, floor_z: f32) -> Vector3<f32> {
         let kind = self.kind;
         let (position_gain, velocity_gain) = match kind {
@@ -41,7 +40,7 @@ impl Autopilot {
                 }
             }
             if kind == AutopilotKind::Px4 {
-                // The ramp of a take-off.
+                // The ramp of the vertical speed in PX4's take-off.
                 let lifted_s = self.lifted_at.map_or(0.0, |at| (now - at).as_secs_f32());
                 velocity.z = velocity.z.min(0.4 + 0.4 * lifted_s);
             }
@@ -80,14 +79,15 @@ impl Autopilot {
         wanted
     }
 
-    /// Keeps a vehicle that is caught where it is; returns the height of what it rests on.
+    /// Keeps a caught vehicle at its place; returns the height of the ledge that it rests on, if
+    /// any.
     fn keep_caught(&mut self, now: Instant) -> Option<f32> {
         let (how, place) = self.caught?;
         let ledge = how == Catch::Ledge;
         let t_s = (now - self.lifted_at?).as_secs_f32();
         let (away_m, speed_mps) = match how {
             Catch::Wall | Catch::Ledge => (0.0, 0.0),
-            // On the ground its net lies still.
+            // A vehicle that reached the ground does not swing any more.
             Catch::Net if self.grounded_since.is_some() => (self.position.x - place.x, 0.0),
             Catch::Net => (
                 SWING_M * (SWING_PER_S * t_s).sin(),
@@ -103,8 +103,8 @@ impl Autopilot {
         ledge.then_some(place.z)
     }
 
-    /// Whether the land detector looks for the ground: PX4's does while the setpoint's velocity
-    /// sinks, above 1.1 times `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
+    /// Whether the land detector may detect the ground: PX4's does only while the setpoint's
+    /// velocity sinks faster than 1.1 times `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
     fn detects_ground(&self) -> bool {
         self.kind != AutopilotKind::Px4
             || self.mode != self.kind.setpoint_mode()
@@ -133,7 +133,7 @@ impl Autopilot {
         self.velocity += self.acceleration * STEP_S;
         self.position += self.velocity * STEP_S;
         let floor_z = self.keep_caught(now).unwrap_or(floor_z);
-        // A floor is met from above only.
+        // A floor stops the vehicle from above only.
         if self.position.z <= floor_z && self.position.z > floor_z - 0.3 {
             self.position.z = floor_z;
             self.velocity = Point::new(0.0, 0.0, self.velocity.z.max(0.0));
@@ -163,7 +163,7 @@ impl Autopilot {
     }
 }
 
-/// Shortens a vector across to at most this length.
+/// Shortens the horizontal part of a vector to at most `most`.
 fn bound_across(vector: &mut Point, most: f32) {
     let across = vector.xy().norm();
     if across > most {

@@ -1,4 +1,4 @@
-//! What the companion sends: setpoints, commands and parameters.
+//! Handles what the companion sends: setpoints, commands and parameters.
 
 use companion::Instant;
 use companion::autopilot::AutopilotKind;
@@ -11,7 +11,7 @@ use planner_core::frames;
 use super::{Autopilot, PX4_LOSS_S, Target};
 
 impl Autopilot {
-    /// Takes what the companion sent, whole frames; answers go to `out`.
+    /// Handles whole frames from the companion; answers are appended to `out`.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8], out: &mut Vec<u8>) {
         let mut input = bytes;
         while let Some(frame) = self.framer.next(now, &mut input) {
@@ -90,7 +90,7 @@ impl Autopilot {
         if fields.clone().any(|field| !field.is_finite()) {
             return;
         }
-        // A setpoint ends a take-off, before the lift-off too.
+        // A setpoint ends a take-off, also before the lift-off.
         self.takeoff_z = None;
         self.target = Some(Target { at: now, position, velocity, acceleration });
         if self.lost && self.kind == AutopilotKind::Px4 {
@@ -124,7 +124,7 @@ impl Autopilot {
                     AutopilotKind::ArduPilot => data.param2 as u32,
                 };
                 if self.kind == AutopilotKind::Px4 {
-                    // The first answer is always yes.
+                    // PX4 accepts every mode command at first; a second ack has the result.
                     self.ack(data.command, MAV_RESULT_ACCEPTED, out);
                 }
                 if mode == px4::OFFBOARD

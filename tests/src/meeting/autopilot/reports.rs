@@ -1,4 +1,4 @@
-//! What the companion hears: answers, and streams as PX4 and ArduCopter send them.
+//! What the autopilot sends: answers, and telemetry streams like those of PX4 and ArduCopter.
 
 use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
@@ -22,7 +22,7 @@ impl Autopilot {
     }
 
     pub(super) fn ack(&mut self, command: MavCmd, result: MavResult, out: &mut Vec<u8>) {
-        // With the extensions, which the crate leaves out: progress, a second result, and to whom.
+        // With the extension fields that the crate leaves out: progress, second result, and target.
         let mut payload = [0; 10];
         payload[..2].copy_from_slice(&(command as u16).to_le_bytes());
         payload[2] = result as u8;
@@ -36,7 +36,7 @@ impl Autopilot {
         out.extend_from_slice(&buffer[..len]);
     }
 
-    /// The streams that are due.
+    /// Sends the telemetry that is due at `now`.
     pub(super) fn report(&mut self, now: Instant, out: &mut Vec<u8>) {
         let count = now.as_micros() / 25_000 + self.phase;
         if count.is_multiple_of(40) {
@@ -65,7 +65,7 @@ impl Autopilot {
         frames::geodetic_to_ned(self.kind.projection(), &self.ekf_origin, &place)
     }
 
-    /// PX4 sends all unasked, ArduCopter nothing.
+    /// Whether a stream is sent: by PX4 always, by ArduCopter only if it was requested.
     fn sends(&self, id: u16) -> bool {
         self.kind == AutopilotKind::Px4 || self.streams.contains(&id)
     }

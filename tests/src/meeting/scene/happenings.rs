@@ -1,4 +1,4 @@
-//! What happens in a meeting beside the flights.
+//! Random events of a meeting: commands, pilots, failures.
 
 use planner_core::Point;
 
@@ -6,7 +6,7 @@ use super::types::{Happening, START_S, Vehicle, What};
 use crate::meeting::autopilot::Failsafe;
 use crate::meeting::dice::Dice;
 
-/// Starts, and what else happens.
+/// The start of each vehicle, and up to three random events, by time.
 pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening> {
     let mut out = Vec::new();
     let mut ended = vec![false; vehicles.len()];
@@ -37,7 +37,7 @@ pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening
                         push(until + 3.0, What::Resume);
                     }
                 }
-                // A command that is refused then comes again.
+                // The command is repeated, since the first one may be refused.
                 push(at_s + 40.0, What::Resume);
             }
             2 => push(at_s, What::Return),
@@ -50,7 +50,7 @@ pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening
                     push(at_s + 0.5 * lasts_s, What::PilotTakes(Point::zeros()));
                     push(until, What::PilotReturns);
                     (1..5).for_each(|i| push(until + 1.5 * i as f32, What::Resume));
-                    // A vehicle that cannot continue is landed.
+                    // A vehicle that cannot continue is commanded to land.
                     push(until + 40.0, What::Land);
                 } else {
                     push(until, What::PilotLands);
@@ -63,7 +63,7 @@ pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening
             }
             7 => {
                 push(at_s, What::Dies);
-                // An ArduCopter hovers for ever: its pilot lands it.
+                // An ArduCopter whose companion died hovers for ever, so its pilot lands it.
                 push(at_s + 20.0, What::PilotLands);
                 ended[vehicle] = true;
             }

@@ -1,4 +1,4 @@
-//! Two vehicles that pass as near as their schedule lets them.
+//! Meetings of two vehicles that pass as near as their schedule allows.
 
 use planner_core::Point;
 use planner_core::flight::Flight;
@@ -9,12 +9,13 @@ use super::vehicle;
 use super::ways::{Way, at_height, flight};
 use crate::meeting::dice::Dice;
 
-/// How two vehicles pass in [`passing`].
+/// Geometries of [`passing`].
 pub const PASSINGS: [&str; 6] =
     ["opposite", "alongside", "overhead", "climb beside", "crossing", "lane"];
 
-/// Two vehicles of one plan that pass at exactly the separation of the schedule, or one after the
-/// other; nothing else happens. The radio loses 30 % and takes 0.3 s.
+/// A scene of two vehicles of one plan that pass at exactly the separation of the schedule, or one
+/// after the other; nothing else happens. The radio loses 30 % of the frames and delays them by 0.3
+/// s.
 pub fn passing(seed: u64) -> Scene {
     let mut dice = Dice::new(seed ^ 0xFA15E);
     let kind = PASSINGS[seed as usize % PASSINGS.len()];
@@ -22,7 +23,7 @@ pub fn passing(seed: u64) -> Scene {
     let along = Point::new(angle.cos(), angle.sin(), 0.0);
     let across = Point::new(-along.y, along.x, 0.0);
     let z = dice.real(1.5, 5.0);
-    // What is a hair nearer would get a gate.
+    // Any nearer, and the schedule would give them a gate.
     let apart_m = SCHEDULE.separation_m + 1e-3;
     let place =
         |x: f32, y: f32, z: f32| at_height(Point::new(12.0, 12.0, 0.0) + along * x + across * y, z);

@@ -1,4 +1,4 @@
-//! What a scene is made of.
+//! The types of a scene, and constants of all scenes.
 
 use companion::autopilot::AutopilotKind;
 use planner_core::Point;
@@ -7,132 +7,132 @@ use planner_core::schedule::ScheduleConfig;
 
 use crate::meeting::autopilot::{Catch, Failsafe};
 
-/// Waypoints of a path.
+/// Most waypoints of a path.
 pub const WAYPOINTS: usize = 16;
-/// Gates of a plan.
+/// Most gates of a plan.
 pub const GATES: usize = 128;
-/// Vehicles of a meeting, at most.
+/// Most vehicles of a meeting.
 pub const VEHICLES: usize = 8;
-/// Distance between two vehicles' centres that is kept, metres.
+/// Safety distance between two vehicles' centres, metres.
 pub const SAFETY_M: f32 = 1.5;
-/// Speed along paths, m/s.
+/// Nominal speed along paths, m/s.
 pub const CRUISE_MPS: f32 = 2.0;
 /// Speed of climbs, m/s.
 pub const CLIMB_MPS: f32 = 1.0;
-/// Missions are started then, seconds.
+/// When the missions are started, seconds.
 pub const START_S: f32 = 6.0;
-/// A meeting is over by then, seconds after its start.
+/// Time limit of a meeting, seconds after its start.
 pub const LIMIT_S: f32 = 180.0;
-/// A platform reaches this far around its pad, metres.
+/// Radius of the platform around a pad above the floor, metres.
 pub const PLATFORM_M: f32 = 0.7;
-/// The schedule of these vehicles, as a mission's.
+/// Schedule settings of the vehicles, as in a mission.
 pub const SCHEDULE: ScheduleConfig = ScheduleConfig {
     separation_m: SAFETY_M + 0.5,
     parked_separation_m: SAFETY_M + 0.25,
     cruise_mps: 0.9 * CRUISE_MPS,
     vertical_mps: CLIMB_MPS,
 };
-/// A vehicle's plan.
+/// The plan of one vehicle.
 pub type Plan = VehiclePlan<WAYPOINTS, GATES>;
 
-/// One vehicle.
+/// One vehicle of a scene.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
-    /// System id.
+    /// MAVLink system id.
     pub id: u8,
-    /// Its autopilot.
+    /// Which autopilot flies it.
     pub kind: AutopilotKind,
-    /// Where it stands.
+    /// Position of the vehicle on its pad, ENU metres.
     pub pad: Point,
-    /// What its planner answers.
+    /// Plan that the vehicle's planner returns.
     pub plan: Plan,
-    /// Shift of its streams.
+    /// Shift of its telemetry streams, in steps of 25 ms.
     pub phase: u64,
-    /// What its autopilot does without setpoints.
+    /// What its autopilot does after a loss of setpoints.
     pub on_loss: Failsafe,
 }
 
-/// Something that happens.
+/// An event in a meeting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum What {
-    /// MISSION_START.
+    /// The ground station sends MAV_CMD_MISSION_START.
     Start,
-    /// DO_PAUSE_CONTINUE 0.
+    /// The ground station sends MAV_CMD_DO_PAUSE_CONTINUE 0.
     Pause,
-    /// DO_PAUSE_CONTINUE 1.
+    /// The ground station sends MAV_CMD_DO_PAUSE_CONTINUE 1.
     Resume,
-    /// NAV_RETURN_TO_LAUNCH.
+    /// The ground station sends MAV_CMD_NAV_RETURN_TO_LAUNCH.
     Return,
-    /// NAV_LAND.
+    /// The ground station sends MAV_CMD_NAV_LAND.
     Land,
-    /// The pilot takes over and flies with this velocity.
+    /// The pilot takes over, and flies with this velocity, ENU m/s.
     PilotTakes(Point),
-    /// The pilot gives Offboard or Guided back.
+    /// The pilot switches back to Offboard or Guided.
     PilotReturns,
-    /// The pilot lands.
+    /// The pilot switches to the mode of landing.
     PilotLands,
-    /// The autopilot's failsafe.
+    /// The autopilot enters a failsafe.
     Fails(Failsafe),
-    /// The companion ends.
+    /// The companion stops for good.
     Dies,
-    /// Its radio no longer sends, or receives.
+    /// Directions of its radio fail.
     Cut {
-        /// Sends nothing.
+        /// Whether sending fails.
         sends: bool,
-        /// Hears nothing.
+        /// Whether receiving fails.
         hears: bool,
     },
-    /// Its radio works again.
+    /// Its radio works again in both directions.
     Healed,
-    /// It touches what is on no map, and can go no further.
+    /// Something that is on no map holds the vehicle, or carries it off.
     Caught(Catch),
 }
 
-/// What happens, when, and to which vehicle.
+/// An event with its time and vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Happening {
-    /// Seconds.
+    /// Time of the event, seconds.
     pub at_s: f32,
     /// Index of the vehicle.
     pub vehicle: usize,
-    /// What.
+    /// The event.
     pub what: What,
 }
 
-/// How a vehicle's reports are wrong.
+/// How a lying vehicle falsifies its reports.
 #[derive(Clone, Copy, Debug)]
 pub enum Lie {
-    /// Its position is off by this.
+    /// The reported position is off by this, ENU metres.
     Position(Point),
-    /// Its velocity is off by this.
+    /// The reported velocity is off by this, ENU m/s.
     Velocity(Point),
-    /// It reports no velocity.
+    /// The reported velocity is 0.
     Still,
-    /// Its progress is ahead by so many metres.
+    /// The reported progress is ahead by this, metres.
     Progress(f32),
-    /// Its points are off by this.
+    /// The reported points are off by this, ENU metres.
     Points(Point),
 }
 
-/// A meeting.
+/// A meeting: its vehicles, its radio and its events.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// From which it follows.
+    /// Seed from which the scene follows.
     pub seed: u64,
-    /// Its geometry.
+    /// Geometry of the scene, one of `KINDS` or `PASSINGS`.
     pub kind: &'static str,
-    /// Whether the vehicles share a plan.
+    /// Whether the vehicles fly one common plan.
     pub on_plan: bool,
     /// The vehicles.
     pub vehicles: Vec<Vehicle>,
-    /// It is over by then, seconds after its start.
+    /// Time limit, seconds after the start.
     pub limit_s: f32,
-    /// What happens, by time.
+    /// Events, by rising time.
     pub happenings: Vec<Happening>,
-    /// Least and greatest delay of the radio, seconds.
+    /// Least and greatest delay of a radio frame, seconds.
     pub delay_s: (f32, f32),
-    /// Share of frames lost.
+    /// Probability that a radio frame is lost.
     pub loss: f32,
-    /// A vehicle whose reports are wrong.
+    /// Index of the vehicle that lies in its reports, and its lie; `None`: all are honest.
     pub liar: Option<(usize, Lie)>,
 }

@@ -1,4 +1,4 @@
-//! Ways of a meeting's vehicles: the geometries in which they come close.
+//! Paths of a meeting's vehicles: geometries in which they come close.
 
 use planner_core::Point;
 use planner_core::flight::{Flight, Path, Task};
@@ -7,13 +7,13 @@ use planner_core::schedule;
 use super::types::{SAFETY_M, SCHEDULE, WAYPOINTS};
 use crate::meeting::dice::Dice;
 
-/// No flight is longer, seconds.
+/// Longest flight of a vehicle, seconds.
 const LONGEST_S: f32 = 60.0;
-/// The geometries.
+/// Names of the geometries.
 pub(super) const KINDS: [&str; 6] =
     ["crossing", "shared", "vertical", "beside", "corridor", "random"];
 
-/// A way: ground of the pad, points of the path, ground of the goal.
+/// The path of a vehicle: its pad on the ground, the points, and the goal's ground height.
 pub(super) struct Way {
     pub(super) pad: Point,
     pub(super) points: Vec<Point>,
@@ -24,7 +24,7 @@ pub(super) fn at_height(place: Point, z: f32) -> Point {
     Point::new(place.x, place.y, z)
 }
 
-/// A way of vehicle `i` of `n` in a geometry whose numbers are in `shape`.
+/// A random path of vehicle `i` in the geometry `kind`, which lies in space as `shape` says.
 pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
     let up =
         |dice: &mut Dice| if dice.chance(0.2) { dice.real(1.0, 29.0) } else { dice.real(1.0, 5.0) };
@@ -54,7 +54,7 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
             grounded(points, dice)
         }
         "vertical" => {
-            // Above one another's pads and goals.
+            // Climbs and descents above the pads and goals of others.
             let here = middle + Point::new(dice.real(-0.8, 0.8), dice.real(-0.8, 0.8), 0.0);
             let away = middle + Point::new(dice.real(-9.0, 9.0), dice.real(-9.0, 9.0), 0.0);
             let (low, high) = (up(dice), up(dice));
@@ -78,7 +78,7 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
             }
         }
         "beside" => {
-            // A path, and pads close to it.
+            // Vehicle 0 flies a straight path; the others have pads close to it.
             let across = Point::new(-shape.along.y, shape.along.x, 0.0);
             let line = |along: f32, off: f32, z: f32| {
                 at_height(middle + shape.along * along + across * off, z)
@@ -132,7 +132,7 @@ pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
     }
 }
 
-/// Puts pads under a path: mostly on the floor, some on a platform.
+/// Puts pad and goal below a path's ends: mostly on the floor, some on a platform.
 fn grounded(mut points: Vec<Point>, dice: &mut Dice) -> Way {
     points.iter_mut().for_each(|p| p.z = p.z.max(0.8));
     let mut ground = |top: f32| {
@@ -143,7 +143,7 @@ fn grounded(mut points: Vec<Point>, dice: &mut Dice) -> Way {
     Way { pad: at_height(first, ground(first.z)), ground_z: ground(last.z), points }
 }
 
-/// The numbers of a geometry: metres, radians.
+/// Where a geometry lies: centre, direction as a vector and an angle, and height.
 pub(super) struct Shape {
     pub(super) middle: Point,
     pub(super) along: Point,
@@ -151,7 +151,7 @@ pub(super) struct Shape {
     pub(super) z: f32,
 }
 
-/// The flight along a way; none where it is too short or too long.
+/// The flight along a path; `None` if it is too short, too low or too long.
 pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
     let mut path = Path::new();
     for point in &way.points {
@@ -175,7 +175,7 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
     )
 }
 
-/// Where a flight begins and ends, on the ground.
+/// Ground positions where a flight begins and ends.
 pub(super) fn pads(flight: &Flight<WAYPOINTS>) -> [Point; 2] {
     let down = |length| Point::new(0.0, 0.0, length);
     let points = flight.path.waypoints();
@@ -185,7 +185,7 @@ pub(super) fn pads(flight: &Flight<WAYPOINTS>) -> [Point; 2] {
     ]
 }
 
-/// Whether the flights leave one another's platforms room, and their pads lie apart.
+/// Whether no flight passes close over another's platforms, and all pads lie apart.
 pub(super) fn fits(flights: &[Flight<WAYPOINTS>], next: &Flight<WAYPOINTS>) -> bool {
     let own = pads(next);
     let over = |pads: &[Point; 2], path: &Path<WAYPOINTS>| {

@@ -1,37 +1,38 @@
-//! The best of what Fields2Cover makes of a field: the ways that its driver prints, judged here.
+//! The best route that Fields2Cover finds for a field, chosen from those that its driver prints.
 //!
-//! Without obstacles all of its orders of lanes in one cell are compared, connections straight.
-//! With obstacles such a connection may cross one. So each is led around instead, by the shortest
-//! way there is; and beside its orders in one cell stand those of its boustrophedon decomposition:
-//! the cells in their best order, each in its best direction (it has only a planner on OR-tools for
-//! that). Both are gifts: nothing that it offers without OR-tools is shorter and crosses nothing.
+//! Without obstacles all of its lane orders over the field as one cell are compared, with straight
+//! connections. With obstacles a straight connection may cross one, so it is led around by the
+//! shortest path instead; and its orders in one cell compete with its boustrophedon decomposition:
+//! the cells in their best order, each in its best direction (its own planner for that needs
+//! OR-tools). Both favour it: nothing that it offers without OR-tools is shorter and crosses
+//! nothing.
 
 use anyhow::{Context, Result};
 
 /// East and north, metres.
 pub type Place = [f64; 2];
 
-/// Obstacles are this much smaller: ways run along their borders, where its lanes end.
+/// Scale of the obstacles: paths run along their borders, where its lanes end.
 const SHRUNK: f64 = 0.999;
-/// So near to an obstacle a way only touches it, metres.
+/// Depth to which a path may enter an obstacle and only touch it, metres.
 const TOUCHES_M: f64 = 1e-6;
-/// Most cells whose orders are all compared.
+/// Most cells of a decomposition whose orders are all compared.
 const MAX_CELLS: usize = 14;
-/// Cells across a lane in which it is looked what lanes sweep.
+/// Number of grid cells across a lane by which the swept share is measured.
 const CELLS_ACROSS: f64 = 10.0;
 
-/// Its best way over a field.
+/// Fields2Cover's best route over a field.
 #[derive(Clone, Debug)]
 pub struct Best {
-    /// Lanes, metres.
+    /// Length of all lanes, metres.
     pub lanes_m: f64,
-    /// Lanes and connections, metres.
+    /// Length of all lanes and connections, metres.
     pub total_m: f64,
-    /// Microseconds.
+    /// Planning time, microseconds.
     pub time_us: f64,
-    /// Connections that cross an obstacle, where it flies them straight.
+    /// Number of connections that would cross an obstacle if flown straight.
     pub crossings: usize,
-    /// How: an order, or `cells`.
+    /// Name of its lane order, or `N cells`.
     pub name: String,
     /// The lanes, each by both ends.
     pub lanes: Vec<[Place; 2]>,
@@ -67,7 +68,7 @@ fn is_swept([from, to]: &[Place; 2], lane_m: f64, at: &Place) -> bool {
     (0.0..=length_m).contains(&along_m) && beside_m <= lane_m / 2.0 + 1e-3
 }
 
-/// A way over a cell as it printed it: both ends of each lane.
+/// A route over one cell as the driver printed it: both ends of each lane.
 struct Candidate {
     cell: usize,
     time_us: f64,
@@ -85,7 +86,8 @@ impl Candidate {
         Some(Self { cell, time_us, name, lanes })
     }
 
-    /// Lanes; lanes and connections; connections that are not straight.
+    /// Length of the lanes, length with connections, and number of connections that cross an
+    /// obstacle.
     fn measure(&self, obstacles: &Obstacles) -> (f64, f64, usize) {
         obstacles.measure(&self.lanes)
     }
@@ -95,11 +97,11 @@ fn apart_m(a: &Place, b: &Place) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Convex obstacles, a little shrunk.
+/// Convex obstacles, slightly shrunk.
 pub struct Obstacles(Vec<Vec<Place>>);
 
 impl Obstacles {
-    /// Obstacles of these corners.
+    /// Obstacles with these corners, slightly shrunk.
     pub fn new(rings: impl Iterator<Item = Vec<Place>>) -> Self {
         let shrunk = |ring: Vec<Place>| {
             let middle =
@@ -135,8 +137,8 @@ impl Obstacles {
             let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
             let turn = ring_turn(ring);
             for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-                // Inside is to the left of an edge of a ring that turns left. Metres; a way along
-                // an edge is outside.
+                // The inside is to the left of the edges of a ring that turns left. In metres; a
+                // leg along an edge is outside.
                 let edge = [b[0] - a[0], b[1] - a[1]];
                 let length_m = turn * edge[0].hypot(edge[1]);
                 let side = (edge[0] * (from[1] - a[1]) - edge[1] * (from[0] - a[0])) / length_m
@@ -153,7 +155,7 @@ impl Obstacles {
         })
     }
 
-    /// The shortest way between two places: from corner to corner.
+    /// Length of the shortest path between two points around the obstacles, from corner to corner.
     fn way_m(&self, from: &Place, to: &Place) -> f64 {
         if self.is_free(from, to) {
             return apart_m(from, to);
@@ -178,17 +180,17 @@ impl Obstacles {
     }
 }
 
-/// 1 for a ring that turns left, else −1.
+/// 1 for a ring that turns left (counter-clockwise), else −1.
 fn ring_turn(ring: &[Place]) -> f64 {
     let doubled: f64 =
         ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum();
     doubled.signum()
 }
 
-/// The best of what was printed, by order in one cell and by cells.
+/// The best of the printed routes: over the field as one cell, and over its cells.
 ///
 /// # Errors
-/// What was printed is no list of ways.
+/// A line is not a printed route.
 pub fn best(text: &str, obstacles: &Obstacles) -> Result<[Option<Best>; 2]> {
     let candidates: Vec<Candidate> = text
         .lines()
@@ -209,8 +211,8 @@ pub fn best(text: &str, obstacles: &Obstacles) -> Result<[Option<Best>; 2]> {
     Ok([whole, best_by_cells(&candidates, obstacles)])
 }
 
-/// All orders of the cells, by dynamic programming over those that are done and the way by which
-/// the last one was.
+/// The best route over the cells in any order, by dynamic programming over the set of cells flown
+/// and the route by which the last one was flown; `None` for too many cells.
 fn best_by_cells(candidates: &[Candidate], obstacles: &Obstacles) -> Option<Best> {
     let ways: Vec<&Candidate> =
         candidates.iter().filter(|c| c.cell > 0 && !c.lanes.is_empty()).collect();
@@ -254,7 +256,7 @@ fn best_by_cells(candidates: &[Candidate], obstacles: &Obstacles) -> Option<Best
     let (total_m, lanes_m, crossings) =
         found.last()?.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let name = format!("{} cells", cells.len());
-    // The lanes of a cell are the same in each direction and order.
+    // The lanes of a cell are the same in every direction and order.
     let first = cells.iter().filter_map(|cell| ways.iter().find(|way| way.cell == *cell));
     let lanes = first.flat_map(|way| way.lanes.iter().copied()).collect();
     Some(Best { lanes_m, total_m, time_us: ways[0].time_us, crossings, name, lanes })
