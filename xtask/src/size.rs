@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use object::elf::{SHF_ALLOC, SHF_EXECINSTR, SHF_WRITE, SHT_NOBITS};
-use object::{Object, ObjectSection, SectionFlags};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags};
 use serde_json::json;
 
 use crate::bare_metal::{self, Board, Region};
 use crate::emulate;
+use crate::shell::root;
 
 /// Arguments of `size`.
 #[derive(clap::Args)]
@@ -105,6 +106,7 @@ fn parts(program: &Path, board: Board) -> Result<Parts> {
         std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;
     let elf = object::File::parse(&*bytes)
         .with_context(|| format!("no program for a board: {}", program.display()))?;
+    ensure_placed(&elf, board)?;
     let mut parts = Parts { regions: vec![0; board.regions().len()], ..Parts::default() };
     for section in elf.sections() {
         let SectionFlags::Elf { sh_type, sh_flags } = section.flags() else { continue };
@@ -129,4 +131,30 @@ fn parts(program: &Path, board: Board) -> Result<Parts> {
         }
     }
     Ok(parts)
+}
+
+/// Checks that each static that the board's `memory.x` places by name is in the program: one that
+/// was renamed would silently lie in the default memory.
+fn ensure_placed(elf: &object::File<'_>, board: Board) -> Result<()> {
+    let path = match board {
+        // Its map places what measuring programs have, too.
+        Board::Qemu => return Ok(()),
+        Board::NucleoH743 => root().join("memory.x"),
+        Board::Pico2 => root().join("firmware/src/boards/pico2/memory.x"),
+    };
+    let map = std::fs::read_to_string(&path)
+        .with_context(|| format!("cannot read: {}", path.display()))?;
+    for pattern in map.split(".bss.*").skip(1) {
+        let pattern = pattern.split([' ', ')']).next().unwrap_or_default();
+        let is_held = |name: &str| {
+            let mut parts = pattern.split('*').filter(|part| !part.is_empty());
+            parts.try_fold(name, |rest, part| rest.split_once(part).map(|(_, rest)| rest)).is_some()
+        };
+        ensure!(
+            elf.symbols().any(|symbol| symbol.name().is_ok_and(is_held)),
+            "{}: no static is named {pattern}",
+            path.display()
+        );
+    }
+    Ok(())
 }
