@@ -95,7 +95,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let mut neighbours = Neighbours::new(
             &config.roster,
             config.system_id,
-            config.cruise_mps.max(config.climb_mps),
+            config.slowest_mps,
+            config.fastest_mps.max(config.climb_mps),
         );
         if let Some(down_s) = config.division {
             let stray_m =

@@ -42,6 +42,10 @@ pub struct Config<const V: usize> {
     pub mission_crc: u32,
     /// Nominal speed of this vehicle along its path, m/s.
     pub cruise_mps: f32,
+    /// Cruise of the slowest vehicle of the mission, m/s: what an unheard one surely flies at.
+    pub slowest_mps: f32,
+    /// Cruise of the fastest vehicle of the mission, m/s: how far an unheard one may have come.
+    pub fastest_mps: f32,
     /// Speed of this vehicle's climb from its pad, m/s.
     pub climb_mps: f32,
     /// Speed of this vehicle's guided descent, m/s.
@@ -134,6 +138,8 @@ impl<const V: usize> Config<V> {
             origin,
             mission_crc: 0,
             cruise_mps: 2.0,
+            slowest_mps: 2.0,
+            fastest_mps: 2.0,
             climb_mps: 1.0,
             descend_mps: 1.0,
             accel_mps2: 1.5,
@@ -208,8 +214,10 @@ mod tests {
 
     type Number = fn(&mut Config<4>) -> &mut f32;
     /// Every number that must be positive.
-    const POSITIVE: [Number; 10] = [
+    const POSITIVE: [Number; 12] = [
         |c| &mut c.cruise_mps,
+        |c| &mut c.slowest_mps,
+        |c| &mut c.fastest_mps,
         |c| &mut c.climb_mps,
         |c| &mut c.descend_mps,
         |c| &mut c.accel_mps2,

@@ -111,6 +111,8 @@ pub struct Guidance {
     /// Limits of the reference along the legs of climb, join and descent.
     leg_track: TrackConfig,
     deconflict: DeconflictConfig,
+    /// Speed of the mission's fastest vehicle, m/s.
+    fastest_mps: f32,
     /// Share of the speed that the error bound of the position estimate allows; 0 stops.
     pub pace: f32,
     /// The smoother, which makes setpoints of raw points.
@@ -191,11 +193,13 @@ pub struct Guidance {
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let smoother = SetpointSmoother::new(MotionLimits::new(config, autopilot), config.geofence);
-        let Settings { track, leg_track, deconflict } = Settings::new(config, autopilot);
+        let Settings { track, leg_track, deconflict, fastest_mps } =
+            Settings::new(config, autopilot);
         Self {
             track,
             leg_track,
             deconflict,
+            fastest_mps,
             pace: 1.0,
             smoother,
             phase: Phase::Hold,
@@ -245,8 +249,9 @@ impl Guidance {
 
     /// Computes all limits again, from the settings and the autopilot's limits.
     pub fn set_limits<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
-        let Self { track, leg_track, deconflict, .. } = Self::new(config, autopilot);
-        (self.track, self.leg_track, self.deconflict) = (track, leg_track, deconflict);
+        let Self { track, leg_track, deconflict, fastest_mps, .. } = Self::new(config, autopilot);
+        (self.track, self.leg_track) = (track, leg_track);
+        (self.deconflict, self.fastest_mps) = (deconflict, fastest_mps);
         self.smoother.set_limits(MotionLimits::new(config, autopilot), config.geofence);
     }
 

@@ -256,7 +256,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.has_left_plan()
             || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
-        ranged && follows && !left && !self.guidance.returning && self.mission.plan().is_some()
+        // Slower by a parameter or by its autopilot, it is not where the others reckon it to be.
+        let paced = self.guidance.cruise_mps() >= self.neighbours.assumed_speed_mps();
+        ranged
+            && paced
+            && follows
+            && !left
+            && !self.guidance.returning
+            && self.mission.plan().is_some()
     }
 
     /// Whether this vehicle continues its plan with all others out of range: its next gate is open,

@@ -31,6 +31,8 @@ impl<const V: usize> Config<V> {
         }
         let positive = [
             self.cruise_mps,
+            self.slowest_mps,
+            self.fastest_mps,
             self.climb_mps,
             self.descend_mps,
             self.accel_mps2,

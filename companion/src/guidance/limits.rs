@@ -108,6 +108,8 @@ pub(crate) struct Settings {
     pub(crate) leg_track: TrackConfig,
     /// For advice.
     pub(crate) deconflict: DeconflictConfig,
+    /// Speed that neighbours are assumed to fly at most, m/s.
+    pub(crate) fastest_mps: f32,
 }
 
 impl Settings {
@@ -135,7 +137,7 @@ impl Settings {
             cruise_mps: config.cruise_mps,
             accel_mps2: config.accel_mps2,
         };
-        Self { track, leg_track, deconflict }
+        Self { track, leg_track, deconflict, fastest_mps: config.fastest_mps }
     }
 
     /// Whether planner-core accepts these limits, and the safety filter's that follow from them.
@@ -143,14 +145,16 @@ impl Settings {
         self.track.check()?;
         self.leg_track.check()?;
         self.deconflict.check()?;
-        bounds(&self.track).check()
+        bounds(&self.track, self.fastest_mps).check()
     }
 }
 
-/// Limits within which neighbours are expected to fly and stop: those of this vehicle.
-pub(crate) fn bounds(track: &TrackConfig) -> MotionBounds {
+/// Limits within which neighbours are expected to fly and stop: the speed of the mission's fastest
+/// vehicle, which may be another, and the braking of this one.
+pub(crate) fn bounds(track: &TrackConfig, fastest_mps: f32) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
-    MotionBounds { braking, speed_max_mps: track.cruise_mps, silent_s: UNHEARD_STOPPED_S }
+    let speed_max_mps = fmaxf(track.cruise_mps, fastest_mps);
+    MotionBounds { braking, speed_max_mps, silent_s: UNHEARD_STOPPED_S }
 }
 
 #[cfg(test)]
@@ -210,5 +214,13 @@ mod tests {
                 proptest::prop_assert!((least..=most).contains(&value), "{l:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_slow_vehicle_expects_its_neighbours_to_be_as_fast_as_the_fastest() {
+        let config = Config { cruise_mps: 0.5, slowest_mps: 0.5, fastest_mps: 6.0, ..config() };
+        let settings = Settings::new(&config, &AutopilotKind::Px4.default_limits());
+        assert_eq!(settings.track.cruise_mps, 0.5);
+        assert_eq!(bounds(&settings.track, settings.fastest_mps).speed_max_mps, 6.0);
     }
 }

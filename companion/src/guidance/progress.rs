@@ -29,6 +29,11 @@ impl Guidance {
         (libm::fminf(closed_m, plan.path.length_m()), delay_s)
     }
 
+    /// Greatest speed along the path, by the mission, the parameters and the autopilot, m/s.
+    pub(crate) fn cruise_mps(&self) -> f32 {
+        self.track.cruise_mps
+    }
+
     /// Place along the plan's path up to which all gates are open, metres; −∞ for a vehicle that
     /// flies back or a detour.
     pub(crate) fn gates_open_up_to_m<const W: usize, const G: usize>(

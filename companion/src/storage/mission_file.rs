@@ -466,6 +466,12 @@ impl<'a> MissionView<'a> {
         }
         config.mission_crc = self.crc;
         config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
+        (config.slowest_mps, config.fastest_mps) = (header.cruise_mps, 0.0);
+        for vehicle in self.vehicles() {
+            let cruise_mps = libm::fminf(header.cruise_mps, vehicle.speed_max_mps);
+            config.slowest_mps = libm::fminf(config.slowest_mps, cruise_mps);
+            config.fastest_mps = libm::fmaxf(config.fastest_mps, cruise_mps);
+        }
         config.climb_mps = header.schedule.vertical_mps;
         config.descend_mps = header.schedule.vertical_mps;
         if let MissionKind::Coverage(view) = &self.kind

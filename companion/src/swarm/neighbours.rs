@@ -45,7 +45,7 @@ pub struct Neighbours<const V: usize> {
     heard: Vec<Neighbour, V>,
     /// Number of roster vehicles in `contacts`, sorted by id; behind them are the strangers.
     roster: usize,
-    dropped: u32,
+    dropped: u16,
     /// When the last scan began that found no vehicle out of the plan on the path.
     clear_at: Instant,
     /// Greatest speed at which a reported progress is believed to grow, m/s.
@@ -70,21 +70,23 @@ pub struct Neighbours<const V: usize> {
     /// say, metres; 0 in other missions.
     pair_position_error_m: f32,
     /// Rank of the vehicle with which the next roster report begins.
-    roster_next: usize,
+    roster_next: u16,
 }
 
 impl<const V: usize> Neighbours<V> {
     /// A table of the roster's vehicles, sorted by id, without the own one; none of them was heard
-    /// yet. Their progress is believed to grow no faster than `nominal_mps`, or than they land.
-    pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
+    /// yet. Their progress is believed to grow no faster than `fastest_mps`, or than they land, and
+    /// unheard no slower than a share of `slowest_mps`: of the whole mission's vehicles, since what
+    /// one reports and another makes of it must agree.
+    pub fn new(roster: &[RosterEntry], own_id: u8, slowest_mps: f32, fastest_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
             heard: Vec::new(),
             roster: 0,
             dropped: 0,
             clear_at: Instant::ZERO,
-            fastest_mps: libm::fmaxf(nominal_mps, MAX_LANDING_MPS),
-            assumed_speed_mps: nominal_mps * RECKONED_SPEED_SHARE,
+            fastest_mps: libm::fmaxf(fastest_mps, MAX_LANDING_MPS),
+            assumed_speed_mps: slowest_mps * RECKONED_SPEED_SHARE,
             range_edge_m: f32::INFINITY,
             place: Point::zeros(),
             relay_next: 0,
@@ -134,7 +136,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Number of positions dropped because the table had no room for their sender.
-    pub fn dropped_count(&self) -> u32 {
+    pub fn dropped_count(&self) -> u16 {
         self.dropped
     }
 

@@ -85,7 +85,7 @@ impl Guidance {
         }
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_CLEAR_M } else { 0.0 };
-        let bounds = bounds(&self.track);
+        let bounds = bounds(&self.track, self.fastest_mps);
         let set = match way {
             FlightDirection::Vertical { to_m, .. } if whole_column => {
                 ReachableSet::vertical(*position, to_m)

@@ -52,6 +52,25 @@ fn file() -> List<u8> {
     out
 }
 
+#[test]
+fn all_vehicles_know_the_slowest_and_the_fastest_of_the_mission() {
+    for (cruise_mps, expected) in [(4.0, (0.4, 4.0)), (0.3, (0.3, 0.3)), (20.0, (0.4, 9.0))] {
+        let speeds = [(7, 1.5), (2, 0.4), (250, 9.0)];
+        let vehicles =
+            speeds.map(|(id, speed_max_mps)| MissionVehicle { speed_max_mps, ..vehicle(id, None) });
+        let mut out = vec![0; encoded_len(3, 2)];
+        let block = MissionBlock::Goals(&[goal(0), goal(1)]);
+        let header = MissionHeader { cruise_mps, ..header() };
+        assert_eq!(write_mission(&header, &vehicles, &block, &mut out), Ok(out.len()));
+        let view = MissionView::parse(&out).unwrap();
+        for (id, speed_max_mps) in speeds {
+            let config = view.companion_config::<3>(id).unwrap();
+            assert_eq!(config.cruise_mps, speed_max_mps.min(cruise_mps));
+            assert_eq!((config.slowest_mps, config.fastest_mps), expected, "{id}");
+        }
+    }
+}
+
 /// A file with bytes changed and the CRC made right again.
 fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     let mut file = file();

@@ -86,8 +86,9 @@ impl<const V: usize> Neighbours<V> {
     /// The next roster report: all vehicles, or in turn as many as one message holds.
     pub(crate) fn roster(&mut self) -> Option<RosterReport> {
         let fleet = self.fleet.as_ref()?;
-        let first = if self.roster_next < fleet.vehicle_count() { self.roster_next } else { 0 };
-        self.roster_next = first + MAX_ENTRIES;
+        let next = usize::from(self.roster_next);
+        let first = if next < fleet.vehicle_count() { next } else { 0 };
+        self.roster_next = (first + MAX_ENTRIES) as u16;
         Some(fleet.roster_message(first))
     }
 }

@@ -10,7 +10,7 @@ pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt
 
 fn table() -> Neighbours<4> {
     let entry = |system_id| RosterEntry { system_id, start: Point::zeros() };
-    Neighbours::new(&[entry(3), entry(5), entry(9)], 5, 2.0)
+    Neighbours::new(&[entry(3), entry(5), entry(9)], 5, 2.0, 2.0)
 }
 
 pub(super) fn place(boot_ms: u32, north_1e7: i32) -> GLOBAL_POSITION_INT_DATA {
@@ -290,11 +290,11 @@ proptest::proptest! {
 fn deaf_is_who_hears_none_of_those_there_are() {
     let at = |seconds: u64| Instant::from_millis(seconds * 1000);
     assert!(
-        !Neighbours::<4>::new(&[], 1, 2.0).hears_nobody(at(100)),
+        !Neighbours::<4>::new(&[], 1, 2.0, 2.0).hears_nobody(at(100)),
         "alone there is nobody to hear"
     );
     let roster = [1, 2, 9].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
-    let mut table = Neighbours::<4>::new(&roster, 1, 2.0);
+    let mut table = Neighbours::<4>::new(&roster, 1, 2.0, 2.0);
     table.handle_intent(at(10), 0, &intent(0, 1, 2), 1, None);
     assert!(!table.hears_nobody(at(12)), "one is heard");
     assert!(table.hears_nobody(at(14)));

@@ -28,6 +28,7 @@ const AHEAD_M: f32 = 3.0;
 /// The row: tables, true progress and gates of each.
 struct Row {
     tables: List<Neighbours<8>>,
+    cruise_mps: List<f32>,
     flown_m: List<f32>,
     pace_mps: List<f32>,
     gates: List<List<Gate>>,
@@ -37,7 +38,11 @@ struct Row {
 }
 
 impl Row {
-    fn new(count: u8, length_m: f32, seed: u64) -> Self {
+    /// Vehicles that fly at these speeds at most.
+    fn new(cruise_mps: &[f32], length_m: f32, seed: u64) -> Self {
+        let count = cruise_mps.len() as u8;
+        let fold = |f: fn(f32, f32) -> f32| cruise_mps.iter().copied().reduce(f).expect("a row");
+        let (slowest_mps, fastest_mps) = (fold(f32::min), fold(f32::max));
         let entry = |id: u8| RosterEntry { system_id: id, start: Point::zeros() };
         let roster: List<_> = (1..=count).map(entry).collect();
         let gate = |id: u8, at_m: f32| Gate { at_m, id, until_m: at_m + AHEAD_M };
@@ -47,9 +52,12 @@ impl Row {
             places.map(|at_m| gate(rank, at_m)).collect()
         };
         Self {
-            tables: (1..=count).map(|id| Neighbours::new(&roster, id, CRUISE_MPS)).collect(),
+            tables: (1..=count)
+                .map(|id| Neighbours::new(&roster, id, slowest_mps, fastest_mps))
+                .collect(),
+            cruise_mps: cruise_mps.to_vec(),
             flown_m: (0..count).map(|_| 0.0).collect(),
-            pace_mps: (0..count).map(|rank| 0.9 + 0.15 * f32::from(rank)).collect(),
+            pace_mps: cruise_mps.iter().map(|mps| 0.45 * mps).collect(),
             gates: (0..count).map(gates).collect(),
             length_m,
             now: Instant::from_millis(1000),
@@ -93,7 +101,7 @@ impl Row {
         for rank in 0..self.tables.len() {
             let stop_m = self.closed(rank).first().map_or(self.length_m, |gate| gate.at_m);
             if self.draw() < 0.04 {
-                self.pace_mps[rank] = 0.85 + 1.1 * self.draw();
+                self.pace_mps[rank] = self.cruise_mps[rank] * (0.425 + 0.55 * self.draw());
             }
             let pace_mps = self.pace_mps[rank];
             let flown_m = &mut self.flown_m[rank];
@@ -130,8 +138,12 @@ impl Row {
 fn no_vehicle_is_reckoned_to_be_further_than_it_is() {
     let mut rng = Pcg32::seed_from_u64(3);
     for seed in 0..300 {
-        let mut row =
-            Row::new(2 + rng.next_u32() as u8 % 5, 20.0 + (rng.next_u32() % 40) as f32, seed);
+        let mut cruise_mps = [CRUISE_MPS; 6];
+        if seed % 2 == 1 {
+            cruise_mps.fill_with(|| 0.5 + (rng.next_u32() % 40) as f32 * 0.1);
+        }
+        let cruise_mps = &cruise_mps[..2 + rng.next_u32() as usize % 5];
+        let mut row = Row::new(cruise_mps, 20.0 + (rng.next_u32() % 40) as f32, seed);
         let parts = rng.next_u32() % 60;
         for step in 0..300 {
             row.step(step < parts || (step > parts + 40 && step < parts + 50));
@@ -143,7 +155,7 @@ fn no_vehicle_is_reckoned_to_be_further_than_it_is() {
 #[test]
 fn rows_that_lose_one_another_come_to_their_ends() {
     let arrives = |seed: &u64| {
-        let mut row = Row::new(2 + *seed as u8 % 3, 20.0, *seed);
+        let mut row = Row::new(&[CRUISE_MPS; 4][..2 + *seed as usize % 3], 20.0, *seed);
         (0..50).for_each(|_| row.step(true));
         (0..250).for_each(|_| row.step(false));
         row.flown_m.iter().all(|m| *m >= 20.0)

@@ -72,7 +72,7 @@ impl Swarm {
     fn new(count: u8) -> Self {
         let entry = |id: u8| RosterEntry { system_id: id, start: Point::zeros() };
         let roster: List<_> = (1..=count).map(entry).collect();
-        let tables = (1..=count).map(|id| Neighbours::new(&roster, id, 2.0)).collect();
+        let tables = (1..=count).map(|id| Neighbours::new(&roster, id, 2.0, 2.0)).collect();
         Self { tables, now: Instant::from_millis(1000) }
     }
 
@@ -200,7 +200,7 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
 #[test]
 fn the_delay_of_a_flight_goes_with_its_progress() {
     let roster = [1, 2, 3].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
-    let mut table = Neighbours::<8>::new(&roster, 3, 2.0);
+    let mut table = Neighbours::<8>::new(&roster, 3, 2.0, 2.0);
     let (first, second) = (Instant::from_millis(1000), Instant::from_millis(1100));
     let by = Intent {
         system_id: 2,
