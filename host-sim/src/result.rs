@@ -153,7 +153,8 @@ pub struct VehicleResult {
     pub goal: Option<u16>,
     /// Whether the vehicle came to its goal, by its true position.
     pub reached: bool,
-    /// Whether the vehicle stands on the ground, disarmed, after its flight.
+    /// Whether the vehicle stood on the ground again, disarmed, after it had left it; false if
+    /// nothing was flown.
     pub landed: bool,
     /// Length of the vehicle's planned path, metres.
     pub path_m: f64,

@@ -134,7 +134,8 @@ impl FtpClient {
         Ok(frames)
     }
 
-    /// Waits up to 30 s for a frame of a companion; returns its system id.
+    /// Waits up to 30 s for any frame of the companion that this client is for, or of the first
+    /// companion heard; returns its system id.
     ///
     /// # Errors
     /// No companion is heard.

@@ -56,8 +56,8 @@ pub enum ZoneKind {
 }
 
 impl KeepOutZone {
-    /// Checks that the ends are finite, and that the radius is finite and not negative; the error
-    /// names the first that is not.
+    /// Checks that both ends of the zone's axis are finite, and that its radius is finite and not
+    /// negative; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
         check_finite("from", &self.from)?;
         check_finite("to", &self.to)?;

@@ -79,8 +79,8 @@ pub enum RoadmapError {
     ZeroLength(u16),
     /// An edge of this node is shorter or longer than the limits in the header.
     EdgeLength(u16),
-    /// The clearance of an edge of this node is below the header's tested clearance, or above the
-    /// largest that can be stored.
+    /// The clearance of an edge of this node is more than a millimetre below the header's
+    /// `tested_clearance_m`, or above its `max_clearance_m`.
     EdgeClearance(u16),
     /// The distance of this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the
     /// length of the shortest path over all edges.

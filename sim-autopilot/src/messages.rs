@@ -21,6 +21,7 @@ const PX4_SENSORS: [u32; 3] = [50_348_079, 50_413_615, 52_480_063];
 const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343 & !PREARM];
 /// Bit MAV_SYS_STATUS_PREARM_CHECK of SYS_STATUS.
 const PREARM: u32 = 0x1000_0000;
+/// Bit MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL of SYS_STATUS.
 const POSITION_SENSORS: u32 = 0x4000;
 
 /// Messages that many dialects do not have: id, CRC seed and payload as recorded from PX4 1.17.

@@ -61,6 +61,7 @@ pub(crate) struct Sender {
 }
 
 impl Sender {
+    /// System and component id of the sender, without its port.
     pub(crate) fn system_and_component(self) -> (u8, u8) {
         (self.system, self.component)
     }

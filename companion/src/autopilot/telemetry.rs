@@ -130,7 +130,8 @@ pub struct Telemetry {
     /// Whether an EKF origin counts at any distance, as there is no mission origin to compare it
     /// with.
     accept_any_origin: bool,
-    /// EKF origin; `None` while it is unknown.
+    /// EKF origin, which positions are relative to; `None` until one is received, and again after
+    /// it was refused as too far away, or after the autopilot restarted or its position jumped.
     pub ekf_origin: Option<Geodetic>,
     /// EKF origin with which the vehicle was armed; `None` while disarmed.
     last_armed_origin: Option<Geodetic>,

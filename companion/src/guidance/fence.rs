@@ -212,7 +212,8 @@ fn distribute_remaining_jerk(
         let room = sqrtf(fmaxf(across * across - taken * taken, 0.0));
         let next = accel[beside] + others[beside] * dt_s;
         let next = fmaxf(fminf(next, room), -room);
-        // The vertical axis gets what the horizontal ones leave of the jerk.
+        // The braking axes take their jerk first, then the other horizontal axis, then the vertical
+        // one.
         let most = left(&braking);
         others[beside] = fmaxf(fminf((next - accel[beside]) / dt_s, most), -most);
         let most = sqrtf(fmaxf(most * most - others[beside] * others[beside], 0.0));

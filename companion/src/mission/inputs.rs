@@ -138,7 +138,8 @@ pub struct GuardInputs {
     /// Whether the vehicle may take off: its departure is due, advice and safety filter leave it
     /// room, the battery's charge is known, and it is heard.
     pub gates_open: bool,
-    /// Whether the vehicle has climbed to the start of its path.
+    /// Whether, in the state `Climb`, setpoint and vehicle are at the start of the path; false in
+    /// all other states.
     pub climb_done: bool,
     /// Whether the vehicle is at the end of its path and may land there, or is on the ground in its
     /// last descent.

@@ -91,8 +91,9 @@ impl PhotographedWaypoints {
         Some(kept)
     }
 
-    /// Prepares the request for a plan: with `resumes` it leaves out the known waypoints, else
-    /// none, in a new round.
+    /// Prepares the request for a plan. With `resumes` the plan leaves out the known waypoints, or,
+    /// if the vehicle has not flown since its last request, those agreed on the ground. Without it
+    /// a new round begins, and the plan leaves out none.
     pub(crate) fn begin_plan(&mut self, resumes: bool) {
         if !resumes {
             self.begin_round();

@@ -60,7 +60,7 @@ const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
 pub(super) type Lanes = Tracks<LANES>;
 pub(super) type ZoneTransit<'a> = Transit<'a, CORNERS>;
 
-/// Memory that is lent to the calls.
+/// Memory that is lent to the coverage calls with extreme arguments.
 pub(super) struct CoverageMemory {
     pub(super) tracks: Lanes,
     left: Lanes,

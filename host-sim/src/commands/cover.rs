@@ -1,4 +1,5 @@
-//! `host-sim cover`: plans how a fleet photographs an area, and exports the flights; no flight.
+//! `host-sim cover`: plans how a fleet photographs an area, and exports the flights. It simulates
+//! none.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -32,8 +32,8 @@ use crate::scenario::coverage::{Method, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
 
-/// Height above the pad at which the take-off ends and the landing begins, metres; in between the
-/// vehicle flies its path.
+/// Climb from the pad after which a vehicle flies its path, and descent at the path's end, metres;
+/// less where the pictures are taken lower above the ground.
 const PATH_OVER_PAD_M: f32 = 3.0;
 /// Distance by which the map extends beyond area and pads, and above the highest layer, metres.
 const AROUND_AREA_M: f32 = 30.0;

@@ -135,7 +135,7 @@ pub struct PicturePlan {
     numbers: [u16; Self::MAX_STRETCHES],
     /// For each stretch, in order, the number of its pictures.
     counts: [u16; Self::MAX_STRETCHES],
-    /// Whether the area's numbers fall along the path, which is flown backwards.
+    /// Whether the area's numbers fall along the path: it follows the area's lanes backwards.
     backward: bool,
     /// Number of waypoints of the whole area; 0 where they have no numbers.
     area: u32,

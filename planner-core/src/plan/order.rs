@@ -206,9 +206,10 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     Ok(None)
 }
 
-/// The vehicle's flight with waits and sidesteps on its way. The flight that arrives earliest may
-/// take off only to wait long in the air. Then a later take-off is tried, at most
-/// [`MAX_DEPARTURES`] times; the flight with the shortest longest wait is returned.
+/// The vehicle's flight on a route searched with waits and sidesteps, if possible clear of the pads
+/// of waiting vehicles. The flight that arrives earliest may take off only to wait long in the air.
+/// Then later take-offs are tried, until no wait is longer than [`LONG_WAIT_S`], with at most
+/// [`MAX_DEPARTURES`] searches; the flight whose longest wait is shortest is returned.
 fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,

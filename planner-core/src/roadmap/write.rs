@@ -214,8 +214,9 @@ fn write_header(
     }
 }
 
-/// Fills the compressed sparse rows. `offsets` first counts the degrees, then holds each row's
-/// write position, then is shifted by one entry to hold each row's begin.
+/// Fills the compressed sparse rows, each sorted by target, with clearances limited to the header's
+/// greatest; an error if an edge is there twice. `offsets` first counts the degrees, then holds
+/// each row's write position, then is shifted by one entry to hold each row's begin.
 fn write_rows(
     header: &RoadmapHeader,
     edges: &[Edge],

@@ -12,6 +12,7 @@ use super::records::{Compaction, RecordKind};
 use crate::services::parameters::STORED_LEN;
 use core::ops::Range;
 
+/// First bytes of the head of each record.
 pub(super) const MAGIC: [u8; 4] = *b"FLKR";
 
 /// State of the journal.
