@@ -264,47 +264,9 @@ impl Guidance {
         self.filter.reset();
     }
 
-    /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was
-    /// sent.
-    pub fn hold_at(&mut self, point: Point) {
-        // A vehicle whose position is known again brakes from its last place.
-        let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
-        if lost || !self.smoother.has_setpoint() {
-            self.smoother.resume_at(point, self.unsent_s);
-            self.forget_leg();
-        }
-    }
-
-    /// Holds at the place to which the pilot flew, until the mission resumes; the place of
-    /// interruption is kept.
-    pub fn hold_after_pilot(&mut self, point: Point) {
-        self.hold_at(point);
-        self.forget_leg();
-    }
-
-    /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing
-    /// was sent.
-    pub fn begin_climb(&mut self, position: &Point) {
-        self.reset();
-        self.phase = Phase::Climb;
-        if !self.smoother.has_setpoint() {
-            self.smoother.begin_at(*position, self.unsent_s);
-        }
-    }
-
     /// Place of the reference on the path, metres; −∞ before the reference runs.
     pub fn along_m(&self) -> f32 {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
-    }
-
-    /// Whether the setpoint stands, and is not on its way down.
-    pub fn is_standing(&self) -> bool {
-        self.is_setpoint_still() && self.phase != Phase::Descent
-    }
-
-    /// Whether it stands where its path leaves the geofence.
-    pub fn is_standing_at_fence(&self) -> bool {
-        self.stopped_at_fence && self.is_standing()
     }
 
     /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one that

@@ -13,6 +13,34 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::Tracker;
 
 impl Guidance {
+    /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was
+    /// sent.
+    pub fn hold_at(&mut self, point: Point) {
+        // A vehicle whose position is known again brakes from its last place.
+        let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
+        if lost || !self.smoother.has_setpoint() {
+            self.smoother.resume_at(point, self.unsent_s);
+            self.forget_leg();
+        }
+    }
+
+    /// Holds at the place to which the pilot flew, until the mission resumes; the place of
+    /// interruption is kept.
+    pub fn hold_after_pilot(&mut self, point: Point) {
+        self.hold_at(point);
+        self.forget_leg();
+    }
+
+    /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing
+    /// was sent.
+    pub fn begin_climb(&mut self, position: &Point) {
+        self.reset();
+        self.phase = Phase::Climb;
+        if !self.smoother.has_setpoint() {
+            self.smoother.begin_at(*position, self.unsent_s);
+        }
+    }
+
     /// Continues where the flight was interrupted.
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
@@ -59,6 +87,16 @@ impl Guidance {
     /// Whether the setpoint stands, if only on its way down.
     pub(crate) fn is_setpoint_still(&self) -> bool {
         self.smoother.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
+    }
+
+    /// Whether the setpoint stands, and is not on its way down.
+    pub fn is_standing(&self) -> bool {
+        self.is_setpoint_still() && self.phase != Phase::Descent
+    }
+
+    /// Whether it stands where its path leaves the geofence.
+    pub fn is_standing_at_fence(&self) -> bool {
+        self.stopped_at_fence && self.is_standing()
     }
 
     /// Place along the path where the vehicle could stop now, metres.

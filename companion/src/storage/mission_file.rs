@@ -171,6 +171,33 @@ pub fn write_mission(
     };
     let needed = block.file_len(vehicles.len());
     let out = out.get_mut(..needed).ok_or(MissionError::MissionFull { needed })?;
+    write_header(header, block, [vehicle_count, goal_count], out);
+    let (to_vehicles, rest) =
+        out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
+    let (to_goals, to_block) = rest.split_at_mut(goals.len() * GOAL_LEN);
+    for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
+        to.copy_from_slice(&vehicle.to_bytes());
+    }
+    for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
+        put_numbers(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
+    }
+    if let MissionBlock::Coverage(parts) = block {
+        parts.write(to_block);
+    }
+    let crc = CRC32.checksum(&out[..needed - CRC_LEN]);
+    out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
+    MissionView::parse(out)?;
+    Ok(needed)
+}
+
+/// Writes the bytes before the first vehicle; `out` is the whole file.
+fn write_header(
+    header: &MissionHeader,
+    block: &MissionBlock<'_>,
+    [vehicle_count, goal_count]: [u16; 2],
+    out: &mut [u8],
+) {
+    let needed = out.len();
     out[..8].copy_from_slice(&MAGIC);
     out[8..10].copy_from_slice(&VERSION.to_le_bytes());
     out[10..12].copy_from_slice(&(HEADER_LEN as u16).to_le_bytes());
@@ -216,22 +243,6 @@ pub fn write_mission(
             .chain(high.iter().copied())
             .chain([s.cruise_mps]),
     );
-    let (to_vehicles, rest) =
-        out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
-    let (to_goals, to_block) = rest.split_at_mut(goals.len() * GOAL_LEN);
-    for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
-        to.copy_from_slice(&vehicle.to_bytes());
-    }
-    for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
-        put_numbers(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
-    }
-    if let MissionBlock::Coverage(parts) = block {
-        parts.write(to_block);
-    }
-    let crc = CRC32.checksum(&out[..needed - CRC_LEN]);
-    out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
-    MissionView::parse(out)?;
-    Ok(needed)
 }
 
 /// A checked mission over borrowed bytes.

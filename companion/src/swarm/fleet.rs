@@ -17,16 +17,11 @@ use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportE
 use crate::time::{Duration, Instant};
 
 mod lots;
+mod timeouts;
 
 pub use lots::{DivisionInput, DivisionInputs};
+pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
 
-/// Time for which a vehicle continues photographing after a majority last reported that they hear
-/// it.
-pub const LEASE: Duration = Duration::from_secs(20);
-/// Greatest age of a report that renews the lease.
-pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
-/// Silence after which a vehicle's share is divided among the others.
-pub const SILENT_AFTER: Duration = Duration::from_secs(45);
 /// Time for which a vehicle commits itself to fly on, seconds, up to the last picture that it takes
 /// within it. A vehicle requests a division this long before its path ends if its route continues
 /// there.
@@ -36,27 +31,6 @@ pub const COMMITMENT_S: f32 = 10.0;
 pub const MAX_DIVISIONS: usize = 12;
 /// Number of distinct incarnations: 3 bits.
 const INCARNATIONS: u8 = 8;
-
-/// Time limits of a fleet. A vehicle that has no lease lands after twice the lease.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct FleetTimeouts {
-    /// As [`LEASE`].
-    pub lease: Duration,
-    /// As [`LEASE_HEARD_WITHIN`].
-    pub heard: Duration,
-    /// As [`SILENT_AFTER`].
-    pub silent: Duration,
-    /// A lost vehicle is down once it has been silent for so long.
-    pub down: Duration,
-}
-
-impl FleetTimeouts {
-    /// Time limits of a flight in which a vehicle that no other vehicle hears any more is down
-    /// after `down`.
-    pub const fn of_flight(down: Duration) -> Self {
-        Self { lease: LEASE, heard: LEASE_HEARD_WITHIN, silent: SILENT_AFTER, down }
-    }
-}
 
 /// State that a vehicle reports of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
