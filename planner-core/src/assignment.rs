@@ -9,9 +9,9 @@
 //! Beyond the paper: fewer rows than columns or the other way round, and pairs that cannot be
 //! (`f32::INFINITY`). The answer has the most pairs there can be and, among those, the least total.
 //! No large number stands in for infinity. Where every row of the shorter side can be served,
-//! Jonker–Volgenant answers; where one cannot, it begins again with shortest augmenting paths from *all*
-//! free rows at once. Each of those keeps the matching the cheapest of its size, so when no path is
-//! left it is the largest and the cheapest of that size.
+//! Jonker–Volgenant answers; where one cannot, it begins again with shortest augmenting paths
+//! from *all* free rows at once. Each of those keeps the matching the cheapest of its size, so when
+//! no path is left it is the largest and the cheapest of that size.
 //!
 //! Costs are f32 in any unit (metres, seconds), sums and dual prices f64.
 

@@ -8,9 +8,8 @@
 //! problem, Čáp et al. 2015).
 //!
 //! In flight only the *order* of the schedule counts. For each pair of conflicting segments the
-//! later vehicle gets a
-//! [`Gate`]: it enters its segment once the earlier one has left its own. Why this keeps vehicles apart and lets all of them
-//! arrive is in `docs/schedule.md`, claim by claim.
+//! later vehicle gets a [`Gate`]: it enters its segment once the earlier one has left its own. Why
+//! this keeps vehicles apart and lets all of them arrive is in `docs/schedule.md`, claim by claim.
 //!
 //! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or
 //! step aside on its way.

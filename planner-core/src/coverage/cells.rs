@@ -1,8 +1,8 @@
 //! A first order of lanes: cells, each flown back and forth, one after the other.
 //!
-//! Lanes that follow each other, one a strip, are a cell: the boustrophedon decomposition (Choset 2000)
-//! of the lanes themselves. From each cell the way goes on to the nearest corner of another.
-//! O(cells · lanes + lanes²) sums, and few distances.
+//! Lanes that follow each other, one a strip, are a cell: the boustrophedon decomposition
+//! (Choset 2000) of the lanes themselves. From each cell the way goes on to the nearest corner of
+//! another. O(cells · lanes + lanes²) sums, and few distances.
 
 use super::lanes::Lane;
 use super::transit::Transit;

@@ -108,7 +108,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
             ((*a, *b), (a[U] + skip, b[U]))
         };
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
-        // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate by 2⁻²² of the length, and two units.
+        // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate by 2⁻²² of the
+        // length, and two units.
         let per_u = if d[U] == 0 { 0.0 } else { (1 << 30) as f32 / d[U] as f32 };
         Self {
             words: grid.words(),
