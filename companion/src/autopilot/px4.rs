@@ -1,6 +1,6 @@
-//! PX4's numbers: flight modes, the setpoint mask, and the streams a companion needs. Source: PX4 1.17
-//! `px4_custom_mode.h` and what AUTOPILOTS recordings show. Another autopilot gets a module of the
-//! same shape.
+//! PX4's numbers: flight modes, the setpoint mask, and the streams a companion needs. Source:
+//! PX4 1.17 `px4_custom_mode.h` and what AUTOPILOTS recordings show. Another autopilot gets a
+//! module of the same shape.
 
 use crate::autopilot::limits::{Limit, LimitParameter};
 

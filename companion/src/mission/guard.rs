@@ -3,7 +3,8 @@
 use super::inputs::GuardInputs;
 use crate::time::Duration;
 
-pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500); // Age up to which a position is known.
+/// Age up to which a position is known.
+pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 
 /// Condition of a row. Every guard is a field, or a comparison of fields, of [`GuardInputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

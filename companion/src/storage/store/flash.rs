@@ -39,7 +39,8 @@ pub struct FlashLayout {
 }
 
 impl FlashLayout {
-    /// Bank 2 of the STM32H743: 8 sectors of 128 kB, roadmap slots in 0–2 and 3–5, journal in 6 and 7.
+    /// Bank 2 of the STM32H743: 8 sectors of 128 kB, roadmap slots in 0–2 and 3–5, journal in 6
+    /// and 7.
     pub const H743: Self =
         Self { sector_len: 128 << 10, slot_len: 384 << 10, half_len: 128 << 10, stalls: false };
     /// 832 kB of the RP2350's external flash, sectors of 4 kB.

@@ -50,8 +50,8 @@ pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
 /// Over an area, a vehicle that has been silent for this long may land further along its path than
-/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle leaves the plan
-/// for that silence earlier.
+/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle leaves the
+/// plan for that silence earlier.
 pub(super) const LANDS_UNHEARD: Duration = Duration::from_secs(40);
 /// Rounding of the length of a way of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;

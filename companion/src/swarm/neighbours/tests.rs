@@ -155,7 +155,13 @@ proptest::proptest! {
     #[test]
     fn strangers_never_displace_the_roster(
         frames in proptest::collection::vec(
-            (1u8..=255, proptest::prelude::any::<bool>(), 0u64..2000, proptest::prelude::any::<u8>(), 2u32..9),
+            (
+                1u8..=255,
+                proptest::prelude::any::<bool>(),
+                0u64..2000,
+                proptest::prelude::any::<u8>(),
+                2u32..9,
+            ),
             0..200,
         ),
     ) {
@@ -175,10 +181,21 @@ proptest::proptest! {
             }
             let heard = table.states_at(at(now));
             proptest::prop_assert!(heard.len() <= 4);
-            let own = |id: u8| heard.iter().find(|n| n.id == id).map(|n| (n.rank, n.position.y > 11.0, n.out_of_plan));
-            proptest::prop_assert_eq!((own(3), own(9)), (Some((0, true, false)), Some((2, true, false))));
+            let own = |id: u8| {
+                heard
+                    .iter()
+                    .find(|n| n.id == id)
+                    .map(|n| (n.rank, n.position.y > 11.0, n.out_of_plan))
+            };
+            proptest::prop_assert_eq!(
+                (own(3), own(9)),
+                (Some((0, true, false)), Some((2, true, false)))
+            );
             proptest::prop_assert_eq!(table.blocked_count_before(255), 0);
-            proptest::prop_assert_eq!(table.silence_duration(at(now), at(0)), Duration::from_millis(now));
+            proptest::prop_assert_eq!(
+                table.silence_duration(at(now), at(0)),
+                Duration::from_millis(now)
+            );
         }
     }
 }
@@ -273,7 +290,11 @@ proptest::proptest! {
             let believed_m = place_of(&lying).unwrap();
             proptest::prop_assert!(believed_m <= reported_m);
             if let Some((before_m, at)) = last {
-                let most_m = before_m + 2.0 * (now - at).as_secs_f32() + 2.0 * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M + 1e-3;
+                let most_m = before_m
+                    + 2.0 * (now - at).as_secs_f32()
+                    + 2.0 * MAX_MESSAGE_DELAY_S
+                    + MAX_PROGRESS_JUMP_M
+                    + 1e-3;
                 proptest::prop_assert!(believed_m <= most_m, "{believed_m} m after {before_m} m");
             }
             last = Some((believed_m, now));
