@@ -27,8 +27,8 @@ const VERTICAL_SHARE: f32 = 0.5;
 const BIAS_TAU_S: f32 = 60.0;
 /// Quick wander of the position estimate, seconds: what the filter lets through of GPS noise.
 const JITTER_TAU_S: f32 = 1.0;
-/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts 0.1 m/s where it is 0.5
-/// m off.
+/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts 0.1 m/s where it
+/// is 0.5 m off.
 const VELOCITY_SHARE: f32 = 0.2;
 
 /// Gaussian numbers from a seed. Four 16-bit uniforms are summed (Irwin–Hall): mean 0, variance 1,

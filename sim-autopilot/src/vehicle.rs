@@ -51,8 +51,8 @@ impl Default for VehicleLimits {
     /// PX4's quadrotor defaults, and the drag of its SIH (`SIH_KDV` 1 N s/m at `SIH_MASS` 1 kg),
     /// with which the recorded flights are flown again to 0.2 m. No real vehicle has that much, so
     /// wind moves it half as much, and still rather too much: PX4's estimator assumes 0.17 1/s at 3
-    /// m/s (`EKF2_MCOEF` 0.15 1/s beside `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured at 0.39
-    /// and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
+    /// m/s (`EKF2_MCOEF` 0.15 1/s beside `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured
+    /// at 0.39 and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
     fn default() -> Self {
         Self {
             radius_m: 0.3,

@@ -288,7 +288,8 @@ fn read_all(view: &RoadmapView<'_>) {
     }
 }
 
-/// Lengths of the shortest ways from a node over edges that are wide enough, in f64 (Dijkstra 1959).
+/// Lengths of the shortest ways from a node over edges that are wide enough, in f64
+/// (Dijkstra 1959).
 fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> {
     let mut ways = vec![f64::INFINITY; view.node_count()];
     ways[usize::from(from)] = 0.0;

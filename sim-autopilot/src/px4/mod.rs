@@ -405,7 +405,8 @@ impl Commander {
                     self.disarm(true);
                     return;
                 }
-                // Position, Altitude and Manual (0 to 2) need sticks nobody holds: Return, as for 3.
+                // Position, Altitude and Manual (0 to 2) need sticks nobody holds: Return, as
+                // for 3.
                 _ => Some(Mode::Return),
             }
         } else if battery_out && tuning.low_battery_action == 2 {

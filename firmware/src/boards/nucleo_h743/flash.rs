@@ -10,11 +10,11 @@
 //! barriers is this word's. The flag that the flash itself keeps is not asked: a load that the
 //! processor made ahead of time, and dropped, may have set it.
 //!
-//! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands embassy-stm32 0.6
-//! takes every erasure and program for failed: it clears them by FLASH_SR2, which on this chip is
-//! read-only for them. So they are cleared before. It leaves PSIZE at 8 bits when it has
-//! programmed, as which a sector is erased at the slowest (DS12110, "Flash memory programming"): so
-//! that is widened before.
+//! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands
+//! embassy-stm32 0.6 takes every erasure and program for failed: it clears them by FLASH_SR2, which
+//! on this chip is read-only for them. So they are cleared before. It leaves PSIZE at 8 bits when
+//! it has programmed, as which a sector is erased at the slowest (DS12110, "Flash memory
+//! programming"): so that is widened before.
 //!
 //! The bank is not cached, so a load that fails is this code's own, and what was programmed is what
 //! is read. Only the sectors of the roadmap in use are: the MPU holds them read only for as long.
