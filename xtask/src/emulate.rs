@@ -25,7 +25,8 @@ const GAP_MS: usize = 51;
 #[derive(clap::Args)]
 pub struct Args {
     /// How many boards
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=10))]
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=10))]
     vehicles: u8,
     /// Directory for what `host-sim fly` writes, and what each board logs
     #[arg(long, value_name = "DIR", default_value = "out/emulate")]

@@ -1,4 +1,5 @@
-//! `cargo xtask structure`: which file imports which, and the shape of structs and functions.
+//! `cargo xtask structure`: which file imports which, the shape of structs and functions, and the
+//! length of files and lines.
 //!
 //! Read from the sources with `syn`. An import is any path that leaves its file: a `use`, a type, a
 //! call. What a `pub use` passes on counts as an import of the file that defines it. Test modules
@@ -6,6 +7,7 @@
 
 mod distances;
 mod imports;
+mod lines;
 mod shape;
 mod sources;
 
@@ -19,8 +21,8 @@ use self::sources::Tree;
 const CRATES: [&str; 8] =
     ["fpu", "planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 
-/// Prints every cycle of imports and every struct or function beyond the limits; fails if there is
-/// one without a reason, or if docs/margins.md is not that of the sources.
+/// Prints every cycle of imports and every struct, function, file or line beyond the limits; fails
+/// if there is one without a reason, or if docs/margins.md is not that of the sources.
 pub fn run() -> Result<()> {
     let mut wrong = 0;
     for name in CRATES {
@@ -34,6 +36,10 @@ pub fn run() -> Result<()> {
                 wrong += usize::from(reason.is_none());
             }
         }
+    }
+    for (what, reason) in lines::beyond()? {
+        println!("{what}: {}", reason.unwrap_or("no reason given"));
+        wrong += usize::from(reason.is_none());
     }
     for place in distances::wrong()? {
         println!("{place}");
