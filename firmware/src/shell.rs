@@ -258,7 +258,7 @@ impl Shell {
             match with_timeout(CHECK_IN_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
                     self.with_companion(|companion, now| {
-                        companion.handle_bytes(link, now, &chunk[..length])
+                        companion.handle_bytes(link, now, &chunk[..length]);
                     });
                     if let Some(ear) = &mut ear {
                         ear.handle_bytes(&chunk[..length]);

@@ -129,7 +129,7 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
                     })
                 });
                 distance.iter().for_each(|&d| {
-                    assert!((0.0..=hard.max(0.0)).contains(&d), "{p:?} {hard}: {d}")
+                    assert!((0.0..=hard.max(0.0)).contains(&d), "{p:?} {hard}: {d}");
                 });
                 let alone = to.call("distance::point_clearance", || {
                     segment::point_clearance(&grid, &p, hard)

@@ -248,7 +248,7 @@ proptest::proptest! {
         bench.swarm.clear();
         bench.acks.clear();
         let ask = |bench: &mut Bench, bytes: &[u8]| {
-            bench.companion.handle_bytes(Link::Swarm, bench.now, bytes)
+            bench.companion.handle_bytes(Link::Swarm, bench.now, bytes);
         };
         let list = PARAM_REQUEST_LIST_DATA {
             target_system: SYSTEM,

@@ -132,7 +132,7 @@ proptest::proptest! {
                     bench.enu.z
                 ),
                 AutopilotKind::ArduPilot => {
-                    proptest::prop_assert!(lowest > end_m.min(low_m) - 0.02, "led to {lowest} m")
+                    proptest::prop_assert!(lowest > end_m.min(low_m) - 0.02, "led to {lowest} m");
                 }
             }
             for pair in bench.setpoints.windows(2) {

@@ -98,7 +98,7 @@ impl Watch {
                 self.armed_once &= b.armed || !resumed;
             }
             Land => {
-                self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted
+                self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted;
             }
             Return => _ = order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
             Start => {
