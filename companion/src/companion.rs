@@ -256,7 +256,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (PlanKind::Mission, State::Planning, Err(failure)) => self.mission.set_failure(failure),
             (PlanKind::Detour, ..) if !self.detours.is_request_read() => return,
             (PlanKind::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => {
-                self.begin_detour(plan)
+                self.begin_detour(plan);
             }
             (PlanKind::Detour, State::Replanning | State::PadReplanning, Err(failure)) => {
                 self.handle_detour_failure(failure);

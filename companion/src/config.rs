@@ -266,10 +266,16 @@ mod tests {
             let high = low + Point::from(size);
             config.geofence = Some((low, high));
             let outside = |p: &Point| {
-                p.x < low.x || p.x > high.x || p.y < low.y || p.y > high.y || p.z < low.z || p.z > high.z
+                p.x < low.x
+                    || p.x > high.x
+                    || p.y < low.y
+                    || p.y > high.y
+                    || p.z < low.z
+                    || p.z > high.z
             };
             let first = config.roster.iter().find(|entry| outside(&entry.start));
-            let expected = first.map_or(Ok(()), |entry| Err(ConfigError::StartOutside(entry.system_id)));
+            let expected =
+                first.map_or(Ok(()), |entry| Err(ConfigError::StartOutside(entry.system_id)));
             prop_assert_eq!(config.check(), expected);
         }
     }

@@ -269,47 +269,9 @@ impl Guidance {
         self.filter.reset();
     }
 
-    /// Holds from now on: where the setpoint comes to a stop; at `point` where there is no
-    /// setpoint, or the position was lost.
-    pub fn hold_at(&mut self, point: Point) {
-        // After a lost position the setpoint begins where the vehicle is.
-        let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
-        if lost || !self.smoother.has_setpoint() {
-            self.smoother.resume_at(point, self.unsent_s);
-            self.forget_leg();
-        }
-    }
-
-    /// Holds where the pilot left the vehicle, until the mission resumes; the place along the path
-    /// where the flight was interrupted is kept.
-    pub fn hold_after_pilot(&mut self, point: Point) {
-        self.hold_at(point);
-        self.forget_leg();
-    }
-
-    /// Begins the climb, straight up from the setpoint, or from `position` where there is no
-    /// setpoint.
-    pub fn begin_climb(&mut self, position: &Point) {
-        self.reset();
-        self.phase = Phase::Climb;
-        if !self.smoother.has_setpoint() {
-            self.smoother.begin_at(*position, self.unsent_s);
-        }
-    }
-
     /// Arc length of the reference along the path, metres; −∞ before the path is begun.
     pub fn along_m(&self) -> f32 {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
-    }
-
-    /// Whether the setpoint stands, outside a descent.
-    pub fn is_standing(&self) -> bool {
-        self.is_setpoint_still() && self.phase != Phase::Descent
-    }
-
-    /// Whether the setpoint stands because its path leaves the geofence ahead.
-    pub fn is_standing_at_fence(&self) -> bool {
-        self.stopped_at_fence && self.is_standing()
     }
 
     /// One step of `dt_s` seconds: advice, safety filter, raw points, setpoint. Returns false where

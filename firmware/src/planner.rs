@@ -2,7 +2,7 @@
 //! of the swarm's plan, from the roadmap and mission file in flash, and a detour around keep-out
 //! zones.
 
-use companion::planner::coverage::Request;
+use companion::planner::coverage::{self, Request};
 use companion::storage::mission_file::coverage::CoverageView;
 use companion::storage::mission_file::{MissionKind, MissionView};
 use companion::swarm::fleet::{DivisionInputs, MAX_DIVISIONS};
@@ -186,7 +186,7 @@ fn plan_area_detour<'m>(
         return Err(PlanFailure::Capacity);
     }
     let ws = &mut scratch.area().area;
-    planner::coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
+    coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
         area,
         field,
         request,
@@ -209,14 +209,7 @@ fn plan_area<'m>(
     let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
     let PlanningMemory { scratch, swarm, own } = memory;
     let ws = scratch.area();
-    planner::coverage::plan_flights::<
-        AREA_VERTICES,
-        LANES,
-        VEHICLES,
-        AREA_CORNERS,
-        VEHICLES,
-        WAYPOINTS,
-    >(
+    coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
         &Request { mission, view, field, max_gates: GATES, photographed: &own.done },
         own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,

@@ -294,11 +294,17 @@ mod tests {
             let cfg = DeconflictConfig { cruise_mps, ..cfg(Method::Priority) };
             let velocity = Point::from(velocity);
             let meet = Point::new(cruise_mps * meet_s, 0.0, 0.0) + Point::from(off);
-            let n = Neighbour { velocity, age_s, ..neighbour(1, 0, meet - velocity * (age_s + meet_s)) };
+            let n = Neighbour {
+                velocity,
+                age_s,
+                ..neighbour(1, 0, meet - velocity * (age_s + meet_s))
+            };
             let own = own(&path);
             let distance = |ms: u32| {
                 let after_s = ms as f32 * 1e-3;
-                (n.position + n.velocity * (age_s + after_s) - Point::new(cruise_mps * after_s, 0.0, 0.0)).norm()
+                (n.position + n.velocity * (age_s + after_s)
+                    - Point::new(cruise_mps * after_s, 0.0, 0.0))
+                .norm()
             };
             prop_assume!(distance(0) > cfg.safety_distance_m);
             let contact = (0..4000).find(|&ms| distance(ms) < cfg.safety_distance_m - 0.01);

@@ -345,13 +345,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
             return search::astar(view, entry, goal, passable, ws, nodes);
         }
         search::dijkstra_all(view, entry, passable, ws)?;
-        let rest =
-            |node: &u16| !obstacles.iter().any(|obstacle| obstacle.contains(&view.node(*node)));
-        let reached =
-            (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < MAX_SIDESTEP_M);
-        let nearest =
-            reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)));
-        let nearest = nearest.ok_or(SearchError::NoPath)?;
+        let nearest = nearest_place_aside(view, obstacles, ws).ok_or(SearchError::NoPath)?;
         ws.path_to(nearest, nodes)?;
         Ok(ws.distance_m(nearest))
     };
@@ -376,6 +370,18 @@ pub fn plan_detour<const N: usize, const W: usize>(
         }
     }
     failed
+}
+
+/// The nearest node that was reached and that no obstacle takes.
+fn nearest_place_aside<const N: usize>(
+    view: &RoadmapView<'_>,
+    obstacles: &[KeepOutZone],
+    ws: &SearchWorkspace<N>,
+) -> Option<u16> {
+    let rest = |node: &u16| !obstacles.iter().any(|obstacle| obstacle.contains(&view.node(*node)));
+    let reached =
+        (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < MAX_SIDESTEP_M);
+    reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)))
 }
 
 /// Shrinks each zone that contains the vehicle, so that the vehicle is on its border; zones of

@@ -53,7 +53,7 @@ impl Autopilot {
                 firmware.handle_command(platform, from, &Command::from_command_long(&fields));
             }
             84 | 86 if for_us(50, 51) => {
-                firmware.handle_setpoint(platform, frame.message_id, &fields)
+                firmware.handle_setpoint(platform, frame.message_id, &fields);
             }
             111 if fields.i64(0) == 0 => {
                 let message = dialect::TIMESYNC_DATA {

@@ -365,7 +365,7 @@ fn searches_are_right(
             near(legs.sum(), way(0, to[0]));
         }
         error => {
-            assert!(error == Err(SearchError::NoPath) && way(0, to[0]).is_infinite(), "{error:?}")
+            assert!(error == Err(SearchError::NoPath) && way(0, to[0]).is_infinite(), "{error:?}");
         }
     }
     bounded(1);

@@ -210,30 +210,40 @@ impl SetpointCheck {
             rounded_m,
         };
         if let Some(before) = before {
-            let dt_s = ((at_s - before.at_s) as f32).max(1e-3);
-            let moved = position - before.position;
-            let velocity = moved / dt_s;
-            next.dt_s = [dt_s, before.dt_s[0]];
-            let stats = &mut self.stats;
-            let sent = Vector3::new(data.vx, data.vy, data.vz);
-            let follows = self.follows || (sent == Vector3::zeros() && moved.norm() > STILL_M);
-            let jumps = velocity.norm() > if follows { FOLLOWS_MPS } else { self.limits.speed_mps };
-            if jumps {
-                stats.jumps += 1;
-                self.fault(at_s, format!("a step of {:.2} m in {dt_s:.3} s", moved.norm()));
-            }
-            if follows {
-                self.last = Some(next);
-                return;
-            }
-            let stats = &mut self.stats;
-            stats.step_m = stats.step_m.max(moved.norm());
-            stats.speed_mps = stats.speed_mps.max(velocity.norm());
-            stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
-            next.velocity = Some(velocity);
-            self.take_change(&before, &mut next, jumps);
+            self.take_step(&before, &mut next, data);
         }
         self.last = Some(next);
+    }
+
+    /// The step from the setpoint before this one.
+    fn take_step(
+        &mut self,
+        before: &Last,
+        next: &mut Last,
+        data: &SET_POSITION_TARGET_LOCAL_NED_DATA,
+    ) {
+        let at_s = next.at_s;
+        let dt_s = ((at_s - before.at_s) as f32).max(1e-3);
+        let moved = next.position - before.position;
+        let velocity = moved / dt_s;
+        next.dt_s = [dt_s, before.dt_s[0]];
+        let stats = &mut self.stats;
+        let sent = Vector3::new(data.vx, data.vy, data.vz);
+        let follows = self.follows || (sent == Vector3::zeros() && moved.norm() > STILL_M);
+        let jumps = velocity.norm() > if follows { FOLLOWS_MPS } else { self.limits.speed_mps };
+        if jumps {
+            stats.jumps += 1;
+            self.fault(at_s, format!("a step of {:.2} m in {dt_s:.3} s", moved.norm()));
+        }
+        if follows {
+            return;
+        }
+        let stats = &mut self.stats;
+        stats.step_m = stats.step_m.max(moved.norm());
+        stats.speed_mps = stats.speed_mps.max(velocity.norm());
+        stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
+        next.velocity = Some(velocity);
+        self.take_change(before, next, jumps);
     }
 
     /// Checks acceleration and jerk, from this setpoint and up to three before it.

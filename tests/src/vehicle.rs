@@ -311,7 +311,7 @@ impl Heard {
         let by_radio = line == Port::Swarm as usize;
         match frame.message_id {
             HEARTBEAT_DATA::ID if by_radio => {
-                self.state = reported_state(frame).unwrap_or(self.state)
+                self.state = reported_state(frame).unwrap_or(self.state);
             }
             STATUSTEXT_DATA::ID if by_radio => {
                 let text = frame.decode::<STATUSTEXT_DATA>().map(|data| data.text);

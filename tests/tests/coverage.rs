@@ -338,7 +338,7 @@ fn bad_areas_are_refused_by_name_or_covered() {
                 assert!(judged, "{shown}: {:?}", Findings { over_time: Vec::new(), ..found });
             }
             Err(error) if !why.is_empty() => {
-                assert!(error.contains(why), "{shown} {more}: {error}")
+                assert!(error.contains(why), "{shown} {more}: {error}");
             }
             other => panic!("{shown} {more}: {other:?}, expected {why:?}"),
         }

@@ -210,10 +210,10 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
 }
 
 /// Whether nobody could have got out of the way of a wreck. Nobody knows that a vehicle falls
-/// before there was a second without positions (a shorter gap is everyday: see the stall of 0.8 s), 0.2
-/// s to the next word, 0.05 s on the air and two steps of 0.05 s; the airframe answers 0.55 s
-/// later, and then gains room at 1.5 m/s². What was missing is what the bodies (0.3 m each) overlap
-/// across the fall.
+/// before there was a second without positions (a shorter gap is everyday: see the stall of 0.8
+/// s), 0.2 s to the next word, 0.05 s on the air and two steps of 0.05 s; the airframe answers 0.55
+/// s later, and then gains room at 1.5 m/s². What was missing is what the bodies (0.3 m each)
+/// overlap across the fall.
 fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
     let wreck = hit.text.rsplit(' ').next().and_then(|n| n.parse::<usize>().ok());
     let (Some(wreck), Some(vehicle)) = (wreck, hit.vehicle) else { return false };

@@ -112,7 +112,7 @@ impl Pair {
                 | Event::WaitsForStart { .. }
                 | Event::FlownAround { .. } => {}
                 Event::PlanRequested(wanted) => {
-                    self.companion.handle_plan(self.now(), wanted, Ok(&plan()))
+                    self.companion.handle_plan(self.now(), wanted, Ok(&plan()));
                 }
                 Event::StateChanged { to, .. } => self.states.push((self.now_us, to)),
             }

@@ -136,8 +136,20 @@ fn report() -> ReportData {
         obstacles: vec![],
         result: json!({
             "complete": true,
-            "vehicles": [{ "id": 1, "goal": 0, "reached": true, "landed": true, "path_m": 14.1, "end": "landed" }],
-            "safety": { "wall_contacts": 0, "min_separation_m": 1.9, "safety_distance_m": 1.5, "min_clearance_m": null },
+            "vehicles": [{
+                "id": 1,
+                "goal": 0,
+                "reached": true,
+                "landed": true,
+                "path_m": 14.1,
+                "end": "landed",
+            }],
+            "safety": {
+                "wall_contacts": 0,
+                "min_separation_m": 1.9,
+                "safety_distance_m": 1.5,
+                "min_clearance_m": null,
+            },
             "totals": { "path_m": 25.0, "makespan_s": 13.0 },
         }),
         timing: None,

@@ -15,11 +15,11 @@
 //!
 //! Planted errors must be found. Which plans they spoil is known without the search: gates only
 //! open, so two vehicles can be at two places at once if they come there when each goes as far as
-//! it may and no further than its place, with all others out of the plan. So a dropped gate *matters*
-//! in a plan, and every gate that does is dropped. Likewise for vehicles that do not stop at a gate
-//! when they already stand at it (`<` for `≤` in the gate's place). Gates that open only beyond
-//! their progress (`<` for `≤` there) matter where somebody is stuck when each goes as far as it
-//! may; those plans are looked for among more.
+//! it may and no further than its place, with all others out of the plan. So a dropped
+//! gate *matters* in a plan, and every gate that does is dropped. Likewise for vehicles that do not
+//! stop at a gate when they already stand at it (`<` for `≤` in the gate's place). Gates that open
+//! only beyond their progress (`<` for `≤` there) matter where somebody is stuck when each goes as
+//! far as it may; those plans are looked for among more.
 //!
 //! `FLOCKMATE_MODELS=N` searches N plans each in place of [`PLANS`].
 

@@ -26,7 +26,8 @@ const GAP_MS: usize = 51;
 #[derive(clap::Args)]
 pub struct Args {
     /// Number of boards
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=10))]
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=10))]
     vehicles: u8,
     /// Directory for the files of `host-sim fly` and each board's log
     #[arg(long, value_name = "DIR", default_value = "out/emulate")]

@@ -1,5 +1,5 @@
-//! `cargo xtask structure`: checks the sources for import cycles between files, large structs and
-//! long functions.
+//! `cargo xtask structure`: checks the sources for import cycles between files, large structs,
+//! long functions, long files and long lines.
 //!
 //! The sources are parsed with `syn`. Any path that names an item of another file is an import of
 //! that file: in a `use`, a type, a call. An item behind a `pub use` counts as an import of the
@@ -7,6 +7,7 @@
 
 mod distances;
 mod imports;
+mod lines;
 mod shape;
 mod sources;
 
@@ -20,8 +21,8 @@ use self::sources::Tree;
 const CRATES: [&str; 8] =
     ["fpu", "planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 
-/// Prints every import cycle and every struct or function beyond the limits. An error if one of
-/// them has no listed reason, or if docs/margins.md does not match the sources.
+/// Prints every import cycle and every struct, function, file or line beyond the limits. An error
+/// if one of them has no listed reason, or if docs/margins.md does not match the sources.
 pub fn run() -> Result<()> {
     let mut wrong = 0;
     for name in CRATES {
@@ -35,6 +36,10 @@ pub fn run() -> Result<()> {
                 wrong += usize::from(reason.is_none());
             }
         }
+    }
+    for (what, reason) in lines::beyond()? {
+        println!("{what}: {}", reason.unwrap_or("no reason given"));
+        wrong += usize::from(reason.is_none());
     }
     for place in distances::wrong()? {
         println!("{place}");

@@ -52,6 +52,22 @@ fn sources() -> Result<()> {
     step("structure", structure::run)
 }
 
+/// Runs the programs that check themselves.
+fn examples() -> Result<()> {
+    for (package, example) in EXAMPLES {
+        shell::run(cargo().args([
+            "run",
+            "--quiet",
+            "--locked",
+            "-p",
+            package,
+            "--example",
+            example,
+        ]))?;
+    }
+    Ok(())
+}
+
 /// Runs every step; stops at the first that fails.
 fn steps(args: &Args) -> Result<()> {
     sources()?;
@@ -91,20 +107,7 @@ fn steps(args: &Args) -> Result<()> {
         }
         shell::run(&mut tests)
     })?;
-    step("examples", || {
-        for (package, example) in EXAMPLES {
-            shell::run(cargo().args([
-                "run",
-                "--quiet",
-                "--locked",
-                "-p",
-                package,
-                "--example",
-                example,
-            ]))?;
-        }
-        Ok(())
-    })?;
+    step("examples", examples)?;
     let mut stack = 0;
     step("emulated flight", || {
         stack = emulate::run_emulate(&emulate::Args::default())?;

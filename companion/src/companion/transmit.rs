@@ -58,13 +58,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if self.guidance.hold.is_on() {
                 self.guidance.hold.note_reported(self.now);
             }
-            return frame::encode_raw(
-                header,
-                TUNNEL_DATA::ID,
-                TUNNEL_DATA::EXTRA_CRC,
-                &payload[..len],
-                out,
-            );
+            return encode_tunnel(header, &payload[..len], out);
         }
         if link == Link::Swarm
             && self.links.take_due(link, OnDemandMessage::Roster)
@@ -74,25 +68,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let mut payload = [0; roster::MAX_LEN];
             let len = roster.encode(&mut payload);
             let header = self.links.next_header(link, system);
-            return frame::encode_raw(
-                header,
-                TUNNEL_DATA::ID,
-                TUNNEL_DATA::EXTRA_CRC,
-                &payload[..len],
-                out,
-            );
+            return encode_tunnel(header, &payload[..len], out);
         }
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Done) {
             let mut payload = [0; done::MAX_LEN];
             let len = self.done_report().encode(&mut payload);
             let header = self.links.next_header(link, system);
-            return frame::encode_raw(
-                header,
-                TUNNEL_DATA::ID,
-                TUNNEL_DATA::EXTRA_CRC,
-                &payload[..len],
-                out,
-            );
+            return encode_tunnel(header, &payload[..len], out);
         }
         if self.links.take_due(link, OnDemandMessage::DoneCount) {
             let data = self.done_count_message();
@@ -249,7 +231,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn own_intent(&self) -> Intent {
+    /// What it says of itself: whether it flies, follows the plan, waits or is blocked.
+    fn intent_flags(&self) -> u8 {
         use State::*;
         let grounded = match self.mission.state() {
             Done | Disarm => true,
@@ -279,7 +262,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.detours.is_out_of_plan(&self.detour_view());
-        let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
+        let flies = if grounded { intent::GROUNDED } else { intent::FLYING };
+        flies
             | flag(intent::LANDED, self.mission.state() == Done)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT_OF_PLAN, out)
@@ -290,7 +274,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.detours.is_on_detour()
                     || self.detours.has_left_plan()
                     || self.guidance.evading,
-            );
+            )
+    }
+
+    fn own_intent(&self) -> Intent {
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let (mut points, column) = self.points_ahead();
@@ -300,7 +287,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (clear_m, clear_in_s) = self.unheard_reach_m(along_m);
         Intent {
             system_id: self.config.system_id,
-            flags,
+            flags: self.intent_flags(),
             mission_crc: self.config.mission_crc,
             plan_crc: plan.map_or(0, |plan| plan.plan_crc),
             progress_m: if self.detours.is_on_detour() {
@@ -417,4 +404,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         (points, column)
     }
+}
+
+/// Writes a message of the swarm's own.
+fn encode_tunnel(header: frame::Header, payload: &[u8], out: &mut [u8]) -> usize {
+    frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, payload, out)
 }

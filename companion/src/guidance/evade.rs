@@ -205,7 +205,7 @@ mod tests {
             // A neighbour gives up to 16.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
             search.continue_search(&path, 9.0, 31, |i, tell| {
-                of(i).iter().for_each(|column| tell(*column))
+                of(i).iter().for_each(|column| tell(*column));
             });
             if search.found != EvadeTarget::Back(99.0) {
                 return (search.found, steps);

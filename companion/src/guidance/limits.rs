@@ -188,7 +188,10 @@ mod tests {
         /// Limits stay between those of a slow vehicle and those of the mission, whatever is read.
         #[test]
         fn no_value_makes_a_limit_senseless(
-            read in proptest::collection::vec((0usize..8, proptest::prelude::any::<u32>(), -5.0f32..600.0), 0..40),
+            read in proptest::collection::vec(
+                (0usize..8, proptest::prelude::any::<u32>(), -5.0f32..600.0),
+                0..40,
+            ),
             px4 in proptest::prelude::any::<bool>(),
         ) {
             let kind = if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };

@@ -13,6 +13,34 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::Tracker;
 
 impl Guidance {
+    /// Holds from now on: where the setpoint comes to a stop; at `point` where there is no
+    /// setpoint, or the position was lost.
+    pub fn hold_at(&mut self, point: Point) {
+        // After a lost position the setpoint begins where the vehicle is.
+        let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
+        if lost || !self.smoother.has_setpoint() {
+            self.smoother.resume_at(point, self.unsent_s);
+            self.forget_leg();
+        }
+    }
+
+    /// Holds where the pilot left the vehicle, until the mission resumes; the place along the path
+    /// where the flight was interrupted is kept.
+    pub fn hold_after_pilot(&mut self, point: Point) {
+        self.hold_at(point);
+        self.forget_leg();
+    }
+
+    /// Begins the climb, straight up from the setpoint, or from `position` where there is no
+    /// setpoint.
+    pub fn begin_climb(&mut self, position: &Point) {
+        self.reset();
+        self.phase = Phase::Climb;
+        if !self.smoother.has_setpoint() {
+            self.smoother.begin_at(*position, self.unsent_s);
+        }
+    }
+
     /// Lets the reference run along the path from its place there.
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
@@ -59,6 +87,16 @@ impl Guidance {
     /// Whether the setpoint stands, in a descent too.
     pub(crate) fn is_setpoint_still(&self) -> bool {
         self.smoother.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
+    }
+
+    /// Whether the setpoint stands, outside a descent.
+    pub fn is_standing(&self) -> bool {
+        self.is_setpoint_still() && self.phase != Phase::Descent
+    }
+
+    /// Whether the setpoint stands because its path leaves the geofence ahead.
+    pub fn is_standing_at_fence(&self) -> bool {
+        self.stopped_at_fence && self.is_standing()
     }
 
     /// Nearest place along the path at which the vehicle could stop now, metres.

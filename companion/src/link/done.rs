@@ -137,8 +137,18 @@ mod tests {
             ranges in proptest::collection::vec((0u32..1 << 24, 1u32..1 << 24), 0..=MAX_RANGES),
             (mission_crc, round, flies, plan) in any::<(u32, u8, bool, bool)>(),
         ) {
-            let ranges = ranges.iter().map(|&(first, count)| WaypointRange { first, end: first + count }).collect();
-            let report = DoneReport { system_id: 9, mission_crc, round, flies, is_left_out_by_plan: plan, ranges };
+            let ranges = ranges
+                .iter()
+                .map(|&(first, count)| WaypointRange { first, end: first + count })
+                .collect();
+            let report = DoneReport {
+                system_id: 9,
+                mission_crc,
+                round,
+                flies,
+                is_left_out_by_plan: plan,
+                ranges,
+            };
             prop_assert_eq!(DoneReport::decode(&padded(&report), 9), Some(report.clone()));
             prop_assert_eq!(DoneReport::decode(&padded(&report), 8), None);
             for (at, value) in [(0, 0), (4, 9), (5, 2), (9, 20)] {

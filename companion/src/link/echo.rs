@@ -140,14 +140,18 @@ mod tests {
         }
 
         #[test]
-        fn wrong_echoes_stay_bounded(echoes in proptest::collection::vec((any::<u8>(), 0..255_u8, 0..60_000_u64), 1..50)) {
+        fn wrong_echoes_stay_bounded(
+            echoes in proptest::collection::vec((any::<u8>(), 0..255_u8, 0..60_000_u64), 1..50),
+        ) {
             let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
             for i in 0..20 {
                 sent.note_sent(i, 0.0, Instant::from_millis(u64::from(i) * 200));
             }
             for (sequence, held, at_ms) in echoes {
                 let echo = IntentEcho { rank: 0, sequence, held };
-                if let Some(delay_s) = sent.message_delay_s(&echo, Instant::from_millis(4000 + at_ms)) {
+                if let Some(delay_s) =
+                    sent.message_delay_s(&echo, Instant::from_millis(4000 + at_ms))
+                {
                     late.update(delay_s);
                 }
                 prop_assert!((0.0..=MAX_DELAY_S).contains(&late.delay_s));

@@ -223,14 +223,23 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 255), kind in any::<bool>()) {
+        fn any_bytes_are_survived(
+            bytes in proptest::collection::vec(any::<u8>(), 255),
+            kind in any::<bool>(),
+        ) {
             let mut padded: [u8; 255] = bytes.try_into().unwrap();
             if kind {
                 padded[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
                 padded[5] = VERSION;
             }
             if let Some(intent) = Intent::decode(&padded, padded[6]) {
-                prop_assert!(intent.progress_m.is_finite() && intent.points.iter().all(|p| p.norm().is_finite() || p.amax().is_finite()));
+                prop_assert!(
+                    intent.progress_m.is_finite()
+                        && intent
+                            .points
+                            .iter()
+                            .all(|p| p.norm().is_finite() || p.amax().is_finite())
+                );
             }
         }
     }

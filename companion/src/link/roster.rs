@@ -173,14 +173,35 @@ mod tests {
     proptest! {
         #[test]
         fn comes_back_as_sent_and_refuses_the_unsound(
-            entries in proptest::collection::vec((0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()), 1..=MAX_ENTRIES),
+            entries in proptest::collection::vec(
+                (0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()),
+                1..=MAX_ENTRIES,
+            ),
             head in any::<(u8, u8, u32, u32, u32)>(),
         ) {
-            let entries = entries.iter().map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| RosterReportEntry {
-                incarnation, status: MemberStatus::ALL[standing], progress_dm: done_dm, commitment_dm: promise_dm, holds, agrees,
-            }).collect();
+            let entries = entries
+                .iter()
+                .map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| {
+                    RosterReportEntry {
+                        incarnation,
+                        status: MemberStatus::ALL[standing],
+                        progress_dm: done_dm,
+                        commitment_dm: promise_dm,
+                        holds,
+                        agrees,
+                    }
+                })
+                .collect();
             let (divisions, first, mission_crc, counted, hash) = head;
-            let roster = RosterReport { system_id: 9, divisions, first, mission_crc, committed_hash: counted, hash, entries };
+            let roster = RosterReport {
+                system_id: 9,
+                divisions,
+                first,
+                mission_crc,
+                committed_hash: counted,
+                hash,
+                entries,
+            };
             prop_assert_eq!(RosterReport::decode(&padded(&roster), 9), Some(roster.clone()));
             prop_assert_eq!(RosterReport::decode(&padded(&roster), 8), None);
             for (at, value) in [(0, 0), (4, 17), (5, 2), (9, 0), (9, 23)] {

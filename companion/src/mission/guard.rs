@@ -3,7 +3,8 @@
 use super::inputs::GuardInputs;
 use crate::time::Duration;
 
-pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500); // Age up to which a position is known.
+/// Age up to which a position is known.
+pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 
 /// Condition of a row: a field of [`GuardInputs`], or a comparison of fields. "Limit" is the row's
 /// minimum duration. "MISSION_START" and other commands mean that the command is pending.

@@ -182,7 +182,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
         G::StartCommanded => (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false),
         G::StartWithoutGoal => {
-            (i.start, i.plans_as_others, i.at_start, i.armed) = (true, true, true, false)
+            (i.start, i.plans_as_others, i.at_start, i.armed) = (true, true, true, false);
         }
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
         G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
@@ -207,7 +207,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::StaysArmed => i.in_state = long,
         G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
         G::StaysDisarmedPaused => {
-            (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true)
+            (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true);
         }
         G::ArmedUnseen => i.armed_unseen = true,
         G::ArmingHeld => {
@@ -303,7 +303,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
                 (AutopilotSilent, _) => inputs.heartbeat_age = MAX_HEARTBEAT_AGE,
                 (Arming, _) => inputs.armed = false,
                 (Scheduled | PadReplanning | Streaming | Engaging, guard) => {
-                    inputs.armed = guard == G::Armed
+                    inputs.armed = guard == G::Armed;
                 }
                 (Blocked, guard) => inputs.blocked = guard != G::PathClear,
                 _ => {}

@@ -15,6 +15,7 @@
 
 mod memory;
 mod packet;
+mod reply;
 mod stream;
 
 use heapless::Deque;
@@ -24,8 +25,8 @@ use self::memory::DuplicateDetection;
 pub(crate) use self::packet::FTP_TEXTS;
 pub use self::packet::MAX_DATA;
 use self::packet::{
-    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NAK, NakError, Request, Text, chunk_len,
-    format_decimal, is_open, op, upload_text,
+    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NakError, Request, Text, chunk_len, format_decimal,
+    is_open, op, upload_text,
 };
 use self::stream::{FtpBurst, next_request};
 use crate::link::frame::Frame;
@@ -460,54 +461,6 @@ impl Ftp {
             self.operation = FtpOperation::Read(stream.first_request(), false);
             self.continue_operation(store);
         }
-    }
-
-    /// Sends the reply, and remembers it for repetitions of the request.
-    fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
-        self.duplicates.remember(request, result, self.now);
-        self.respond(request, result);
-    }
-
-    fn respond(&mut self, request: &Request, result: Result<(), NakError>) {
-        match result {
-            Ok(()) => self.ack(request, &[]),
-            Err(error) => self.nak(request, error),
-        }
-    }
-
-    fn ack(&mut self, request: &Request, data: &[u8]) {
-        self.set_reply(request, ACK, 0, data);
-    }
-
-    fn nak(&mut self, request: &Request, error: NakError) {
-        let code = match error {
-            NakError::Errno(errno) => return self.set_reply(request, NAK, 0, &[2, errno]),
-            NakError::InvalidSize => 3,
-            NakError::InvalidSession => 4,
-            NakError::Sessions => 5,
-            NakError::EndOfFile => 6,
-            NakError::Unknown => 7,
-            NakError::Protected => 9,
-            NakError::NotFound => 10,
-        };
-        self.set_reply(request, NAK, 0, &[code]);
-    }
-
-    fn set_reply(&mut self, request: &Request, opcode: u8, burst_complete: u8, data: &[u8]) {
-        let data = &data[..data.len().min(MAX_DATA)];
-        let mut packet = [0; HEADER_LEN + MAX_DATA];
-        packet[..2].copy_from_slice(&request.sequence.wrapping_add(1).to_le_bytes());
-        packet[2..8].copy_from_slice(&[
-            request.session,
-            opcode,
-            data.len() as u8,
-            request.opcode,
-            burst_complete,
-            0,
-        ]);
-        packet[8..12].copy_from_slice(&request.offset.to_le_bytes());
-        packet[HEADER_LEN..HEADER_LEN + data.len()].copy_from_slice(data);
-        self.reply = Some(Reply { link: request.link, to: request.client, packet });
     }
 }
 

@@ -16,20 +16,20 @@ use planner_core::deconflict::Method;
 use planner_core::file::{CRC32, FileError};
 use planner_core::frames::Geodetic;
 use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
-use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
+use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::ScheduleConfig;
 
 use self::coverage::{CoverageParts, CoverageView};
-use self::numbers::{
-    MAX_SPEED_MPS, f32_at, in_range, is_positive_up_to, point_at, put_numbers, u16_at, u32_at,
-};
-use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS, box_contains};
+use self::numbers::{f32_at, point_at, put_numbers, u16_at, u32_at};
+use crate::config::{Config, RosterEntry, USUAL_GROUND_STATIONS, box_contains};
 
 pub mod coverage;
 mod error;
+mod header;
 mod numbers;
 mod records;
 pub use error::MissionError;
+pub use header::MissionHeader;
 pub use records::{GOAL_LEN, MissionGoal, MissionVehicle, NO_GOAL, VEHICLE_LEN};
 
 /// First eight bytes of the file.
@@ -51,69 +51,6 @@ const FLAG_FENCED: u8 = 1;
 /// Kinds of mission: the value of the byte after the flags.
 const KIND_GOALS: u8 = 0;
 const KIND_COVERAGE: u8 = 1;
-/// Settings of a mission that all its vehicles share.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MissionHeader {
-    /// CRC-32 of the roadmap file that the mission was made for; in a coverage mission over uneven
-    /// ground of the field.
-    pub roadmap_crc: u32,
-    /// Rule by which goals are assigned to vehicles.
-    pub mode: Mode,
-    /// Method by which vehicles keep apart in flight.
-    pub method: Method,
-    /// Origin of the mission frame: latitude, longitude, altitude.
-    pub origin: Geodetic,
-    /// Cruise speed along paths, m/s.
-    pub cruise_mps: f32,
-    /// Separations and speeds that the schedule is planned with; its cruise speed is lower than the
-    /// flown one.
-    pub schedule: ScheduleConfig,
-    /// Least distance between the centres of two vehicles, metres.
-    pub safety_distance_m: f32,
-    /// Geofence: lowest and highest corner of the box, in the mission frame, in which vehicles must
-    /// stay; `None` for no geofence.
-    pub geofence: Option<(Point, Point)>,
-    /// System ids of the ground stations whose commands count; 0 for an unused entry.
-    pub ground_stations: [u8; GROUND_STATIONS],
-}
-
-impl MissionHeader {
-    fn check(&self) -> Result<(), MissionError> {
-        let refuse = |name| Err(FileError::Header(name).into());
-        if !self.origin.is_valid() {
-            return refuse("origin");
-        }
-        let schedule = &self.schedule;
-        if !is_positive_up_to(self.cruise_mps, MAX_SPEED_MPS) {
-            return refuse("cruise_mps");
-        }
-        if !is_positive_up_to(schedule.cruise_mps, MAX_SPEED_MPS) {
-            return refuse("schedule_mps");
-        }
-        if !is_positive_up_to(schedule.vertical_mps, MAX_SPEED_MPS) {
-            return refuse("vertical_mps");
-        }
-        if !is_positive_up_to(self.safety_distance_m, MAX_COORDINATE_M) {
-            return refuse("safety_distance_m");
-        }
-        if !is_positive_up_to(schedule.separation_m, MAX_COORDINATE_M) {
-            return refuse("separation_m");
-        }
-        if !is_positive_up_to(schedule.parked_separation_m, MAX_COORDINATE_M) {
-            return refuse("parked_separation_m");
-        }
-        let sound = |(low, high): &(Point, Point)| {
-            in_range(low) && in_range(high) && (0..3).all(|axis| low[axis] <= high[axis])
-        };
-        if !self.geofence.as_ref().is_none_or(sound) {
-            return refuse("geofence");
-        }
-        if self.ground_stations == [0; GROUND_STATIONS] {
-            return refuse("ground_stations");
-        }
-        Ok(())
-    }
-}
 
 /// What the vehicles of a mission do, as read from its file.
 #[derive(Clone, Copy, Debug)]
@@ -174,6 +111,33 @@ pub fn write_mission(
     };
     let needed = block.file_len(vehicles.len());
     let out = out.get_mut(..needed).ok_or(MissionError::MissionFull { needed })?;
+    write_header(header, block, [vehicle_count, goal_count], out);
+    let (to_vehicles, rest) =
+        out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
+    let (to_goals, to_block) = rest.split_at_mut(goals.len() * GOAL_LEN);
+    for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
+        to.copy_from_slice(&vehicle.to_bytes());
+    }
+    for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
+        put_numbers(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
+    }
+    if let MissionBlock::Coverage(parts) = block {
+        parts.write(to_block);
+    }
+    let crc = CRC32.checksum(&out[..needed - CRC_LEN]);
+    out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
+    MissionView::parse(out)?;
+    Ok(needed)
+}
+
+/// Writes the bytes before the first vehicle; `out` is the whole file.
+fn write_header(
+    header: &MissionHeader,
+    block: &MissionBlock<'_>,
+    [vehicle_count, goal_count]: [u16; 2],
+    out: &mut [u8],
+) {
+    let needed = out.len();
     out[..8].copy_from_slice(&MAGIC);
     out[8..10].copy_from_slice(&VERSION.to_le_bytes());
     out[10..12].copy_from_slice(&(HEADER_LEN as u16).to_le_bytes());
@@ -219,22 +183,6 @@ pub fn write_mission(
             .chain(high.iter().copied())
             .chain([s.cruise_mps]),
     );
-    let (to_vehicles, rest) =
-        out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
-    let (to_goals, to_block) = rest.split_at_mut(goals.len() * GOAL_LEN);
-    for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
-        to.copy_from_slice(&vehicle.to_bytes());
-    }
-    for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
-        put_numbers(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
-    }
-    if let MissionBlock::Coverage(parts) = block {
-        parts.write(to_block);
-    }
-    let crc = CRC32.checksum(&out[..needed - CRC_LEN]);
-    out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
-    MissionView::parse(out)?;
-    Ok(needed)
 }
 
 /// A mission file whose bytes have been checked; it borrows them.

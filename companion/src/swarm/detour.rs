@@ -27,6 +27,7 @@ pub(crate) mod asking;
 mod beside;
 pub(crate) mod flown;
 mod homeward;
+mod reported;
 mod returning;
 
 use planner_core::detour;
@@ -36,13 +37,12 @@ use planner_core::{Length, Point};
 use self::beside::{DETOUR_MARGIN_M, FieldSearches, LOOK_AHEAD_M};
 use self::flown::{DetourPurpose, FlownPath};
 use self::homeward::HomewardFlight;
-use crate::autopilot::telemetry::Telemetry;
 use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::swarm::obstacles::Obstacles;
 use crate::swarm::sweep::IncrementalScan;
-use crate::swarm::view::{DetourView, ReportedPlace};
+use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
 /// Period of the scans that check whether the path is blocked.
@@ -88,8 +88,6 @@ const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Distance from the end of a path aside at which a blocked vehicle still is aside, metres.
 const SWAY_ASIDE_M: f32 = 0.5;
-/// Age of this vehicle's position from which it reports no velocity with it.
-const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
 /// Deviation from the path, metres: a zone within the safety distance and this blocks the path.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
@@ -309,35 +307,6 @@ impl Detours {
             // A held landing goes on by itself once its column is free.
             State::LandingHeld => view.telemetry.velocity.length() < MAX_HOVER_MPS,
             _ => false,
-        }
-    }
-
-    /// Position and velocity that this vehicle reports to the others, and when they were measured.
-    pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> ReportedPlace {
-        let t = telemetry;
-        let vague = self.before_jump.is_some() || t.position_age(now) > MAX_POSITION_AGE;
-        let (position, at) =
-            self.before_jump.unwrap_or((t.position, t.position_at.unwrap_or_default()));
-        ReportedPlace { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
-    }
-
-    /// On entering the state `to`, remembers the place from before a jump of the position, which
-    /// may be wrong since; or forgets it.
-    pub(crate) fn save_place_before_jump<const V: usize, const W: usize, const G: usize>(
-        &mut self,
-        to: State,
-        view: &DetourView<'_, V, W, G>,
-    ) {
-        match to {
-            State::PositionLost
-                if self.before_jump.is_none() && view.telemetry.is_settling(view.now) =>
-            {
-                let path = view.mission.plan().map(|plan| &plan.path);
-                let on_path = path.and_then(|path| path.point_at(view.guidance.along_m()));
-                self.before_jump = Some((on_path.unwrap_or(view.telemetry.position), view.now));
-            }
-            State::Follow | State::WaitPosition => self.before_jump = None,
-            _ => {}
         }
     }
 

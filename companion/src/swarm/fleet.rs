@@ -17,16 +17,11 @@ use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportE
 use crate::time::{Duration, Instant};
 
 mod lots;
+mod timeouts;
 
 pub use lots::{DivisionInput, DivisionInputs};
+pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
 
-/// Time for which a vehicle continues photographing after a majority last reported that they hear
-/// it.
-pub const LEASE: Duration = Duration::from_secs(20);
-/// Greatest age of a neighbour's report that renews the lease.
-pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
-/// Silence of a vehicle after which it counts as lost, and its share is divided among the others.
-pub const SILENT_AFTER: Duration = Duration::from_secs(45);
 /// Time of flight for which a vehicle promises to fly on, seconds: up to the last picture that it
 /// takes within it. A vehicle whose path ends before its route requests a division this long before
 /// that end.
@@ -36,26 +31,6 @@ pub const COMMITMENT_S: f32 = 10.0;
 pub const MAX_DIVISIONS: usize = 12;
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
-
-/// Time limits of a fleet. A vehicle without a lease lands after twice the lease.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct FleetTimeouts {
-    /// Time for which a renewed lease lasts, as [`LEASE`].
-    pub lease: Duration,
-    /// Greatest age of a report that renews the lease, as [`LEASE_HEARD_WITHIN`].
-    pub heard: Duration,
-    /// Silence after which a vehicle counts as lost, as [`SILENT_AFTER`].
-    pub silent: Duration,
-    /// Silence after which a lost vehicle is down, at whatever height it was lost.
-    pub down: Duration,
-}
-
-impl FleetTimeouts {
-    /// Time limits of a flight in which a vehicle that no other vehicle hears is down after `down`.
-    pub const fn of_flight(down: Duration) -> Self {
-        Self { lease: LEASE, heard: LEASE_HEARD_WITHIN, silent: SILENT_AFTER, down }
-    }
-}
 
 /// This vehicle's state, as it reports it to the fleet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -13,6 +13,7 @@ mod met;
 mod places;
 mod reach;
 pub(crate) mod relay;
+mod standing;
 
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
@@ -30,9 +31,7 @@ pub(crate) use self::met::{FilterNeighbour, ReachQuery};
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{IntentEcho, MessageDelay};
-use crate::link::intent::{
-    BLOCKED, GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING,
-};
+use crate::link::intent::{GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
@@ -382,38 +381,6 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for
-    /// so long that they lie on the ground.
-    pub(crate) fn are_all_down(&self, now: Instant) -> bool {
-        self.contacts[..self.roster]
-            .iter()
-            .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
-    }
-
-    /// Whether a vehicle of the roster counts as dead, but may still be coming down.
-    pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
-        let roster = &self.contacts[..self.roster];
-        roster.iter().any(|c| {
-            !c.reports(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down)
-        })
-    }
-
-    /// Whether the vehicle `id` of the roster has landed, or is out of the plan.
-    pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
-        self.roster_index(id).is_some_and(|at| {
-            self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now)
-        })
-    }
-
-    /// Whether the vehicle `id` of the roster was not heard yet, or stands on the ground without
-    /// having flown.
-    pub(crate) fn is_not_started(&self, id: u8) -> bool {
-        let waits = |c: &NeighbourEntry| {
-            c.heard_at.is_none() || (c.reports(GROUNDED) && !c.reports(LANDED | OUT_OF_PLAN))
-        };
-        self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
-    }
-
     /// Estimated delay of the messages from the vehicle `id` of the roster.
     pub(crate) fn message_delay(&mut self, id: u8) -> Option<&mut MessageDelay> {
         let at = self.roster_index(id)?;
@@ -445,27 +412,6 @@ impl<const V: usize> Neighbours<V> {
         let heard =
             self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
         heard.fold(0, |bits, c| bits | 1 << c.rank)
-    }
-
-    /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand
-    /// and wait.
-    pub fn are_all_waiting(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.is_waiting(now))
-    }
-
-    /// Whether every other vehicle of the roster is out of the plan, waits, or claims the turn.
-    pub fn are_all_standing(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
-    }
-
-    /// Whether a vehicle with a lower system id than `id` claims the turn to fly a detour.
-    pub fn is_turn_claimed_before(&self, id: u8, now: Instant) -> bool {
-        self.contacts.iter().any(|c| c.id < id && c.claims_turn(now))
-    }
-
-    /// Number of vehicles with a lower system id than `id` that report a blocked path.
-    pub fn blocked_count_before(&self, id: u8) -> u64 {
-        self.contacts.iter().filter(|c| c.id < id && c.reports(BLOCKED)).count() as u64
     }
 
     /// Whether the vehicle `id` was last heard to follow the shared plan; true for an unknown id.
@@ -500,12 +446,6 @@ impl<const V: usize> Neighbours<V> {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
         let roster = &self.contacts[..self.roster];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
-    }
-
-    /// Whether every other vehicle of the roster last reported that it has landed or is out of the
-    /// plan; true where there is none.
-    pub fn are_all_at_rest(&self) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
     }
 
     /// Time since any vehicle of the roster was heard, or since one reported that it hears this

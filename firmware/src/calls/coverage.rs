@@ -181,6 +181,22 @@ fn flown_ranges(plan: &Plan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLE
     done
 }
 
+/// The lanes of the first ten waypoints of each route.
+fn flown_lanes(tracks: &Tracks<LANES>, plan: &Plan<VEHICLES>) -> Vec<WaypointRange, VEHICLES> {
+    // Widened to whole lanes: no lane is cut in two, so the rest fits the capacity.
+    let whole = |range: WaypointRange| {
+        let lane = |number: u32| &tracks.lanes()[tracks.lane_of(number)];
+        let (from, to) = (lane(range.first), lane(range.end - 1));
+        WaypointRange { first: from.first, end: to.first + to.count }
+    };
+    let mut done: Vec<WaypointRange, VEHICLES> =
+        flown_ranges(plan, 10).into_iter().map(whole).collect();
+    for k in 1..done.len() {
+        done[k].first = done[k].first.max(done[k - 1].end);
+    }
+    done
+}
+
 /// Divides 512 lanes among 32 vehicles, and divides the rest again after a loss.
 fn measure_division(
     meter: &mut impl Meter,
@@ -221,17 +237,7 @@ fn measure_division(
         });
         sum.add_floats(&[place.x, place.y, along_m]);
     }
-    // Widened to whole lanes: no lane is cut in two, so the rest fits the capacity.
-    let whole = |range: WaypointRange| {
-        let lane = |number: u32| &tracks.lanes()[tracks.lane_of(number)];
-        let (from, to) = (lane(range.first), lane(range.end - 1));
-        WaypointRange { first: from.first, end: to.first + to.count }
-    };
-    let mut done: Vec<WaypointRange, VEHICLES> =
-        flown_ranges(plan, 10).into_iter().map(whole).collect();
-    for k in 1..done.len() {
-        done[k].first = done[k].first.max(done[k - 1].end);
-    }
+    let done = flown_lanes(tracks, plan);
     let rest = &many[1..];
     meter.call("left and binpat, 32", size_of_val(left) + size_of_val(pack), || {
         divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
@@ -294,9 +300,11 @@ fn measure_ways_home(
     }
 }
 
-/// Plans an area with the most vertices, some of them of no-fly zones with the most corners.
-fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
-    const ZONES: usize = AREA_CORNERS / 4;
+/// No-fly zones of the largest area.
+const ZONES: usize = AREA_CORNERS / 4;
+
+/// The vertices and rings of an area with as many as there may be.
+fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
     const OUTER: usize = AREA_VERTICES - AREA_CORNERS;
     let mut vertices: Vec<Flat, AREA_VERTICES> = Vec::new();
     for k in 0..OUTER {
@@ -314,6 +322,12 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
         let end = (OUTER + 4 * (zone + 1)) as u16;
         rings.push(Ring { end, kind: RingKind::NoFly }).expect("there is room");
     }
+    (vertices, rings)
+}
+
+/// Plans an area with the most vertices, some of them of no-fly zones with the most corners.
+fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
+    let (vertices, rings) = largest_area();
     let area =
         meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
     let mut transit = Transit::<AREA_CORNERS>::empty();

@@ -17,78 +17,8 @@ use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
 
-/// Numbers that make code fail which does not check its arguments.
-pub(super) const HARD_NUMBERS: [f32; 14] = [
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    0.25,
-    7.5,
-    f32::MIN_POSITIVE,
-    -1e-40,
-    1e7,
-    -1e19,
-    f32::MAX,
-    f32::INFINITY,
-    f32::NEG_INFINITY,
-    f32::NAN,
-];
-
-/// Is given the name of each call before it is made, so that a panic can be attributed.
-pub trait Listener {
-    /// Called before each call; `name` is the callee's file, type (if any) and function.
-    fn next(&mut self, name: &'static str);
-}
-
-/// Makes calls and keeps a checksum of their results.
-pub struct Results<'a, L> {
-    listener: &'a mut L,
-    sum: u32,
-}
-
-impl<'a, L: Listener> Results<'a, L> {
-    /// No results yet.
-    pub fn new(listener: &'a mut L) -> Self {
-        Self { listener, sum: 0 }
-    }
-
-    /// Reports `name` to the listener, then calls `work`.
-    pub(super) fn call<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
-        self.listener.next(name);
-        work()
-    }
-
-    /// Adds a number to the checksum; all NaNs count as the same.
-    pub(super) fn add(&mut self, answer: f32) {
-        let bits = if answer.is_nan() { 0x7fc0_0000 } else { answer.to_bits() };
-        self.add_count(bits as usize);
-    }
-
-    pub(super) fn add_point(&mut self, answer: &Point) {
-        answer.iter().for_each(|&c| self.add(c));
-    }
-
-    pub(super) fn add_count(&mut self, answer: usize) {
-        self.sum = self.sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ answer as u32;
-    }
-
-    pub(super) fn add_bool(&mut self, answer: bool) {
-        self.add_count(usize::from(answer));
-    }
-
-    /// The checksum of all results so far.
-    pub fn sum(&self) -> u32 {
-        self.sum
-    }
-}
-
-/// Points whose coordinates are [`HARD_NUMBERS`].
-pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
-    let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
-    (0..HARD_NUMBERS.len() * 3)
-        .map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
-}
+use super::limits_results::{HARD_NUMBERS, extreme_points};
+pub use super::limits_results::{Listener, Results};
 
 /// Makes all calls that need no roadmap.
 pub fn call_without_roadmap(to: &mut Results<'_, impl Listener>) {
@@ -199,7 +129,7 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
                     })
                 });
                 distance.iter().for_each(|&d| {
-                    assert!((0.0..=hard.max(0.0)).contains(&d), "{p:?} {hard}: {d}")
+                    assert!((0.0..=hard.max(0.0)).contains(&d), "{p:?} {hard}: {d}");
                 });
                 let alone = to.call("distance::point_clearance", || {
                     segment::point_clearance(&grid, &p, hard)
@@ -309,11 +239,6 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
 fn call_paths(to: &mut Results<'_, impl Listener>) {
     let mut path: Path<4> = to.call("flight::Path::new", Path::new);
     let track = TrackConfig::default();
-    let advice = |scale: f32, within_m: f32| Advice {
-        speed_scale: scale,
-        stop_within_m: within_m,
-        waiting_for: 0,
-    };
     assert!(track::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
     assert!(path.point_at(f32::NAN).is_none() && path.points_from(0.0, 1.0).next().is_none());
     for round in 0..3 {
@@ -342,26 +267,7 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
             assert_eq!(count, 20);
             let along_m = to.call("flight::Path::project", || path.project(&at, hard, other));
             to.add(along_m);
-            for dt_s in [0.05, hard] {
-                let mut tracker = Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 };
-                let reference = to
-                    .call("track::advance", || {
-                        track::advance(&track, &path, &mut tracker, &advice(hard, other), dt_s)
-                    })
-                    .expect("a path with waypoints");
-                assert!(
-                    reference.position.iter().all(|c| c.is_finite()),
-                    "{hard} {other} {reference:?}"
-                );
-                assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
-                let waits = dt_s.is_nan() || dt_s <= 0.0;
-                assert!(!waits || tracker == Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 });
-            }
-            let config = TrackConfig { accel_mps2: hard, response_s: other, ..track };
-            let checked = to.call("track::TrackConfig::check", || config.check());
-            let good = |x: f32| x > 0.0 && x.is_finite();
-            assert_eq!(checked.is_ok(), good(hard) && good(other));
-            track::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
+            call_tracking(to, &path, hard, other);
         }
         call_tasks(to, &path);
         to.add_count(push_until_full(&path));
@@ -369,6 +275,34 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
         let _ = path.push(Point::zeros(), 1.0);
     }
     assert!(!to.call("flight::Path::waypoints", || path.waypoints().is_empty()));
+}
+
+/// The way along a path, whatever the advice, the step and the limits.
+fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32, other: f32) {
+    let track = TrackConfig::default();
+    let advice = |scale: f32, within_m: f32| Advice {
+        speed_scale: scale,
+        stop_within_m: within_m,
+        waiting_for: 0,
+    };
+    let length_m = path.length_m();
+    for dt_s in [0.05, hard] {
+        let mut tracker = Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 };
+        let reference = to
+            .call("track::advance", || {
+                track::advance(&track, path, &mut tracker, &advice(hard, other), dt_s)
+            })
+            .expect("a path with waypoints");
+        assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
+        assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
+        let waits = dt_s.is_nan() || dt_s <= 0.0;
+        assert!(!waits || tracker == Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 });
+    }
+    let config = TrackConfig { accel_mps2: hard, response_s: other, ..track };
+    let checked = to.call("track::TrackConfig::check", || config.check());
+    let good = |x: f32| x > 0.0 && x.is_finite();
+    assert_eq!(checked.is_ok(), good(hard) && good(other));
+    track::advance(&config, path, &mut Tracker::default(), &Advice::FREE, 0.05);
 }
 
 /// Calls of the pictures along a path, with extreme spacings.

@@ -16,10 +16,10 @@ use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 
 use super::coverage_flights;
-use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
 use super::limits_coverage::{
     self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, ZoneTransit,
 };
+use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points, is_good};
 
 /// Capacities of these calls: waypoints and gates of one vehicle's plan.
 const WAYPOINTS: usize = 24;
@@ -92,10 +92,6 @@ fn coverage_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a
     Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint }
 }
 
-fn is_good(number: f32) -> bool {
-    number > 0.0 && number.is_finite()
-}
-
 /// Whether all waypoints of all flights have finite coordinates.
 fn is_finite(out: &Flights) -> bool {
     let places = out.flights.iter().flat_map(|flight| flight.path.waypoints());
@@ -126,29 +122,7 @@ fn call_flight_plans(
             let planned = plan(&Work { heights, ..*good }, routes, &SWARM);
             assert_eq!(matches!(planned, Err(PlanError::Config(_))), !is_good(hard));
         }
-        let vehicle = FLEET[1];
-        for vehicle in [
-            Vehicle { home: Flat::new(hard, -5.0), ..vehicle },
-            Vehicle { cruise_mps: hard, ..vehicle },
-            Vehicle { climb_mps: hard, ..vehicle },
-            Vehicle { descend_mps: hard, ..vehicle },
-        ] {
-            let vehicles = [FLEET[0], vehicle, FLEET[2]];
-            let planned = plan(&Work { vehicles: &vehicles, ..*good }, routes, &SWARM);
-            assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
-        }
-        let pad = PADS[1];
-        for pad in [
-            Pad { start: Point::new(5.0, -5.0, hard), ..pad },
-            Pad { end_z_m: hard, ..pad },
-            Pad { climb_m: hard, ..pad },
-            Pad { descent_m: hard, ..pad },
-            Pad { start: Point::new(hard, hard, 30.0), climb_m: 0.0, airborne: true, ..pad },
-        ] {
-            let pads = [PADS[0], pad, PADS[2]];
-            let planned = plan(good, routes, &FlightInputs { pads: &pads, ..SWARM });
-            assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
-        }
+        call_hard_vehicles(&mut plan, good, routes, hard);
         for look in [HeadingMode::Ahead, HeadingMode::Fixed(hard)] {
             for clearance_m in [10.0, hard] {
                 let manner =
@@ -182,6 +156,42 @@ fn call_flight_plans(
     }
     unusual_routes(&mut plan, good, routes);
     call_field_plans(&mut plan, good, routes);
+}
+
+/// Plans for a vehicle or a pad with a hard number.
+fn call_hard_vehicles(
+    plan: &mut impl FnMut(
+        &Work<'_, LANES, CORNERS>,
+        &Plan<VEHICLES>,
+        &FlightInputs<'_>,
+    ) -> Result<(), PlanError>,
+    good: &Work<'_, LANES, CORNERS>,
+    routes: &Plan<VEHICLES>,
+    hard: f32,
+) {
+    let vehicle = FLEET[1];
+    for vehicle in [
+        Vehicle { home: Flat::new(hard, -5.0), ..vehicle },
+        Vehicle { cruise_mps: hard, ..vehicle },
+        Vehicle { climb_mps: hard, ..vehicle },
+        Vehicle { descend_mps: hard, ..vehicle },
+    ] {
+        let vehicles = [FLEET[0], vehicle, FLEET[2]];
+        let planned = plan(&Work { vehicles: &vehicles, ..*good }, routes, &SWARM);
+        assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
+    }
+    let pad = PADS[1];
+    for pad in [
+        Pad { start: Point::new(5.0, -5.0, hard), ..pad },
+        Pad { end_z_m: hard, ..pad },
+        Pad { climb_m: hard, ..pad },
+        Pad { descent_m: hard, ..pad },
+        Pad { start: Point::new(hard, hard, 30.0), climb_m: 0.0, airborne: true, ..pad },
+    ] {
+        let pads = [PADS[0], pad, PADS[2]];
+        let planned = plan(good, routes, &FlightInputs { pads: &pads, ..SWARM });
+        assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
+    }
 }
 
 /// Plans with unusual routes. An unknown vehicle or a wrong waypoint range must be refused; an odd

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
-use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
+use planner_core::coverage::footprint::Spacing;
 use planner_core::coverage::pack::{
     self, Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work,
 };
@@ -12,7 +12,8 @@ use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
 use planner_core::flight::{WaypointRange, WaypointSet};
 
-use super::limits::{HARD_NUMBERS, Listener, Results};
+use super::limits_cameras::{SPACING, call_cameras};
+use super::limits_results::{HARD_NUMBERS, Listener, Results};
 
 /// Capacities of these calls: lanes, vertices, corners of no-fly zones, vehicles.
 pub(super) const LANES: usize = 8;
@@ -34,11 +35,6 @@ const CORNERS_OF_ALL: [Flat; 8] = [
 ];
 const RINGS: [Ring; 2] =
     [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 8, kind: RingKind::NoFly }];
-const SPACING: Spacing = Spacing {
-    footprint: Footprint { along_m: 10.0, across_m: 10.0 },
-    lane_m: 10.0,
-    waypoint_m: 10.0,
-};
 const PATTERN: LanePattern =
     LanePattern { spacing: SPACING, angle_deg: None, margin_m: 0.0, search_steps: 100 };
 pub(super) const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
@@ -82,10 +78,6 @@ impl CoverageMemory {
     }
 }
 
-fn is_good(number: f32) -> bool {
-    number > 0.0 && number.is_finite()
-}
-
 /// Makes all calls on areas, lanes and divisions. Leaves lanes and routes of [`test_area`] in
 /// `lent`.
 pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut CoverageMemory) {
@@ -104,49 +96,6 @@ pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut Cove
 /// An area of 40 by 30 m with a no-fly zone inside.
 pub(super) fn test_area() -> Area<'static> {
     Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
-}
-
-fn call_cameras(to: &mut Results<'_, impl Listener>) {
-    let pixels = [6000, 4000];
-    for hard in HARD_NUMBERS {
-        for camera in [
-            Camera::Diagonal { fov_deg: 73.7, aspect: 1.5 },
-            Camera::Diagonal { fov_deg: hard, aspect: 1.5 },
-            Camera::Diagonal { fov_deg: 73.7, aspect: hard },
-            Camera::Sensor { sides_mm: [hard, 15.6], focal_mm: 16.0, pixels },
-            Camera::Sensor { sides_mm: [23.5, hard], focal_mm: 16.0, pixels },
-            Camera::Sensor { sides_mm: [23.5, 15.6], focal_mm: hard, pixels },
-            Camera::Sensor { sides_mm: [23.5, 15.6], focal_mm: 16.0, pixels: [0, u32::MAX] },
-        ] {
-            let checked = to.call("footprint::Camera::check", || camera.check());
-            let seen = to.call("footprint::Camera::footprint", || camera.footprint(hard));
-            let height_m =
-                to.call("footprint::Camera::height_for_gsd", || camera.height_for_gsd(hard));
-            assert!(checked.is_ok() || seen.is_err() && height_m.is_err());
-            assert!(is_good(hard) || seen.is_err() && height_m.is_err());
-            let Ok(footprint) = seen else { continue };
-            to.add(footprint.along_m);
-            to.add(footprint.across_m);
-            to.add(height_m.unwrap_or(0.0));
-            let spacing = Spacing { footprint, lane_m: hard, waypoint_m: 1.0 };
-            let checked = check_spacing(to, &spacing).is_ok();
-            to.add_bool(checked);
-        }
-        for spacing in [
-            Spacing { lane_m: hard, ..SPACING },
-            Spacing { waypoint_m: hard, ..SPACING },
-            Spacing { footprint: Footprint { along_m: hard, across_m: hard }, ..SPACING },
-        ] {
-            assert!(is_good(hard) || check_spacing(to, &spacing).is_err());
-        }
-    }
-}
-
-fn check_spacing(
-    to: &mut Results<'_, impl Listener>,
-    spacing: &Spacing,
-) -> Result<(), CoverageError> {
-    to.call("footprint::Spacing::check", || spacing.check())
 }
 
 fn call_areas(to: &mut Results<'_, impl Listener>) {
@@ -392,17 +341,7 @@ fn call_packing(
             for vehicles in &fleets_with_hard_number(hard) {
                 pack(to, &Work { unit, vehicles, ..good }, ws, plan);
             }
-            for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
-                let by_shares = || pack::binpat_by_shares(&Work { unit, ..good }, shares, ws, plan);
-                let cut = to.call("pack::binpat_by_shares", by_shares);
-                assert!(shares.len() == VEHICLES || cut.is_err());
-                to.add_bool(cut.is_ok());
-                let mut ends = [0; VEHICLES];
-                to.call("pack::cbinpack", || pack::cbinpack(tracks, unit, shares, &mut ends));
-                assert!(ends.iter().all(|end| *end <= tracks.waypoint_count()), "{shares:?}");
-                pack::cbinpack(tracks, unit, &SHARES, &mut ends[..1]);
-                pack::cbinpack(&Tracks::<LANES>::new(), unit, shares, &mut ends);
-            }
+            call_packing_by_shares(to, &Work { unit, ..good }, hard, ws, plan);
         }
     }
     let crowd = [VEHICLE; VEHICLES + 1];
@@ -419,6 +358,27 @@ fn call_packing(
                 to.add_count((ends.0 ^ ends.1) as usize + waypoints);
             }
         }
+    }
+}
+
+fn call_packing_by_shares(
+    to: &mut Results<'_, impl Listener>,
+    work: &Work<'_, LANES, CORNERS>,
+    hard: f32,
+    ws: &mut PackWorkspace<VEHICLES>,
+    plan: &mut Plan<VEHICLES>,
+) {
+    let (tracks, unit) = (work.tracks, work.unit);
+    for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
+        let by_shares = || pack::binpat_by_shares(work, shares, ws, plan);
+        let cut = to.call("pack::binpat_by_shares", by_shares);
+        assert!(shares.len() == VEHICLES || cut.is_err());
+        to.add_bool(cut.is_ok());
+        let mut ends = [0; VEHICLES];
+        to.call("pack::cbinpack", || pack::cbinpack(tracks, unit, shares, &mut ends));
+        assert!(ends.iter().all(|end| *end <= tracks.waypoint_count()), "{shares:?}");
+        pack::cbinpack(tracks, unit, &SHARES, &mut ends[..1]);
+        pack::cbinpack(&Tracks::<LANES>::new(), unit, shares, &mut ends);
     }
 }
 

@@ -5,7 +5,7 @@ use planner_core::coverage::Flat;
 use planner_core::field::follow::TerrainFollowing;
 use planner_core::field::{self, FieldShape, FieldView, MAX_NODES};
 
-use super::limits::{HARD_NUMBERS, Listener, Results};
+use super::limits_results::{HARD_NUMBERS, Listener, Results};
 
 const COLUMNS: u16 = 3;
 const ROWS: u16 = 2;

@@ -7,7 +7,7 @@ use planner_core::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
 use planner_core::search::{self, RoadmapWithLengths, SearchError, SearchWorkspace};
 
-use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
+use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
 
 /// Most nodes of the search workspace in these calls.
 pub(super) const MAX_NODES: usize = 8;

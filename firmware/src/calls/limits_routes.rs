@@ -13,10 +13,10 @@ use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use planner_core::search::SearchWorkspace;
 
-use super::limits::{HARD_NUMBERS, Listener, Results, extreme_points};
 use super::limits_area_flights as area_flights;
 use super::limits_field as field;
 use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any_edge_passable};
+use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
 
 /// Capacities of these calls: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;

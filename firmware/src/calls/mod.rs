@@ -10,9 +10,11 @@ pub mod coverage_flights;
 pub mod flight;
 pub mod limits;
 mod limits_area_flights;
+mod limits_cameras;
 mod limits_coverage;
 mod limits_field;
 mod limits_graph;
+mod limits_results;
 pub mod limits_routes;
 #[cfg(test)]
 mod limits_tests;

@@ -43,7 +43,7 @@ fn add_geometry(geometry: &Geometry<f64>, polygons: &mut Polygons) {
     match geometry {
         Geometry::Polygon(polygon) => polygons.add(rings(polygon)),
         Geometry::MultiGeometry(many) => {
-            many.geometries.iter().for_each(|g| add_geometry(g, polygons))
+            many.geometries.iter().for_each(|g| add_geometry(g, polygons));
         }
         _ => {}
     }

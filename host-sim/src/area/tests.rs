@@ -17,7 +17,10 @@ fn all_formats_say_the_same() {
             ),
         ),
         (AreaFormat::Wkt, "POLYGON ((1 2, 5 2, 5 6, 1 6, 1 2), (2 3, 3 3, 3 4, 2 3))".to_owned()),
-        (AreaFormat::Wkt, "SRID=25830;MULTIPOLYGON(((1 2,5 2,5 6,1 6,1 2),(2 3,3 3,3 4,2 3)))".to_owned()),
+        (
+            AreaFormat::Wkt,
+            "SRID=25830;MULTIPOLYGON(((1 2,5 2,5 6,1 6,1 2),(2 3,3 3,3 4,2 3)))".to_owned(),
+        ),
         (
             AreaFormat::Kml,
             "<kml xmlns=\"http://www.opengis.net/kml/2.2\"><Document><Folder><Placemark><Polygon><outerBoundaryIs>\

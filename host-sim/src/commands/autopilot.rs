@@ -36,7 +36,8 @@ pub struct AutopilotArgs {
     #[arg(long, value_name = "NAME", default_value = "px4", value_parser = autopilot_kind_parser())]
     pub personality: AutopilotKind,
     /// MAVLink system id
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..))]
     pub sysid: u8,
     /// Seconds from the start until ArduCopter's estimator has a position; PX4's has one at once
     #[arg(long, value_name = "S", default_value_t = 40.0, value_parser = parse_seconds)]

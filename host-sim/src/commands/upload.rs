@@ -31,7 +31,8 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     id: Option<u8>,
     /// System id to send from: one that the companion's mission names as a ground station
-    #[arg(long, value_name = "N", default_value_t = 255, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 255)]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..))]
     ground_station: u8,
     /// The vehicle's board: nucleo-h743, qemu or pico2. A file that does not fit it is not sent;
     /// without this option, a file that fits no board

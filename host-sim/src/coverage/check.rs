@@ -252,7 +252,7 @@ impl CoverageCells {
             self.for_row_inside_rings(line, &wanted, at, |place| *place = true);
             for zone in &zones {
                 self.for_row_inside_rings(line, std::slice::from_ref(zone), at, |place| {
-                    *place = false
+                    *place = false;
                 });
             }
         }

@@ -197,7 +197,11 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Va
             "globalPlanAltitudeMode": 1,
             "hoverSpeed": speed,
             "items": items.iter().enumerate().map(item).collect::<Vec<_>>(),
-            "plannedHomePosition": [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(home.alt_m, 1e3)],
+            "plannedHomePosition": [
+                round_to(home.lat_deg, 1e9),
+                round_to(home.lon_deg, 1e9),
+                round_to(home.alt_m, 1e3),
+            ],
             "vehicleType": 2,
             "version": 2,
         },

@@ -29,6 +29,7 @@ use planner_core::coverage::pack::{
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, exact, powell};
+use planner_core::field::follow::TerrainFollowing;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 
 pub use self::planned::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES};
@@ -72,10 +73,8 @@ impl<'a> CoveragePlan<'a> {
         search_steps: u32,
     ) -> anyhow::Result<Self> {
         let Some(wanted) = &scenario.area else {
-            bail!(
-                "area is missing: {}\nhint: add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`",
-                scenario.path
-            );
+            let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
+            bail!("area is missing: {}\nhint: {hint}", scenario.path);
         };
         let area = Area::new(&wanted.vertices, &wanted.rings)
             .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
@@ -88,11 +87,7 @@ impl<'a> CoveragePlan<'a> {
         transit.set_area(area).map_err(failed)?;
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
-        let (angle_deg, margin_m) = (wanted.angle_deg, wanted.margin_m);
-        let pattern = LanePattern { spacing: wanted.usable, angle_deg, margin_m, search_steps };
-        let mut tracks = Box::new(Tracks::new());
-        let mut workspace = Box::new(tracks::Workspace::<MAX_VERTICES>::new());
-        tracks::build(&area, &pattern, &transit, &mut workspace, &mut tracks).map_err(failed)?;
+        let tracks = build_tracks(wanted, &area, &transit, search_steps).map_err(failed)?;
         let lanes = began.elapsed().as_secs_f64();
         let began = Instant::now();
         let work = Work {
@@ -111,10 +106,7 @@ impl<'a> CoveragePlan<'a> {
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
-        let following =
-            wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
-        let following =
-            following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))?;
+        let following = terrain_following(wanted)?;
         let mut planned = Self {
             scenario,
             wanted,
@@ -297,6 +289,28 @@ impl<'a> CoveragePlan<'a> {
     }
 }
 
+/// The surface that vehicles follow above terrain; none above level ground.
+fn terrain_following(wanted: &coverage::Area) -> anyhow::Result<Option<TerrainFollowing<'_>>> {
+    let following =
+        wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
+    following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))
+}
+
+/// The lanes of an area, in the best order of those that are tried.
+fn build_tracks(
+    wanted: &coverage::Area,
+    area: &Area<'_>,
+    transit: &Transit<'_, MAX_CORNERS>,
+    search_steps: u32,
+) -> Result<Box<Tracks<MAX_LANES>>, CoverageError> {
+    let (angle_deg, margin_m) = (wanted.angle_deg, wanted.margin_m);
+    let pattern = LanePattern { spacing: wanted.usable, angle_deg, margin_m, search_steps };
+    let mut tracks = Box::new(Tracks::new());
+    let mut workspace = Box::new(tracks::Workspace::<MAX_VERTICES>::new());
+    tracks::build(area, &pattern, transit, &mut workspace, &mut tracks)?;
+    Ok(tracks)
+}
+
 /// Checks that every vehicle starts at most 1.5 m above or below the ground: with a greater error
 /// of its height a companion does not take off.
 ///
@@ -397,7 +411,8 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     let mut packed_m = 0.0;
     for (share, route) in shares.iter_mut().zip(&exact.routes) {
         let end_m = work.tracks.distance_to_waypoint_m(route.end - 1);
-        // A share of length 0 would get no waypoint, but the path's first waypoint alone has length 0.
+        // A share of length 0 would get no waypoint, but the path's first waypoint alone has
+        // length 0.
         *share = (end_m - packed_m).max(MIN_SHARE_M);
         packed_m = end_m;
     }

@@ -344,7 +344,10 @@ mod tests {
     proptest! {
         /// Any bytes give a tree or an error, and a tree that is written as it was read.
         #[test]
-        fn any_bytes_are_read_or_refused(data in proptest::collection::vec(any::<u8>(), 0..400), size in 0u64..3000) {
+        fn any_bytes_are_read_or_refused(
+            data in proptest::collection::vec(any::<u8>(), 0..400),
+            size in 0u64..3000,
+        ) {
             let header = format!("{HEADER}size {size}\nres 0.1\ndata\n");
             if let Ok(tree) = parse(&file(&header, &data), Path::new("any.bt")) {
                 prop_assert_eq!(to_bytes(&tree), file(&header, &data));

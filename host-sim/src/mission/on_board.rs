@@ -35,10 +35,9 @@ impl Mission {
     /// Plans with the capacities of a board: `None` if the plan's CRC equals that of `plan`, else a
     /// text that says why not.
     fn plan_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
-        let planned = if board.nodes == NUCLEO_H743.nodes {
-            self.plan_crc_on_board::<{ NUCLEO_H743.nodes }, { NUCLEO_H743.vehicles }, { NUCLEO_H743.pieces }>(
-                board,
-            )
+        const WHOLE: BoardCapacity = NUCLEO_H743;
+        let planned = if board.nodes == WHOLE.nodes {
+            self.plan_crc_on_board::<{ WHOLE.nodes }, { WHOLE.vehicles }, { WHOLE.pieces }>(board)
         } else {
             self.plan_crc_on_board::<{ HALF.nodes }, { HALF.vehicles }, { HALF.pieces }>(board)
         };

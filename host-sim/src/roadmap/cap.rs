@@ -308,7 +308,8 @@ mod tests {
                 .zip(clearances)
                 .filter_map(|((a, b), c)| c.map(|clearance_m| Edge { a, b, clearance_m }))
                 .collect();
-            let parts: std::collections::BTreeSet<u16> = reached(nodes.len(), &edges, -1.0).into_iter().collect();
+            let parts: std::collections::BTreeSet<u16> =
+                reached(nodes.len(), &edges, -1.0).into_iter().collect();
             let forest = nodes.len() - parts.len();
             let kept = limit_edges(&nodes, &edges, room);
             prop_assert_eq!(kept.is_some(), room >= forest.min(edges.len()));

@@ -59,6 +59,6 @@ fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError
     let text = reader::Text { file, text };
     sections::read_root(text, |root| match (root.get("map"), root.get("area")) {
         (None, Some(_)) => sections::area::coverage(text, root, folder),
-        _ => sections::goals_mission(text, root, folder),
+        _ => sections::goals::goals_mission(text, root, folder),
     })
 }

@@ -199,10 +199,10 @@ fn begin_fault(
         "serial-stall" => member.stall_serial(spell_us),
         "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
         "position-jump" => {
-            member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M))
+            member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M));
         }
         "origin-change" => {
-            member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M))
+            member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
         }
         "gps-loss" => member.autopilot.set_gps_ok(false),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
@@ -226,10 +226,10 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         "radio-cut" => world.radio.set_outage(i, RadioOutage::default()),
         "serial-corrupt" => member.set_serial_corruption(corruption),
         "position-jump" => {
-            member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M))
+            member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M));
         }
         "origin-change" => {
-            member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M))
+            member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
         }
         "gps-loss" => member.autopilot.set_gps_ok(true),
         "pilot-takeover" => return_from_pilot(i, now_us, world),

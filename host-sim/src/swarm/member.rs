@@ -1,5 +1,7 @@
 //! One simulated vehicle of the swarm: companion, autopilot and the serial link between them.
 
+mod observed;
+
 use anyhow::Context;
 use companion::storage::store::{MAX_READ, Store};
 use companion::{Config, Event, Instant, Link, PlanKind, PlanRequests, State};
@@ -8,7 +10,6 @@ use sim_autopilot::{Autopilot, Photo};
 
 use super::board::{Board, BoardLinks};
 use super::radio::Radio;
-use super::referee::{Observation, Phase};
 use super::serial::{SerialConfig, SerialLink};
 use super::step::{STEP_S, STEP_US};
 use crate::boards::STACK_LEN;
@@ -451,54 +452,9 @@ impl SimulatedVehicle {
         };
         self.autopilot.take_photos().into_iter().map(picture).collect()
     }
-
-    /// The vehicle's true position and phase, for the referee.
-    pub fn observation(&self) -> Observation {
-        let truth = self.autopilot.true_state();
-        let state = self.state();
-        // A board's reported state is up to a second old; the autopilot's landing is known at once.
-        let lands = self.board.is_some() && self.autopilot.is_landing();
-        let phase = match (truth.touching, on_path(state) && !lands) {
-            (touching, _) if self.wrecked => {
-                if touching {
-                    Phase::Wreck
-                } else {
-                    Phase::Falling
-                }
-            }
-            (true, _) if !truth.armed => Phase::Grounded,
-            (false, true) => Phase::Flying,
-            _ => Phase::TakeOffOrLanding,
-        };
-        // A vehicle that stands by command of operator or pilot is not deadlocked.
-        let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
-        let progress_m = self
-            .board
-            .as_ref()
-            .map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
-        Observation { position: truth.position, phase, ordered, progress_m }
-    }
 }
 
 /// Whether a vehicle in this state does not move any more: its mission is done or aborted.
 pub fn is_finished(state: State) -> bool {
     matches!(state, State::Done | State::Aborted)
-}
-
-fn on_path(state: State) -> bool {
-    use State::*;
-    matches!(
-        state,
-        Follow
-            | Paused
-            | Alone
-            | Blocked
-            | Replanning
-            | Dividing
-            | Stopping
-            | AutopilotSilent
-            | PositionLost
-            | PilotControl
-            | PilotReturned
-    )
 }

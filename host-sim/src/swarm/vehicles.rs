@@ -13,7 +13,7 @@ use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
 use crate::flash::DeskFlash;
 use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
-use crate::scenario::Companion;
+use crate::scenario::{Companion, Vehicle};
 
 /// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
 const DEFAULT_RANGE_M: f32 = 500.0;
@@ -38,38 +38,7 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
         .iter()
         .zip(&mission.tasks)
         .map(|(vehicle, task)| {
-            let pad = vehicle.start - Point::new(0.0, 0.0, task.climb_m);
-            let limits = autopilot::VehicleLimits {
-                radius_m: vehicle.radius_m,
-                speed_max_mps: vehicle.speed_max_mps,
-                endurance_s: vehicle
-                    .endurance_s
-                    .unwrap_or(autopilot::VehicleLimits::default().endurance_s),
-                ..autopilot::VehicleLimits::default()
-            };
-            let mut config = autopilot::Config {
-                system_id: vehicle.id,
-                autopilot: vehicle.personality,
-                world_origin: scenario.map.origin,
-                // The EKF origin is where the autopilot was switched on, unless the scenario says
-                // otherwise: no two vehicles share it.
-                ekf_origin: vehicle
-                    .ekf_origin
-                    .unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
-                home: vehicle.home,
-                start: pad,
-                vehicle: limits,
-                wind: Point::new(settings.wind_mps, 0.0, 0.0),
-                gust_mps: settings.gust_mps,
-                position_noise_m: settings.position_noise_m,
-                estimator: settings.estimator,
-                seed: scenario.seed,
-                ..autopilot::Config::default()
-            };
-            if vehicle.ekf_origin.is_none() {
-                // The GNSS receiver set this origin, so it has the receiver's height error.
-                config.ekf_origin.alt_m += f64::from(config.height_error_m());
-            }
+            let config = autopilot_config(mission, vehicle, task.climb_m);
             let companion = companion_config(mission, vehicle.id)?;
             let mut member = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
@@ -89,6 +58,43 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
             Ok(member)
         })
         .collect()
+}
+
+/// The settings of the autopilot of a vehicle whose path begins so far above its pad.
+fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autopilot::Config {
+    let scenario = &mission.scenario;
+    let settings = &scenario.simulation;
+    let pad = vehicle.start - Point::new(0.0, 0.0, climb_m);
+    let limits = autopilot::VehicleLimits {
+        radius_m: vehicle.radius_m,
+        speed_max_mps: vehicle.speed_max_mps,
+        endurance_s: vehicle.endurance_s.unwrap_or(autopilot::VehicleLimits::default().endurance_s),
+        ..autopilot::VehicleLimits::default()
+    };
+    let mut config = autopilot::Config {
+        system_id: vehicle.id,
+        autopilot: vehicle.personality,
+        world_origin: scenario.map.origin,
+        // The EKF origin is where the autopilot was switched on, unless the scenario says
+        // otherwise: no two vehicles share it.
+        ekf_origin: vehicle
+            .ekf_origin
+            .unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
+        home: vehicle.home,
+        start: pad,
+        vehicle: limits,
+        wind: Point::new(settings.wind_mps, 0.0, 0.0),
+        gust_mps: settings.gust_mps,
+        position_noise_m: settings.position_noise_m,
+        estimator: settings.estimator,
+        seed: scenario.seed,
+        ..autopilot::Config::default()
+    };
+    if vehicle.ekf_origin.is_none() {
+        // The GNSS receiver set this origin, so it has the receiver's height error.
+        config.ekf_origin.alt_m += f64::from(config.height_error_m());
+    }
+    config
 }
 
 /// Settings of one vehicle's companion: those of the mission file, with the scenario's fence,

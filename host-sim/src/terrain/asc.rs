@@ -1,6 +1,7 @@
 //! Reads ESRI ASCII grids: a header, then heights row by row from the north. The format states no
 //! units: heights are metres. A `.prj` file beside the grid has its coordinate system.
 
+use std::iter::Peekable;
 use std::path::Path;
 
 use super::crs::{Crs, System};
@@ -35,52 +36,72 @@ fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
     Ok(Crs::Said(Box::new(system)))
 }
 
+/// What the lines before the heights say.
+struct Header {
+    /// Columns and rows.
+    size: [usize; 2],
+    /// The south-western corner.
+    low: [f64; 2],
+    cell: [f64; 2],
+    /// The number that stands for no height.
+    missing: f64,
+}
+
+impl Header {
+    fn read<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>) -> Result<Self, TerrainError> {
+        let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
+        let (mut size, mut corner, mut middle) = ([None; 2], [None; 2], [false; 2]);
+        let (mut cell, mut missing) = ([None; 2], -9999.0);
+        while let Some(key) = words.next_if(|word| {
+            word.starts_with(|c: char| c.is_ascii_alphabetic() && c != 'n' && c != 'N')
+                || ["ncols", "nrows", "nodata_value"].contains(&word.to_ascii_lowercase().as_str())
+        }) {
+            let value = words.next().ok_or_else(|| bad("it ends in its header"))?;
+            let value: f64 =
+                value.parse().map_err(|_| bad(&format!("{key} is {value}, no number")))?;
+            match key.to_ascii_lowercase().as_str() {
+                "ncols" => size[0] = Some(value),
+                "nrows" => size[1] = Some(value),
+                "xllcorner" => corner[0] = Some(value),
+                "yllcorner" => corner[1] = Some(value),
+                "xllcenter" => (corner[0], middle[0]) = (Some(value), true),
+                "yllcenter" => (corner[1], middle[1]) = (Some(value), true),
+                "cellsize" => cell = [Some(value); 2],
+                "dx" => cell[0] = Some(value),
+                "dy" => cell[1] = Some(value),
+                "nodata_value" => missing = value,
+                other => return Err(bad(&format!("its header has a {other}"))),
+            }
+        }
+        let need = |value: Option<f64>, name: &str| {
+            value.ok_or_else(|| bad(&format!("{name} is missing")))
+        };
+        let [columns, rows] = [need(size[0], "ncols")?, need(size[1], "nrows")?];
+        let whole = |n: f64| n >= 1.0 && n.fract() == 0.0;
+        if !whole(columns) || !whole(rows) {
+            return Err(bad("it has no cells"));
+        }
+        if columns * rows > MAX_CELLS as f64 {
+            return Err(TerrainError::TooManyCells((columns * rows) as u128));
+        }
+        let cell = [need(cell[0], "cellsize")?, need(cell[1], "cellsize")?];
+        let mut low = [need(corner[0], "xllcorner")?, need(corner[1], "yllcorner")?];
+        if !cell.iter().all(|side| *side > 0.0 && side.is_finite())
+            || !low.iter().all(|at| at.is_finite())
+        {
+            return Err(bad("its cells have no size or place"));
+        }
+        for axis in 0..2 {
+            low[axis] -= if middle[axis] { cell[axis] / 2.0 } else { 0.0 };
+        }
+        Ok(Self { size: [columns as usize, rows as usize], low, cell, missing })
+    }
+}
+
 pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
     let mut words = text.split_ascii_whitespace().peekable();
-    let (mut size, mut corner, mut middle) = ([None; 2], [None; 2], [false; 2]);
-    let (mut cell, mut missing) = ([None; 2], -9999.0);
-    while let Some(key) = words.next_if(|word| {
-        word.starts_with(|c: char| c.is_ascii_alphabetic() && c != 'n' && c != 'N')
-            || ["ncols", "nrows", "nodata_value"].contains(&word.to_ascii_lowercase().as_str())
-    }) {
-        let value = words.next().ok_or_else(|| bad("it ends in its header"))?;
-        let value: f64 = value.parse().map_err(|_| bad(&format!("{key} is {value}, no number")))?;
-        match key.to_ascii_lowercase().as_str() {
-            "ncols" => size[0] = Some(value),
-            "nrows" => size[1] = Some(value),
-            "xllcorner" => corner[0] = Some(value),
-            "yllcorner" => corner[1] = Some(value),
-            "xllcenter" => (corner[0], middle[0]) = (Some(value), true),
-            "yllcenter" => (corner[1], middle[1]) = (Some(value), true),
-            "cellsize" => cell = [Some(value); 2],
-            "dx" => cell[0] = Some(value),
-            "dy" => cell[1] = Some(value),
-            "nodata_value" => missing = value,
-            other => return Err(bad(&format!("its header has a {other}"))),
-        }
-    }
-    let need =
-        |value: Option<f64>, name: &str| value.ok_or_else(|| bad(&format!("{name} is missing")));
-    let [columns, rows] = [need(size[0], "ncols")?, need(size[1], "nrows")?];
-    let whole = |n: f64| n >= 1.0 && n.fract() == 0.0;
-    if !whole(columns) || !whole(rows) {
-        return Err(bad("it has no cells"));
-    }
-    if columns * rows > MAX_CELLS as f64 {
-        return Err(TerrainError::TooManyCells((columns * rows) as u128));
-    }
-    let cell = [need(cell[0], "cellsize")?, need(cell[1], "cellsize")?];
-    let mut low = [need(corner[0], "xllcorner")?, need(corner[1], "yllcorner")?];
-    if !cell.iter().all(|side| *side > 0.0 && side.is_finite())
-        || !low.iter().all(|at| at.is_finite())
-    {
-        return Err(bad("its cells have no size or place"));
-    }
-    for axis in 0..2 {
-        low[axis] -= if middle[axis] { cell[axis] / 2.0 } else { 0.0 };
-    }
-    let (columns, rows) = (columns as usize, rows as usize);
+    let Header { size: [columns, rows], low, cell, missing } = Header::read(&mut words)?;
     let mut heights_m = Vec::with_capacity((columns * rows).min(text.len() / 2 + 1));
     for word in words {
         let value: f64 = word.parse().map_err(|_| bad(&format!("{word} is no height")))?;

@@ -152,7 +152,8 @@ mod tests {
             (reach_m, slope) in (0f32..3.0, 0.1f32..2.0),
             places in prop::collection::vec([0f32..1.0, 0f32..1.0, -1f32..1.0, -1f32..1.0], 40),
         ) {
-            let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
+            let mut grid =
+                HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
             for (index, height_m) in heights.iter().enumerate() {
                 grid.raise_cell(&grid.cell_centre([index % 40, index / 40]), *height_m);
             }
@@ -170,7 +171,12 @@ mod tests {
                 prop_assert!(view.height_at(&at) >= grid.height_at(&beside).unwrap() - 1e-3);
                 let step = Flat::new(east, north);
                 let rise_m = (view.height_at(&(at + step)) - view.height_at(&at)).abs();
-                prop_assert!(rise_m <= slope * step.norm() + 2e-3, "{} {}", rise_m, slope * step.norm());
+                prop_assert!(
+                    rise_m <= slope * step.norm() + 2e-3,
+                    "{} {}",
+                    rise_m,
+                    slope * step.norm()
+                );
             }
         }
     }

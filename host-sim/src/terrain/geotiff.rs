@@ -84,6 +84,17 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         true => f32::NAN,
         false => (value * unit_m) as f32,
     };
+    let heights_m = read_heights(&mut decoder, columns, rows, value_m)?;
+    Ok(Raster { crs, columns, rows, corner, cell, heights_m })
+}
+
+/// The heights row by row, from strips or tiles.
+fn read_heights<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    columns: usize,
+    rows: usize,
+    value_m: impl Fn(f64) -> f32,
+) -> Result<Vec<f32>, TerrainError> {
     let mut heights_m = vec![f32::NAN; columns * rows];
     let (wide, tall) = decoder.chunk_dimensions();
     let (wide, tall) = (wide.max(1) as usize, tall.max(1) as usize);
@@ -103,7 +114,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
             }
         }
     }
-    Ok(Raster { crs, columns, rows, corner, cell, heights_m })
+    Ok(heights_m)
 }
 
 /// Whether a value means "no height"; as decimal text that marker may not equal its float exactly.

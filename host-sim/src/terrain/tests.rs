@@ -102,7 +102,8 @@ proptest! {
                 for (column, height_m) in heights.iter().enumerate() {
                     if touches(0, column) && touches(1, row) {
                         want.holes |= height_m.is_none();
-                        want.highest_m = (*height_m).into_iter().chain(want.highest_m).reduce(f32::max);
+                        want.highest_m =
+                            (*height_m).into_iter().chain(want.highest_m).reduce(f32::max);
                     }
                 }
             }
@@ -132,7 +133,10 @@ proptest! {
             for column in 0..24 {
                 let value = f32::from(values[row * 24 + column]);
                 for (s, t) in [(0.1, 0.1), (0.5, 0.5), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9)] {
-                    let at = [corner[0] + (column as f64 + s) * cell, corner[1] - (row as f64 + t) * cell];
+                    let at = [
+                        corner[0] + (column as f64 + s) * cell,
+                        corner[1] - (row as f64 + t) * cell,
+                    ];
                     let place = raster.crs.to_mission(&origin, at).unwrap();
                     let reach = Flat::repeat(grid.cell_m());
                     let near = grid.heights_in_box(&(place - reach), &(place + reach));
@@ -140,8 +144,9 @@ proptest! {
                         prop_assert!(near.highest_m.unwrap() >= value * unit_m - 1e-3);
                     }
                     // And what is found is near.
-                    let around = (row.saturating_sub(3)..(row + 4).min(17))
-                        .flat_map(|r| (column.saturating_sub(3)..(column + 4).min(24)).map(move |c| r * 24 + c));
+                    let around = (row.saturating_sub(3)..(row + 4).min(17)).flat_map(|r| {
+                        (column.saturating_sub(3)..(column + 4).min(24)).map(move |c| r * 24 + c)
+                    });
                     if let Some(found) = grid.height_at(&place) {
                         let mut around = around.map(|i| f32::from(values[i]) * unit_m);
                         prop_assert!(around.any(|v| (v - found).abs() < 1e-3), "{found}");
@@ -159,18 +164,26 @@ proptest! {
         let mut grid = HeightGrid::new([Flat::zeros(), Flat::repeat(10.0)], 1.0).unwrap();
         for (index, height) in known.iter().enumerate() {
             if let Some(height) = height {
-                grid.raise_cell(&Flat::new((index % 10) as f32 + 0.5, (index / 10) as f32 + 0.5), f32::from(*height));
+                grid.raise_cell(
+                    &Flat::new((index % 10) as f32 + 0.5, (index / 10) as f32 + 0.5),
+                    f32::from(*height),
+                );
             }
         }
         let before = grid.clone();
         grid.fill_holes(2);
         for row in 0..10usize {
             for column in 0..10usize {
-                let (own, was) = (grid.cell_height([column, row]), before.cell_height([column, row]));
-                let at = |c: i64, r: i64| before.cell_height([usize::try_from(c).ok()?, usize::try_from(r).ok()?]);
+                let (own, was) =
+                    (grid.cell_height([column, row]), before.cell_height([column, row]));
+                let at = |c: i64, r: i64| {
+                    before.cell_height([usize::try_from(c).ok()?, usize::try_from(r).ok()?])
+                };
                 let (c, r) = (column as i64, row as i64);
                 let between = [(1, 0), (0, 1)].iter().any(|(dx, dy)| {
-                    let side = |sign: i64| (1..=2).any(|k| at(c + sign * k * dx, r + sign * k * dy).is_some());
+                    let side = |sign: i64| {
+                        (1..=2).any(|k| at(c + sign * k * dx, r + sign * k * dy).is_some())
+                    };
                     side(1) && side(-1)
                 });
                 prop_assert_eq!(own.is_some(), was.is_some() || between);
@@ -178,7 +191,8 @@ proptest! {
                     prop_assert_eq!(own, was);
                 } else if let Some(own) = own {
                     let near = (-2..=2).flat_map(|dx| (-2..=2).map(move |dy| (dx, dy)));
-                    let highest = near.filter_map(|(dx, dy)| at(c + dx, r + dy)).fold(f32::MIN, f32::max);
+                    let highest =
+                        near.filter_map(|(dx, dy)| at(c + dx, r + dy)).fold(f32::MIN, f32::max);
                     prop_assert_eq!(own, highest);
                 }
             }

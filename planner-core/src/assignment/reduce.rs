@@ -45,7 +45,7 @@ fn reduce_columns(
     match costs.cols {
         0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
         SIMD_LANES..BLOCK_COLUMNS => {
-            cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous)
+            cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous);
         }
         _ => cheapest_rows_by::<BLOCK_COLUMNS>(costs, state.price, paths.previous),
     }

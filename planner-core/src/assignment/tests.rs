@@ -120,7 +120,13 @@ proptest! {
             let best = brute_force(&costs, rows, cols, objective);
             let ours = solve_checked(&costs, rows, cols, objective, &mut ws);
             prop_assert_eq!(ours.pairs, best.pairs);
-            prop_assert!((ours.total - best.total).abs() < 1e-4, "{:?} {:?} {:?}", objective, ours, best);
+            prop_assert!(
+                (ours.total - best.total).abs() < 1e-4,
+                "{:?} {:?} {:?}",
+                objective,
+                ours,
+                best
+            );
             if objective == Objective::Makespan {
                 prop_assert_eq!(ours.largest, best.largest);
             }

@@ -6,12 +6,14 @@
 //! mission: the vehicle that flies longest takes off first, each other one as early as those before
 //! it allow, and gates keep that order in the air.
 
+mod builder;
+
 use heapless::Vec;
 
+use self::builder::{FlightPathBuilder, point_at_height};
+use super::divide;
 use super::lanes::Lane;
 use super::pack::{Heading, Plan, Route, Vehicle, Work};
-use super::transit::Transit;
-use super::{Flat, divide};
 use crate::field::follow::TerrainFollowing;
 use crate::flight::{
     Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange,
@@ -251,10 +253,6 @@ fn schedule_in_order<const V: usize, const W: usize>(
     Ok(most_gates)
 }
 
-fn point_at_height(place: &Flat, height_m: f32) -> Point {
-    Point::new(place.x, place.y, height_m)
-}
-
 /// The flight of a vehicle that stays on its pad: one waypoint above it.
 fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
@@ -269,88 +267,6 @@ fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
         depart_s: 0.0,
         segment_m: MAX_TIMED_SEGMENT_M,
     })
-}
-
-/// A flight path that is extended leg by leg.
-struct FlightPathBuilder<'a, const N: usize, const W: usize> {
-    path: Path<W>,
-    transit: &'a Transit<'a, N>,
-    clearance_m: f32,
-    following: Option<TerrainFollowing<'a>>,
-    /// Last point of the path so far.
-    here: Point,
-}
-
-impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
-    /// A path without waypoints; the caller adds the first one, above the pad.
-    const fn new<const L: usize>(
-        work: &Work<'a, L, N>,
-        swarm: &FlightInputs<'a>,
-        pad: &Pad,
-    ) -> Self {
-        let FlightInputs { clearance_m, following, .. } = *swarm;
-        Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start }
-    }
-
-    /// Appends a straight leg to `place`. Returns the index of its waypoint.
-    fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
-        self.path.push(place, self.clearance_m)?;
-        self.here = place;
-        self.path.last().ok_or(PathError::NotFinite)
-    }
-
-    /// Writes the corners of the path from here to `to` around no-fly zones to `corners`.
-    #[inline(never)]
-    fn find_corners_around_zones(&self, to: &Flat, corners: &mut Vec<Flat, N>) {
-        // The routes have finite lengths, so there is a path between all their points.
-        if self.transit.shortest_path(&self.here.xy(), to, corners).is_err() {
-            corners.clear();
-        }
-    }
-
-    /// Appends level legs at `height_m` to `to`, around no-fly zones.
-    fn add_legs_around_zones(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
-        let mut corners = Vec::new();
-        self.find_corners_around_zones(to, &mut corners);
-        for corner in &corners {
-            self.add_straight_leg(point_at_height(corner, height_m))?;
-        }
-        self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
-    }
-
-    /// Appends the descent to the first lane, which begins below and leads to `end`. Returns the
-    /// index of the waypoint where the lane begins.
-    fn descend_to_lane(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
-        let here = self.here.xy();
-        let begin = self.following.map_or(point_at_height(&here, mission_m), |following| {
-            following.start_point(&here, end)
-        });
-        self.add_straight_leg(begin)
-    }
-
-    /// Appends a leg at picture height, along terrain. Returns the index of its last waypoint.
-    fn add_picture_leg(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
-        let Some(following) = self.following else {
-            return self.add_straight_leg(point_at_height(to, mission_m));
-        };
-        let here = self.here;
-        following.corners_to(&here, to, |corner| self.add_straight_leg(corner).map(|_| ()))?;
-        self.path.last().ok_or(PathError::NotFinite)
-    }
-
-    /// As `add_picture_leg`, but around no-fly zones.
-    fn add_picture_legs_around_zones(
-        &mut self,
-        to: &Flat,
-        mission_m: f32,
-    ) -> Result<usize, PathError> {
-        let mut corners = Vec::new();
-        self.find_corners_around_zones(to, &mut corners);
-        for corner in &corners {
-            self.add_picture_leg(corner, mission_m)?;
-        }
-        self.add_picture_leg(to, mission_m)
-    }
 }
 
 /// Duration of a leg flown at up to `most_mps`, from rest to rest since a vehicle nearly stops at
@@ -437,7 +353,8 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
-    let mut draft = FlightPathBuilder::new(work, swarm, pad);
+    let mut draft =
+        FlightPathBuilder::new(work.transit, swarm.clearance_m, swarm.following, pad.start);
     draft.add_straight_leg(pad.start)?;
     draft.add_straight_leg(point_at_height(&vehicle.place, layer_m))?;
     draft.add_legs_around_zones(&place(route.end_waypoints().0)?, layer_m)?;
@@ -473,7 +390,8 @@ fn flight_home<const L: usize, const N: usize, const W: usize>(
 ) -> Result<Flight<W>, PathError> {
     let CaptureSettings { waypoint_m, heading_mode: look, trigger } = swarm.capture;
     let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
-    let mut draft = FlightPathBuilder::new(work, swarm, pad);
+    let mut draft =
+        FlightPathBuilder::new(work.transit, swarm.clearance_m, swarm.following, pad.start);
     draft.add_straight_leg(pad.start)?;
     let photographs = PicturePlan::new(waypoint_m, look, trigger);
     finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)

@@ -57,7 +57,9 @@ proptest! {
         let place = shape.low + Flat::new(column as f32, row as f32) * cell_m;
         // Places are rounded: of 1e5 m to 8 mm.
         let beside = 6554.0 * 0.05 / cell_m + 0.01;
-        prop_assert!((view.height_at(&place) - f32::from(nodes[at]) * HEIGHT_STEP_M).abs() < beside * 2.0);
+        prop_assert!(
+            (view.height_at(&place) - f32::from(nodes[at]) * HEIGHT_STEP_M).abs() < beside * 2.0
+        );
         prop_assert!(FieldView::parse(&bytes[..cut.index(bytes.len())]).is_err());
         let mut damaged = bytes.clone();
         damaged[cut.index(bytes.len())] ^= 1 << flip;
@@ -74,7 +76,12 @@ proptest! {
         let shape = FieldShape { low: Flat::zeros(), cell_m: 5.0, columns: 12, rows: 9 };
         let bytes = field(&shape, &nodes);
         let slope = f32::from(most) * HEIGHT_STEP_M / 5.0 * core::f32::consts::SQRT_2;
-        let following = TerrainFollowing { field: FieldView::parse(&bytes).unwrap(), height_m: 30.0, tolerance_m, slope };
+        let following = TerrainFollowing {
+            field: FieldView::parse(&bytes).unwrap(),
+            height_m: 30.0,
+            tolerance_m,
+            slope,
+        };
         let [from, to] = ends.map(|[x, y]| Flat::new(x, y));
         let begin = following.start_point(&from, &to);
         let mut path = vec![begin];

@@ -76,9 +76,9 @@ fn check_recording(projection: Projection, origin: &Geodetic, samples: &[Sample]
 #[test]
 fn px4_projection_agrees_with_the_recording() {
     // data/mavlink/px4-1.17-offboard.tlog. It holds no GPS_GLOBAL_ORIGIN: the origin is that of its
-    // HOME_POSITION (242) messages, which give the same place globally and locally, (473977414, 85455962) =
-    // (−0.0143 m, −0.0065 m) and (473977427, 85455941) = (0.1287 m, −0.1666 m), rounded to whole
-    // units.
+    // HOME_POSITION (242) messages, which give the same place globally and locally,
+    // (473977414, 85455962) = (−0.0143 m, −0.0065 m) and (473977427, 85455941) = (0.1287 m, −0.1666
+    // m), rounded to whole units.
     let origin = from_int(473_977_415.35, 85_455_963.3, 489_824);
     check_recording(
         Projection::Px4,
@@ -186,19 +186,32 @@ proptest! {
     }
 
     #[test]
-    fn ned_and_back(lat in -85.0f64..85.0, lon in -180.0f64..180.0, x in -5000.0f64..5000.0, y in -5000.0f64..5000.0) {
+    fn ned_and_back(
+        lat in -85.0f64..85.0,
+        lon in -180.0f64..180.0,
+        x in -5000.0f64..5000.0,
+        y in -5000.0f64..5000.0,
+    ) {
         let origin = at(lat, lon, 100.0);
         for projection in [Projection::Px4, Projection::ArduPilot] {
             let ned = Vector3::new(x, y, -30.0);
             let place = ned_to_geodetic(projection, &origin, &ned);
             prop_assert!(place.is_valid() && place.alt_m == 130.0);
-            prop_assert!((geodetic_to_ned(projection, &origin, &place) - ned).norm() < 1e-5, "{:?}", projection);
+            prop_assert!(
+                (geodetic_to_ned(projection, &origin, &place) - ned).norm() < 1e-5,
+                "{:?}",
+                projection
+            );
         }
     }
 
     /// What makes PX4's projection what it is: the distance from the origin is the great circle's.
     #[test]
-    fn px4_keeps_distances_from_the_origin(lat in -85.0f64..85.0, dlat in -2.0f64..2.0, dlon in -2.0f64..2.0) {
+    fn px4_keeps_distances_from_the_origin(
+        lat in -85.0f64..85.0,
+        dlat in -2.0f64..2.0,
+        dlon in -2.0f64..2.0,
+    ) {
         let (origin, place) = (at(lat, 179.5, 0.0), at(lat + dlat, wrap_deg(179.5 + dlon), 0.0));
         let ned = geodetic_to_ned(Projection::Px4, &origin, &place);
         let along = haversine_m(&origin, &place);

@@ -16,7 +16,7 @@ use rand_pcg::Pcg32;
 use super::request::{PlanError, PlanRequest};
 use super::workspace::{PlanWorkspace, SwarmPlan};
 use crate::flight::Flight;
-use crate::schedule::{self, ScheduleError};
+use crate::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
 
 /// Most comparisons of a take-off time with that of a scheduled flight, in a whole search: a third
@@ -110,14 +110,7 @@ pub(super) fn improve_departure_order<
         return Ok(());
     }
     let ends = &mut ws.costs.as_flattened_mut()[..count * count];
-    for (i, a) in out.flights.iter().enumerate() {
-        for (j, b) in out.flights.iter().enumerate().skip(i + 1) {
-            let differences =
-                schedule::forbidden_differences(cfg, a, b, handover_s, &mut ws.schedule);
-            let (from, to) = differences.map_err(|e| PlanError::Schedule(a.id, e))?;
-            (ends[i * count + j], ends[j * count + i]) = (from, to);
-        }
-    }
+    find_differences(cfg, &out.flights, handover_s, &mut ws.schedule, ends)?;
     let differences =
         ForbiddenDifferences { ends: &ws.costs.as_flattened()[..count * count], count };
     let by_departure = |a: &u16, b: &u16| {
@@ -157,6 +150,25 @@ pub(super) fn improve_departure_order<
             .iter_mut()
             .zip(&found_s)
             .for_each(|(flight, &depart_s)| flight.depart_s = depart_s);
+    }
+    Ok(())
+}
+
+/// The forbidden differences of departures of every two flights, put into `ends`.
+fn find_differences<const W: usize>(
+    cfg: &ScheduleConfig,
+    flights: &[Flight<W>],
+    handover_s: f32,
+    ws: &mut ScheduleWorkspace,
+    ends: &mut [f32],
+) -> Result<(), PlanError> {
+    let count = flights.len();
+    for (i, a) in flights.iter().enumerate() {
+        for (j, b) in flights.iter().enumerate().skip(i + 1) {
+            let differences = schedule::forbidden_differences(cfg, a, b, handover_s, ws);
+            let (from, to) = differences.map_err(|e| PlanError::Schedule(a.id, e))?;
+            (ends[i * count + j], ends[j * count + i]) = (from, to);
+        }
     }
     Ok(())
 }

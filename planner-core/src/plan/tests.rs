@@ -119,11 +119,15 @@ proptest! {
         // One in a corner may have no node within reach, or none that leads to the others.
         let connected = connected(&view);
         prop_assume!((0..20).all(|terminal| connected.contains(&terminal)));
-        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
+        let mode =
+            if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
         let plan = plan(&bytes, &tasks(10, labelled), 10, mode).unwrap();
         prop_assert!(plan.flights.iter().all(|f| f.task.leaves_pad()));
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
-        prop_assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{apart:?}");
+        prop_assert!(
+            apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3),
+            "{apart:?}"
+        );
     }
 }
 

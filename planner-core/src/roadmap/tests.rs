@@ -70,7 +70,12 @@ proptest! {
             for (a, b) in [(edge.a, edge.b), (edge.b, edge.a)] {
                 let stored = view.edge_between(a, b).unwrap().clearance_m;
                 let expected = edge.clearance_m.min(10.0);
-                prop_assert!(stored <= expected && expected - stored < 0.00101, "{} {}", stored, expected);
+                prop_assert!(
+                    stored <= expected && expected - stored < 0.00101,
+                    "{} {}",
+                    stored,
+                    expected
+                );
             }
         }
     }
@@ -118,7 +123,10 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_refused_or_sound(tail in proptest::collection::vec(any::<u8>(), 0..200), nodes in 0u32..9) {
+    fn any_bytes_are_refused_or_sound(
+        tail in proptest::collection::vec(any::<u8>(), 0..200),
+        nodes in 0u32..9,
+    ) {
         let (some_nodes, some_edges) = small();
         let mut bytes = encode(&header(1, 1), &some_nodes, &some_edges)[..HEADER_LEN].to_vec();
         bytes.extend(tail);

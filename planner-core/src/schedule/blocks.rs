@@ -357,19 +357,27 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(400))]
         /// Blocks leave out no pair in conflict, give each once, and in order.
         #[test]
-        fn none_in_conflict_is_missed(own in steps(), mut other in steps(), apart in (-90.0f32..90.0, -90.0f32..90.0)) {
+        fn none_in_conflict_is_missed(
+            own in steps(),
+            mut other in steps(),
+            apart in (-90.0f32..90.0, -90.0f32..90.0),
+        ) {
             other.0 = (own.0.0 + apart.0, own.0.1 + apart.1);
             let (own, other) = (flight(&own), flight(&other));
             let mut blocks = Blocks::new();
             blocks.rebuild(&CFG, &own);
-            let all = |own: &mut dyn Iterator<Item = &TimedSegment>, q: &TimedSegment| -> List<f32> {
-                own.filter(|p| is_conflict(&CFG, p, q)).map(|p| p.from_m).collect()
-            };
+            let all =
+                |own: &mut dyn Iterator<Item = &TimedSegment>, q: &TimedSegment| -> List<f32> {
+                    own.filter(|p| is_conflict(&CFG, p, q)).map(|p| p.from_m).collect()
+                };
             for some in other.chunks(SEGMENTS_PER_BLOCK) {
                 let near = blocks.blocks_near(some);
                 for q in some {
                     let expected = all(&mut own.iter(), q);
-                    prop_assert_eq!(all(&mut segments_in_blocks(near, &own).map(|(_, p)| p), q), expected);
+                    prop_assert_eq!(
+                        all(&mut segments_in_blocks(near, &own).map(|(_, p)| p), q),
+                        expected
+                    );
                 }
             }
         }
@@ -406,7 +414,9 @@ mod tests {
             apart in (-150.0f32..150.0, -150.0f32..150.0),
             descent_m in 0.0f32..60.0,
         ) {
-            other.iter_mut().for_each(|point| (point.0, point.1) = (point.0 + apart.0, point.1 + apart.1));
+            other
+                .iter_mut()
+                .for_each(|point| (point.0, point.1) = (point.0 + apart.0, point.1 + apart.1));
             let (own, other) = (whole(&own, 1.5), whole(&other, descent_m));
             let (mut own_pieces, mut other_pieces) = (Vec::new(), Vec::new());
             cut_into_segments(&CFG, &own, &mut own_pieces).unwrap();
@@ -414,7 +424,8 @@ mod tests {
             let mut blocks = Blocks::new();
             blocks.rebuild(&CFG, &own_pieces);
             let far = blocks.parts_near(&CFG, &other).next().is_none();
-            let meet = other_pieces.iter().any(|q| own_pieces.iter().any(|p| is_conflict(&CFG, p, q)));
+            let meet =
+                other_pieces.iter().any(|q| own_pieces.iter().any(|p| is_conflict(&CFG, p, q)));
             prop_assert!(!(far && meet));
         }
     }

@@ -129,13 +129,21 @@ mod tests {
             others in proptest::collection::vec(place(), 0..200),
             own in (-60.0f32..60.0, -20.0f32..20.0, -8.0f32..8.0, -8.0f32..8.0),
         ) {
-            let cfg = ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+            let cfg = ScheduleConfig {
+                separation_m: 2.0,
+                parked_separation_m: 1.7,
+                cruise_mps: 2.0,
+                vertical_mps: 1.0,
+            };
             let mut pieces: Vec<TimedSegment, 200> = others.into_iter().map(piece).collect();
             let mut cells = SegmentGrid::new();
             cells.sort_into_cells(&mut pieces);
             let own = piece(own);
             let all = pieces.iter().filter(|q| is_conflict(&cfg, &own, q)).count();
-            let found = cells.candidates_near(&pieces, &own, 2.0).filter(|q| is_conflict(&cfg, &own, q)).count();
+            let found = cells
+                .candidates_near(&pieces, &own, 2.0)
+                .filter(|q| is_conflict(&cfg, &own, q))
+                .count();
             prop_assert_eq!(found, all);
         }
     }

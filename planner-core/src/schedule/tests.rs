@@ -62,11 +62,15 @@ proptest! {
         speeds in (0.2f32..3.0, 0.2f32..3.0),
     ) {
         let mut pair = [flight(1, &xs[..3]), flight(2, &xs[3..])];
-        let near = |a: (f32, f32), b: (f32, f32)| libm::hypotf(a.0 - b.0, a.1 - b.1) < CFG.separation_m;
+        let near =
+            |a: (f32, f32), b: (f32, f32)| libm::hypotf(a.0 - b.0, a.1 - b.1) < CFG.separation_m;
         prop_assume!(!near(xs[0], xs[3]) && !near(xs[2], xs[5]));
         if schedule(&mut pair).is_ok() {
             let apart = checker::fly(&CFG, &pair, &[speeds.0, speeds.1], 8000);
-            prop_assert!(apart.as_ref().is_ok_and(|&d| d >= CFG.parked_separation_m - 1e-3), "{apart:?} {pair:?}");
+            prop_assert!(
+                apart.as_ref().is_ok_and(|&d| d >= CFG.parked_separation_m - 1e-3),
+                "{apart:?} {pair:?}"
+            );
         }
     }
 }
@@ -101,15 +105,25 @@ proptest! {
         let other = Flight { depart_s, ..field_flight(2, &other.0, other.1, other.2) };
         let mut ws = ScheduleWorkspace::new();
         let mut most = [0; 2];
-        let departure =
-            departure_and_conflicts(&CFG, &own, (0.0, handover_s), &mut [&other].into_iter(), &mut ws, &mut |_, met| most = met);
+        let departure = departure_and_conflicts(
+            &CFG,
+            &own,
+            (0.0, handover_s),
+            &mut [&other].into_iter(),
+            &mut ws,
+            &mut |_, met| most = met,
+        );
         cut_into_segments(&CFG, &own, &mut ws.own).unwrap();
         cut_into_segments(&CFG, &other, &mut ws.other).unwrap();
         ws.forbidden.clear();
         for (q, p) in ws.other.iter().flat_map(|q| ws.own.iter().map(move |p| (q, p))) {
             if is_conflict(&CFG, p, q) {
                 let from_s = depart_s + q.from_s - handover_s - p.to_s;
-                add_forbidden_interval(&mut ws.forbidden, from_s, depart_s + q.to_s + handover_s - p.from_s);
+                add_forbidden_interval(
+                    &mut ws.forbidden,
+                    from_s,
+                    depart_s + q.to_s + handover_s - p.from_s,
+                );
             }
         }
         prop_assert_eq!(departure, first_allowed(&ws.forbidden, 0.0).ok_or(ScheduleError::Blocked));

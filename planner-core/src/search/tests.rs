@@ -117,7 +117,8 @@ proptest! {
                 match astar(&view, from, to, passable, &mut ws, &mut path) {
                     Ok(length) => {
                         let (same, mut same_path) = (path.clone(), Vec::<u16, CAPACITY>::new());
-                        let again = astar(&with_lengths, from, to, passable, &mut ws, &mut same_path);
+                        let again =
+                            astar(&with_lengths, from, to, passable, &mut ws, &mut same_path);
                         prop_assert_eq!((again, same_path), (Ok(length), same));
                         prop_assert!(close(f64::from(length), best));
                         check_path(&view, &path, (from, to), length);

@@ -12,6 +12,7 @@
 //! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever.
 //! Times are arguments, in microseconds since boot; no clock is read.
 
+mod arming;
 mod auto;
 mod auto_state;
 mod commands;
@@ -284,53 +285,6 @@ impl Copter {
             self.failsafe = None;
             platform.send_text(4, "GCS Failsafe Cleared");
         }
-    }
-
-    /// Whether the arming checks pass; the error is the text of the STATUSTEXT.
-    fn check_arming(&self, sensors: &SensorReadings) -> Result<(), &'static str> {
-        if !self.mode.allows_arming() {
-            Err("Arm: Mode not armable")
-        } else if self.tuning.checks && !self.position_known(sensors.now_us) {
-            Err("Arm: Need Position Estimate")
-        } else if sensors.battery < self.tuning.battery_to_arm {
-            Err("Arm: Battery 1 below minimum arming capacity")
-        } else {
-            Ok(())
-        }
-    }
-
-    fn arm(&mut self, platform: &mut Platform, sensors: &SensorReadings, force: bool) -> bool {
-        if self.armed {
-            return true;
-        }
-        if !force && let Err(why) = self.check_arming(sensors) {
-            platform.send_text(2, why);
-            return false;
-        }
-        self.armed = true;
-        self.since.armed_us = sensors.now_us;
-        self.since.idle_us = sensors.now_us;
-        self.goal = Goal::STOP;
-        platform.announce_origin();
-        platform.set_home_here();
-        platform.send_text(6, "Arming motors");
-        true
-    }
-
-    /// Disarms. Refused (false) in the air, unless `force`.
-    fn disarm(&mut self, platform: &mut Platform, force: bool) -> bool {
-        if self.armed && !self.landed && !force {
-            return false;
-        }
-        if self.armed {
-            platform.send_text(6, "Disarming motors");
-        }
-        self.end_auto(platform);
-        self.armed = false;
-        self.takeoff = None;
-        self.failsafe = None;
-        self.speed = None;
-        true
     }
 
     /// Enters the mode. Refused (false) while armed, if it needs a position and there is none.

@@ -45,7 +45,10 @@ proptest! {
         prop_assert_eq!(read.len(), usize::from(seed.is_some()));
         for (frame, heard) in read.iter().zip(heard) {
             let known = (frame.system, frame.component, frame.sequence, frame.message_id);
-            prop_assert_eq!(known, (heard.system, heard.component, heard.sequence, heard.message_id));
+            prop_assert_eq!(
+                known,
+                (heard.system, heard.component, heard.sequence, heard.message_id)
+            );
             prop_assert_eq!(known, (*system, *component, *sequence, *id));
             prop_assert_eq!(frame.padded(), heard.padded());
             let mut passed = Vec::new();
@@ -58,11 +61,16 @@ proptest! {
     /// given up.
     #[test]
     fn no_noise_hides_a_frame(
-        frames in vec((vec(prop_oneof![Just(V1_START), Just(V2_START), any::<u8>()], 0..20), any_frame()), 1..8),
+        frames in vec(
+            (vec(prop_oneof![Just(V1_START), Just(V2_START), any::<u8>()], 0..20), any_frame()),
+            1..8,
+        ),
         cuts in vec(1_usize..60, 1..40),
     ) {
-        let bytes: Vec<u8> =
-            frames.iter().flat_map(|(noise, frame)| [noise.clone(), written(frame)].concat()).collect();
+        let bytes: Vec<u8> = frames
+            .iter()
+            .flat_map(|(noise, frame)| [noise.clone(), written(frame)].concat())
+            .collect();
         let (mut framer, mut found, mut rest) = (Framer::default(), Vec::new(), &bytes[..]);
         for cut in cuts.iter().cycle() {
             if rest.is_empty() {

@@ -124,7 +124,7 @@ pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
                 recording.estimate.push(Sample { t_s, position: vector(3), velocity: vector(6) });
             }
             "truth" => {
-                recording.truth.push(Sample { t_s, position: vector(3), velocity: vector(6) })
+                recording.truth.push(Sample { t_s, position: vector(3), velocity: vector(6) });
             }
             "setpoint" => {
                 let f32s = |k: usize| [0, 1, 2].map(|axis| number(k + axis) as f32);

@@ -118,17 +118,20 @@ fn drawn(seed: u64, draw: u64) -> Option<Scene> {
     let delay = if dice.chance(0.5) { dice.real(0.0, 0.15) } else { dice.real(0.0, 0.9) };
     let delay_s = (delay, (delay + dice.real(0.0, 0.3)).min(1.0));
     let loss = if dice.chance(0.5) { 0.0 } else { dice.real(0.0, 0.3) };
-    let liar = seed.is_multiple_of(6).then(|| {
-        let lie = match dice.below(6) {
-            0 | 1 => Lie::Position(dice.direction() * 0.5),
-            2 => Lie::Velocity(dice.direction() * 0.5),
-            3 => Lie::Still,
-            4 => Lie::Progress(dice.real(0.5, 20.0)),
-            _ => Lie::Points(dice.direction() * dice.real(0.5, 3.0)),
-        };
-        (dice.below(vehicles.len()), lie)
-    });
+    let liar = seed.is_multiple_of(6).then(|| liar(vehicles.len(), &mut dice));
     Some(Scene { seed, kind, on_plan, limit_s: LIMIT_S, vehicles, happenings, delay_s, loss, liar })
+}
+
+/// Which of the vehicles lies, and of what.
+fn liar(count: usize, dice: &mut Dice) -> (usize, Lie) {
+    let lie = match dice.below(6) {
+        0 | 1 => Lie::Position(dice.direction() * 0.5),
+        2 => Lie::Velocity(dice.direction() * 0.5),
+        3 => Lie::Still,
+        4 => Lie::Progress(dice.real(0.5, 20.0)),
+        _ => Lie::Points(dice.direction() * dice.real(0.5, 3.0)),
+    };
+    (dice.below(count), lie)
 }
 
 fn vehicle(

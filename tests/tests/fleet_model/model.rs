@@ -1,5 +1,7 @@
 //! The model: what a vehicle knows, what it may do in a tick, and what must hold.
 
+mod search;
+
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
@@ -7,9 +9,8 @@ use companion::link::roster::{MemberStatus, RosterReport};
 use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
 use companion::time::{Duration, Instant};
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
-use stateright::{Model, Property};
 
-use crate::links::{Links, one_way, partitions, whole};
+use crate::links::{Links, one_way, partitions};
 
 /// Most vehicles.
 pub const MOST: usize = 4;
@@ -457,54 +458,5 @@ impl FleetModel {
             all |= owned;
             twice == 0
         })
-    }
-}
-
-impl Model for FleetModel {
-    type State = State;
-    type Action = State;
-
-    fn init_states(&self) -> Vec<State> {
-        let known = &mut *self.known.lock().unwrap();
-        let begin = |known: &mut Known, stands: usize| {
-            let mut vehicles = [0; MOST];
-            for (rank, number) in vehicles.iter_mut().enumerate().take(self.count) {
-                let stands = stands >> rank & 1 != 0;
-                let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
-                vehicle.fleet.begin_flight(NOW);
-                vehicle.fleet.move_to_clock(NOW, NOW);
-                *number = self.number(known, vehicle);
-            }
-            vehicles
-        };
-        let changes = match self.radio {
-            Radio::Any => 0,
-            Radio::Links(changes) | Radio::Parts(changes) => changes,
-        };
-        let links = whole(self.count);
-        let state = |vehicles| State { vehicles, losses: self.losses, links, changes };
-        (0..1 << self.count).map(|stands| state(begin(known, stands))).collect()
-    }
-
-    fn actions(&self, state: &State, actions: &mut Vec<State>) {
-        let known = &mut *self.known.lock().unwrap();
-        self.tick(known, state, actions);
-        if state.changes > 0 {
-            let (to, changes) = (actions.len(), state.changes - 1);
-            for links in self.all_links.iter().copied().filter(|links| *links != state.links) {
-                (0..to).for_each(|k| actions.push(State { links, changes, ..actions[k] }));
-            }
-        }
-    }
-
-    fn next_state(&self, _: &State, action: State) -> Option<State> {
-        Some(action)
-    }
-
-    fn properties(&self) -> Vec<Property<Self>> {
-        vec![
-            Property::always("one owner", |model: &Self, state| model.one_owner(state)),
-            Property::always("nothing left out", |model: &Self, state| model.ends_well(state)),
-        ]
     }
 }

@@ -85,7 +85,7 @@ impl Visit<'_> for Paths {
         let passes_on = !matches!(item.vis, Visibility::Inherited);
         if !passes_on {
             flatten(&item.tree, &mut Vec::new(), &mut |path, _| {
-                self.found.push((self.module.clone(), path))
+                self.found.push((self.module.clone(), path));
             });
         }
     }

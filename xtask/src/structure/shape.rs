@@ -99,6 +99,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "one match: an arm for each state of a job",
     ),
     (
+        "companion/src/storage/store/jobs.rs",
+        "handle_outcome",
+        "one match: an arm for each job and how it went",
+    ),
+    (
         "companion/src/swarm/detour.rs",
         "Detours",
         "what is known of a blocked path, flat: reset as a whole where a path begins",
@@ -107,6 +112,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "companion/src/swarm/neighbours/contact.rs",
         "NeighbourEntry",
         "a telemetry record: what one neighbour said last",
+    ),
+    (
+        "companion/src/swarm/neighbours/met.rs",
+        "for_filter",
+        "one record of a contact, in the inner loop of the safety filter",
     ),
     ("firmware/src/calls/limits.rs", "call_sampling", AT_LIMITS),
     ("firmware/src/calls/limits_graph.rs", "call_roadmap_files", AT_LIMITS),

@@ -96,7 +96,7 @@ fn a_far_origin_takes_the_place_of_none_in_flight_and_leaves_none_on_the_ground(
                 );
             }
             false => {
-                assert_eq!((change, telemetry.ekf_origin), (TelemetryChange::OriginFar(111), None))
+                assert_eq!((change, telemetry.ekf_origin), (TelemetryChange::OriginFar(111), None));
             }
         }
     }

@@ -123,8 +123,8 @@ impl Other {
 }
 
 happens! {
-    Pause, Resume, Pilot, Back, NoPosition, Position, Silent, Heard, Mute, MuteLong, Hears, NoAnswer,
-    Answers, LiesAhead, HoversAhead, GoesAway, Land, Return, Battery
+    Pause, Resume, Pilot, Back, NoPosition, Position, Silent, Heard, Mute, MuteLong, Hears,
+    NoAnswer, Answers, LiesAhead, HoversAhead, GoesAway, Land, Return, Battery
 }
 
 struct Watch {
@@ -219,7 +219,12 @@ proptest::proptest! {
     ) {
         let mut b = over_a_field(px4);
         b.planner_takes = planner_takes_ms.into_iter().map(Duration::from_millis).collect();
-        let mut watch = Watch { other: Other { mute: true, counts_after, ..Other::default() }, ends: false, returns: 0, log: Vec::new() };
+        let mut watch = Watch {
+            other: Other { mute: true, counts_after, ..Other::default() },
+            ends: false,
+            returns: 0,
+            log: Vec::new(),
+        };
         if !waits {
             b.start();
             b.until(Follow, 30.0);
@@ -239,7 +244,11 @@ proptest::proptest! {
         watch.happen(&mut b, Happens::Hears);
         for second in 0..400 {
             if b.armed && b.mode != b.kind.setpoint_mode() {
-                b.mode = if b.state() == PilotControl { b.kind.setpoint_mode() } else { b.kind.land_mode() };
+                b.mode = if b.state() == PilotControl {
+                    b.kind.setpoint_mode()
+                } else {
+                    b.kind.land_mode()
+                };
             }
             if matches!(b.state(), PilotReturned | Paused) {
                 watch.happen(&mut b, Happens::Resume);
@@ -254,7 +263,13 @@ proptest::proptest! {
             }
             (0..20).for_each(|_| watch.tick(&mut b));
         }
-        proptest::prop_assert!(!b.armed && b.on_ground(), "{:?} {:#?} {:?}", b.state(), watch.log, b.texts);
+        proptest::prop_assert!(
+            !b.armed && b.on_ground(),
+            "{:?} {:#?} {:?}",
+            b.state(),
+            watch.log,
+            b.texts
+        );
     }
 }
 
@@ -387,11 +402,18 @@ proptest::proptest! {
             let before = std::boxed::Box::new(b.companion.neighbours.fleet().cloned());
             b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&lie.told(&b), i as u8));
             let of_roster = lie.crc && matches!(lie.system_id, 77 | 78);
-            proptest::prop_assert!(of_roster || *before == b.companion.neighbours.fleet().cloned(), "{lie:?}");
+            proptest::prop_assert!(
+                of_roster || *before == b.companion.neighbours.fleet().cloned(),
+                "{lie:?}"
+            );
             b.drain();
             (0..*ticks).for_each(|_| b.tick());
             let y_m = (b.enu.y - START.y).abs();
-            proptest::prop_assert!(y_m < 0.3 && b.enu.z < GOAL.z + 0.3, "off its path: {:?} {lies:?}", b.enu);
+            proptest::prop_assert!(
+                y_m < 0.3 && b.enu.z < GOAL.z + 0.3,
+                "off its path: {:?} {lies:?}",
+                b.enu
+            );
         }
         if b.state() == Ready {
             b.start();
@@ -402,6 +424,11 @@ proptest::proptest! {
                 break;
             }
         }
-        proptest::prop_assert!(!b.armed && b.on_ground(), "{:?} {:?} {lies:#?}", b.state(), b.texts);
+        proptest::prop_assert!(
+            !b.armed && b.on_ground(),
+            "{:?} {:?} {lies:#?}",
+            b.state(),
+            b.texts
+        );
     }
 }

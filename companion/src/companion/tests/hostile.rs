@@ -59,7 +59,11 @@ proptest::proptest! {
             bench.companion.handle_bytes(Link::Autopilot, bench.now, &bytes);
             bench.companion.handle_bytes(Link::Swarm, bench.now, &radio);
             bench.drain();
-            proptest::prop_assert!(matches!(bench.state(), State::Follow | State::Land), "{kind} {seed}: {:?}", bench.texts);
+            proptest::prop_assert!(
+                matches!(bench.state(), State::Follow | State::Land),
+                "{kind} {seed}: {:?}",
+                bench.texts
+            );
             bench.run(0.1);
         }
         bench.until(State::Done, 60.0);
@@ -205,7 +209,12 @@ proptest::proptest! {
             bench.until(State::Follow, 20.0);
         } else {
             bench = Bench::new(two_vehicles());
-            bench.neighbour = Some((Point::new(8.0, 20.0, 0.0), crate::link::intent::ON_PLAN | crate::link::intent::GROUNDED, 0.0, 5));
+            bench.neighbour = Some((
+                Point::new(8.0, 20.0, 0.0),
+                crate::link::intent::ON_PLAN | crate::link::intent::GROUNDED,
+                0.0,
+                5,
+            ));
             bench.until(State::Ready, 6.0);
         }
         let mut flash = crate::testing::fake_flash::Flash::new(9);
@@ -222,37 +231,61 @@ proptest::proptest! {
                 bench.tick();
             }
             let landed = matches!(bench.state(), State::Land | State::Disarm | State::Done);
-            proptest::prop_assert!(bench.state() == state || (flies && landed), "{:?} {:?}", bench.state(), bench.texts);
+            proptest::prop_assert!(
+                bench.state() == state || (flies && landed),
+                "{:?} {:?}",
+                bench.state(),
+                bench.texts
+            );
         }
         proptest::prop_assert!(!bench.events.contains(&Event::RestartRequested));
         proptest::prop_assert_eq!(bench.companion.detours.obstacle_count(), 0);
-        proptest::prop_assert!(bench.companion.services.parameters().to_bytes() == parameters && bench.companion.config == config);
+        proptest::prop_assert!(
+            bench.companion.services.parameters().to_bytes() == parameters
+                && bench.companion.config == config
+        );
         // The radio gives the ground station all it requests within as long as its budget needs.
         bench.swarm.clear();
         bench.acks.clear();
-        let ask = |bench: &mut Bench, bytes: &[u8]| bench.companion.handle_bytes(Link::Swarm, bench.now, bytes);
-        let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPANION_COMPONENT };
+        let ask = |bench: &mut Bench, bytes: &[u8]| {
+            bench.companion.handle_bytes(Link::Swarm, bench.now, bytes);
+        };
+        let list = PARAM_REQUEST_LIST_DATA {
+            target_system: SYSTEM,
+            target_component: crate::COMPANION_COMPONENT,
+        };
         let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
-        let ground = |sequence| crate::link::frame::Header { system: 255, component: 190, sequence };
+        let ground =
+            |sequence| crate::link::frame::Header { system: 255, component: 190, sequence };
         let len = crate::link::frame::encode(ground(200), &list, &mut out);
         ask(&mut bench, &out[..len]);
-        let len = crate::link::frame::encode(ground(201), &TIMESYNC_DATA { tc1: 0, ts1: 4711 }, &mut out);
+        let len =
+            crate::link::frame::encode(ground(201), &TIMESYNC_DATA { tc1: 0, ts1: 4711 }, &mut out);
         ask(&mut bench, &out[..len]);
         bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
         for i in 0..200u8 {
             for k in 0..4 {
-                let bytes = forged(7 + k % 4, hostile_id(i.wrapping_mul(7) | 2), i.wrapping_mul(4) + k);
+                let bytes =
+                    forged(7 + k % 4, hostile_id(i.wrapping_mul(7) | 2), i.wrapping_mul(4) + k);
                 bench.companion.handle_bytes(Link::Swarm, bench.now, &bytes);
             }
             bench.tick();
         }
         let values = bench.swarm.iter().filter_map(Frame::decode::<PARAM_VALUE_DATA>).count();
-        let time = bench.swarm.iter().filter_map(Frame::decode::<TIMESYNC_DATA>).any(|t| t.ts1 == 4711);
-        proptest::prop_assert!(values >= crate::services::parameters::PARAMETER_COUNT && time, "{values} {time}");
+        let time =
+            bench.swarm.iter().filter_map(Frame::decode::<TIMESYNC_DATA>).any(|t| t.ts1 == 4711);
+        proptest::prop_assert!(
+            values >= crate::services::parameters::PARAMETER_COUNT && time,
+            "{values} {time}"
+        );
         proptest::prop_assert!(bench.acks.contains(&(512, 0, 255, 190)), "{:?}", bench.acks);
         if flies {
             bench.until(State::Done, 60.0);
-            proptest::prop_assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
+            proptest::prop_assert!(
+                (bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2,
+                "{:?}",
+                bench.enu
+            );
         } else {
             bench.start();
             bench.until(State::Follow, 20.0);
@@ -373,13 +406,20 @@ proptest::proptest! {
     /// autopilot to its other port.
     #[test]
     fn forged_origins_move_no_vehicle(
-        forged in proptest::collection::vec((0u8..=255, -30_000i32..30_000, -30_000i32..30_000, 0u8..12), 1..40),
+        forged in proptest::collection::vec(
+            (0u8..=255, -30_000i32..30_000, -30_000i32..30_000, 0u8..12),
+            1..40,
+        ),
     ) {
         use mavlink::dialects::ardupilotmega::GPS_GLOBAL_ORIGIN_DATA;
         let mut bench = Bench::following(config());
         let (lat, lon) = ((bench.origin.lat_deg * 1e7) as i32, (bench.origin.lon_deg * 1e7) as i32);
         for (sequence, north, east, ticks) in forged {
-            let data = GPS_GLOBAL_ORIGIN_DATA { latitude: lat + north, longitude: lon + east, altitude: 720_000 };
+            let data = GPS_GLOBAL_ORIGIN_DATA {
+                latitude: lat + north,
+                longitude: lon + east,
+                altitude: 720_000,
+            };
             let header = crate::link::frame::Header { system: SYSTEM, component: 1, sequence };
             let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
             let len = crate::link::frame::encode(header, &data, &mut out);
@@ -389,7 +429,9 @@ proptest::proptest! {
         }
         bench.until(State::Done, 60.0);
         // The path runs along y = 12: setpoints and vehicle stay on it.
-        let wide = |(_, at, mask): &&(Instant, Point, u16)| *mask != px4::MASK_VELOCITY && (at.y - 12.0).abs() > 0.05;
+        let wide = |(_, at, mask): &&(Instant, Point, u16)| {
+            *mask != px4::MASK_VELOCITY && (at.y - 12.0).abs() > 0.05
+        };
         proptest::prop_assert_eq!(bench.setpoints.iter().filter(wide).count(), 0);
         proptest::prop_assert!((bench.enu.y - 12.0).abs() < 0.05, "{:?}", bench.enu);
     }

@@ -55,7 +55,12 @@ proptest::proptest! {
         bench.until(State::Follow, 20.0);
         bench.setpoints.clear();
         let order = |bench: &mut Bench, go: f32| {
-            bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, go, SYSTEM, crate::COMPANION_COMPONENT);
+            bench.command(
+                MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
+                go,
+                SYSTEM,
+                crate::COMPANION_COMPONENT,
+            );
         };
         let mut off_m = 0f32;
         let mut fly = |bench: &mut Bench, ticks: u32| {
@@ -92,9 +97,15 @@ proptest::proptest! {
             let mut config = config();
             config.required_clearance_m = config.radius_m + margin_m;
             (config.descend_mps, config.cruise_mps) = (descend_mps, cruise_mps);
-            let mut bench = if kind == AutopilotKind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+            let mut bench = if kind == AutopilotKind::Px4 {
+                Bench::new(config)
+            } else {
+                Bench::ardupilot(config)
+            };
             let mut path = Path::new();
-            for point in [START, Point::new(GOAL.x, GOAL.y, START.z), Point::new(GOAL.x, GOAL.y, end_m)] {
+            for point in
+                [START, Point::new(GOAL.x, GOAL.y, START.z), Point::new(GOAL.x, GOAL.y, end_m)]
+            {
                 path.push(point, 1.2).unwrap();
             }
             bench.answer_plan = Some(Ok(VehiclePlan { path, descent_m: end_m, ..plan() }));
@@ -112,17 +123,28 @@ proptest::proptest! {
             let landing = matches!(bench.state(), State::Land | State::Disarm);
             proptest::prop_assert!(landing, "{:?}", bench.state());
             let low_m = margin_m.min(1.2);
-            let lowest = bench.setpoints.iter().map(|(_, at, _)| at.z).fold(f32::INFINITY, f32::min);
+            let lowest =
+                bench.setpoints.iter().map(|(_, at, _)| at.z).fold(f32::INFINITY, f32::min);
             match kind {
-                AutopilotKind::Px4 => proptest::prop_assert!(bench.enu.z < higher_m.max(0.25), "left at {} m", bench.enu.z),
-                AutopilotKind::ArduPilot => proptest::prop_assert!(lowest > end_m.min(low_m) - 0.02, "led to {lowest} m"),
+                AutopilotKind::Px4 => proptest::prop_assert!(
+                    bench.enu.z < higher_m.max(0.25),
+                    "left at {} m",
+                    bench.enu.z
+                ),
+                AutopilotKind::ArduPilot => {
+                    proptest::prop_assert!(lowest > end_m.min(low_m) - 0.02, "led to {lowest} m");
+                }
             }
             for pair in bench.setpoints.windows(2) {
                 let sinks_mps = (pair[0].1.z - pair[1].1.z) / (pair[1].0 - pair[0].0).as_secs_f32();
                 // What is sent is smoothed, and slow a little later than the raw point: 0.61 m/s at
                 // the margin.
                 let slow = pair[0].1.z > low_m - 0.3 || sinks_mps < 0.55;
-                proptest::prop_assert!(slow, "{kind:?} sinks at {sinks_mps} m/s at {} m", pair[0].1.z);
+                proptest::prop_assert!(
+                    slow,
+                    "{kind:?} sinks at {sinks_mps} m/s at {} m",
+                    pair[0].1.z
+                );
             }
         }
     }
@@ -141,13 +163,26 @@ proptest::proptest! {
         for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
             let mut config = Config { descend_mps, ..two_vehicles() };
             config.required_clearance_m = config.radius_m + margin_m;
-            let mut bench = if kind == AutopilotKind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+            let mut bench = if kind == AutopilotKind::Px4 {
+                Bench::new(config)
+            } else {
+                Bench::ardupilot(config)
+            };
             let mut path = Path::new();
-            for at in [START, Point::new(START.x + 2.0, START.y, end_m), Point::new(GOAL.x, GOAL.y, end_m)] {
+            for at in [
+                START,
+                Point::new(START.x + 2.0, START.y, end_m),
+                Point::new(GOAL.x, GOAL.y, end_m),
+            ] {
                 path.push(at, 1.2).unwrap();
             }
             bench.answer_plan = Some(Ok(VehiclePlan { path, descent_m: end_m, ..plan() }));
-            bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), crate::link::intent::GROUNDED | crate::link::intent::ON_PLAN, 0.0, 5));
+            bench.neighbour = Some((
+                Point::new(8.0, 60.0, 0.0),
+                crate::link::intent::GROUNDED | crate::link::intent::ON_PLAN,
+                0.0,
+                5,
+            ));
             bench.until(State::Ready, 6.0);
             bench.start();
             bench.until(State::Follow, 60.0);
@@ -161,13 +196,22 @@ proptest::proptest! {
                 bench.run(0.05);
                 bench.enu.z = bench.enu.z.max(higher_m);
                 let after_s = (bench.now - began).as_secs_f32();
-                proptest::prop_assert!(after_s < 12.0 + end_m / descend_mps.min(0.4), "{kind:?}: it never lands");
+                proptest::prop_assert!(
+                    after_s < 12.0 + end_m / descend_mps.min(0.4),
+                    "{kind:?}: it never lands"
+                );
             }
             let low_m = if kind == AutopilotKind::Px4 { 0.0 } else { margin_m.min(1.2) };
             let left_m = bench.enu.z;
-            proptest::prop_assert!(left_m < higher_m.max(low_m.min(from.z)) + 0.4, "{kind:?} left at {left_m} m");
+            proptest::prop_assert!(
+                left_m < higher_m.max(low_m.min(from.z)) + 0.4,
+                "{kind:?} left at {left_m} m"
+            );
             for (_, at, _) in &bench.setpoints {
-                proptest::prop_assert!((at - from).xy().norm() < 0.15, "{kind:?} led from {from} to {at}");
+                proptest::prop_assert!(
+                    (at - from).xy().norm() < 0.15,
+                    "{kind:?} led from {from} to {at}"
+                );
             }
         }
     }
@@ -198,7 +242,10 @@ proptest::proptest! {
                 touched = touched.or(Some(bench.now));
             }
             let on_ground_s = touched.map_or(0.0, |at| (bench.now - at).as_secs_f32());
-            proptest::prop_assert!(on_ground_s < 12.0, "still in Follow {on_ground_s} s after it touched the ground");
+            proptest::prop_assert!(
+                on_ground_s < 12.0,
+                "still in Follow {on_ground_s} s after it touched the ground"
+            );
         }
         let landing = matches!(bench.state(), State::Land | State::Disarm);
         proptest::prop_assert!(landing, "{:?}", bench.state());

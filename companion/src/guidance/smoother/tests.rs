@@ -38,9 +38,11 @@ proptest! {
             path.push(place, 0.8).unwrap();
         }
         let first = path.point_at(0.0).unwrap();
-        let fence = fenced.then(|| (first - Point::new(5.0, 5.0, 1.0), first + Point::new(5.0, 5.0, 1.0)));
+        let fence =
+            fenced.then(|| (first - Point::new(5.0, 5.0, 1.0), first + Point::new(5.0, 5.0, 1.0)));
         let cfg = TrackConfig::default();
-        let (mut tracker, mut smoother) = (Tracker::default(), SetpointSmoother::new(LIMITS, fence));
+        let (mut tracker, mut smoother) =
+            (Tracker::default(), SetpointSmoother::new(LIMITS, fence));
         smoother.begin_at(first, 0.0);
         for (step, (kind, share, steps)) in
             paces.iter().flat_map(|p| (0..p.2).map(move |_| (p.0, p.1, p.2))).enumerate()
@@ -53,13 +55,20 @@ proptest! {
             };
             // Most steps are on time.
             let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
-            let (at, velocity, acceleration) = (smoother.position(), smoother.velocity(), smoother.acceleration());
+            let (at, velocity, acceleration) =
+                (smoother.position(), smoother.velocity(), smoother.acceleration());
             for _ in 0..smoother.begin_step(pace, dt_s) {
-                let mut advice = Advice { stop_within_m: if steps % 3 == 0 { 0.0 } else { f32::INFINITY }, ..Advice::FREE };
+                let mut advice = Advice {
+                    stop_within_m: if steps % 3 == 0 { 0.0 } else { f32::INFINITY },
+                    ..Advice::FREE
+                };
                 // Guidance stops before the fence.
                 let v = tracker.speed_mps;
                 let braking_m = v * v / 3.0 + 2.0 * v * TICK_S + 0.05;
-                if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !smoother.is_place_allowed(&ahead)) {
+                if path
+                    .point_at(tracker.along_m + braking_m)
+                    .is_some_and(|ahead| !smoother.is_place_allowed(&ahead))
+                {
                     advice.stop_within_m = advice.stop_within_m.min(braking_m);
                 }
                 let reference = track::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
@@ -73,7 +82,10 @@ proptest! {
             // The velocity is that of the positions.
             let mean = (smoother.velocity() + velocity) * 0.5;
             let off = ((smoother.position() - at) / dt_s - mean).norm();
-            prop_assert!(off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S, "velocity off by {off} m/s in {dt_s} s");
+            prop_assert!(
+                off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S,
+                "velocity off by {off} m/s in {dt_s} s"
+            );
             let a = smoother.acceleration();
             let [across, up] = LIMITS.max_accel_mps2;
             prop_assert!(a.xy().norm() <= across + 1e-4 && a.z.abs() <= up + 1e-4, "{a:?}");
@@ -103,12 +115,19 @@ proptest! {
         size in (2.0f32..30.0, 2.0f32..30.0, 1.0f32..10.0),
         share in (0.0f32..1.0, 0.0f32..1.0, 0.0f32..1.0),
         came_at in (-3.0f32..3.0, -3.0f32..3.0, -2.0f32..2.0),
-        targets in proptest::collection::vec((-0.2f32..1.2, -0.2f32..1.2, -0.2f32..1.2, 0.2f32..2.0, 1u16..60), 1..12),
+        targets in proptest::collection::vec(
+            (-0.2f32..1.2, -0.2f32..1.2, -0.2f32..1.2, 0.2f32..2.0, 1u16..60),
+            1..12,
+        ),
         paces in proptest::collection::vec((0u8..4, 0.0f32..1.0), 1..40),
         late in proptest::collection::vec(0.03f32..0.25, 1..16),
         slow_climber in any::<bool>(),
     ) {
-        let limits = if slow_climber { MotionLimits { accel_z_mps2: 1.0, max_accel_mps2: [2.25, 1.0], ..LIMITS } } else { LIMITS };
+        let limits = if slow_climber {
+            MotionLimits { accel_z_mps2: 1.0, max_accel_mps2: [2.25, 1.0], ..LIMITS }
+        } else {
+            LIMITS
+        };
         let (low, size) = (Point::new(-7.0, 12.0, 0.0), Point::new(size.0, size.1, size.2));
         let high = low + size;
         let mut smoother = SetpointSmoother::new(limits, Some((low, high)));
@@ -138,14 +157,20 @@ proptest! {
                 }
                 smoother.make_setpoint();
                 let place = smoother.position();
-                prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]), "{place:?}");
+                prop_assert!(
+                    (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]),
+                    "{place:?}"
+                );
                 let a = smoother.acceleration();
                 let [across, up] = limits.max_accel_mps2;
                 // Two axes that begin to brake at once pass the disc's edge by a hair.
                 prop_assert!(a.xy().norm() <= across * 1.02 && a.z.abs() <= up + 1e-3, "{a:?}");
                 let jerk = (a - before).norm() / dt_s.min(0.2);
                 let most = limits.jerk(smoother.stopping);
-                prop_assert!(jerk <= most * 1.001 + 1e-3, "{jerk} m/s³ of {most} at {place:?} of {low:?} {high:?}");
+                prop_assert!(
+                    jerk <= most * 1.001 + 1e-3,
+                    "{jerk} m/s³ of {most} at {place:?} of {low:?} {high:?}"
+                );
             }
         }
     }

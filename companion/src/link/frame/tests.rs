@@ -143,7 +143,10 @@ proptest! {
     /// undamaged frames in quiet surroundings still arrive.
     #[test]
     fn hostile_bytes_are_survived(
-        noise in proptest::collection::vec(prop_oneof![Just(V1_START), Just(V2_START), Just(0u8), any::<u8>()], 0..900),
+        noise in proptest::collection::vec(
+            prop_oneof![Just(V1_START), Just(V2_START), Just(0u8), any::<u8>()],
+            0..900,
+        ),
         cut in 1usize..300,
     ) {
         let mut framer = Framer::new();
@@ -282,7 +285,10 @@ proptest! {
         // candidates may too.
         let by_chance = expected.iter().any(|(at, _)| !starts.contains(at));
         for at in &starts {
-            prop_assert!(by_chance || expected.iter().any(|(found, _)| found == at), "the reference loses byte {at}");
+            prop_assert!(
+                by_chance || expected.iter().any(|(found, _)| found == at),
+                "the reference loses byte {at}"
+            );
         }
         let (mut framer, mut got, mut rest) = (Framer::new(), Vec::new(), &stream[..]);
         for (step, chunk) in chunks.iter().cycle().enumerate() {

@@ -192,47 +192,7 @@ impl<'a> CoverageView<'a> {
         if b.len() != encoded_len(vehicles, ring_count, vertex_count) {
             return Err(FileError::Length.into());
         }
-        let angle_deg = f32_at(head, 36);
-        let [height_m, tolerance_m, low_m, high_m] = [44, 48, 52, 56].map(|at| f32_at(head, at));
-        let header = CoverageHeader {
-            unit: match head[4] {
-                0 => TrackUnit::Lane,
-                1 => TrackUnit::Waypoint,
-                _ => return refuse("unit"),
-            },
-            parts: match head[5] {
-                0 => PartEligibility::Anyone,
-                1 => PartEligibility::SameWeight,
-                _ => return refuse("parts"),
-            },
-            heading: match head[6] {
-                0 => HeadingRule::Sweep,
-                1 => HeadingRule::Lane,
-                _ => return refuse("heading"),
-            },
-            trigger: match head[7] {
-                0 => Trigger::Distance,
-                1 => Trigger::Waypoint,
-                2 => Trigger::None,
-                _ => return refuse("trigger"),
-            },
-            search_steps: u32_at(head, 8),
-            heights: Heights { mission_m: f32_at(head, 12), layer_m: f32_at(head, 16) },
-            spacing: Spacing {
-                footprint: Footprint { along_m: f32_at(head, 20), across_m: f32_at(head, 24) },
-                lane_m: f32_at(head, 28),
-                waypoint_m: f32_at(head, 32),
-            },
-            angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
-            margin_m: f32_at(head, 40),
-            ground: (head[44..60] != [0; 16]).then_some(Ground {
-                height_m,
-                tolerance_m,
-                low_m,
-                high_m,
-            }),
-        };
-        header.check()?;
+        let header = CoverageHeader::parse(head)?;
         let (shares, rest) = b[HEAD_LEN..].split_at(vehicles * SHARE_LEN);
         let (rings, vertices) = rest.split_at(ring_count * RING_LEN);
         let view = Self {
@@ -300,6 +260,53 @@ impl VehicleShare {
 }
 
 impl CoverageHeader {
+    /// Reads and checks the bytes before the first vehicle's share.
+    fn parse(head: &[u8; HEAD_LEN]) -> Result<Self, MissionError> {
+        let refuse = |name| Err(FileError::Header(name).into());
+        let angle_deg = f32_at(head, 36);
+        let [height_m, tolerance_m, low_m, high_m] = [44, 48, 52, 56].map(|at| f32_at(head, at));
+        let header = Self {
+            unit: match head[4] {
+                0 => TrackUnit::Lane,
+                1 => TrackUnit::Waypoint,
+                _ => return refuse("unit"),
+            },
+            parts: match head[5] {
+                0 => PartEligibility::Anyone,
+                1 => PartEligibility::SameWeight,
+                _ => return refuse("parts"),
+            },
+            heading: match head[6] {
+                0 => HeadingRule::Sweep,
+                1 => HeadingRule::Lane,
+                _ => return refuse("heading"),
+            },
+            trigger: match head[7] {
+                0 => Trigger::Distance,
+                1 => Trigger::Waypoint,
+                2 => Trigger::None,
+                _ => return refuse("trigger"),
+            },
+            search_steps: u32_at(head, 8),
+            heights: Heights { mission_m: f32_at(head, 12), layer_m: f32_at(head, 16) },
+            spacing: Spacing {
+                footprint: Footprint { along_m: f32_at(head, 20), across_m: f32_at(head, 24) },
+                lane_m: f32_at(head, 28),
+                waypoint_m: f32_at(head, 32),
+            },
+            angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
+            margin_m: f32_at(head, 40),
+            ground: (head[44..60] != [0; 16]).then_some(Ground {
+                height_m,
+                tolerance_m,
+                low_m,
+                high_m,
+            }),
+        };
+        header.check()?;
+        Ok(header)
+    }
+
     fn check(&self) -> Result<(), MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());
         if self.spacing.check().is_err() {

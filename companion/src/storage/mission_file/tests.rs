@@ -260,7 +260,9 @@ fn no_cut_and_no_changed_bit_passes() {
 
 proptest! {
     #[test]
-    fn any_bytes_are_survived(patches in proptest::collection::vec((8usize..232, any::<u8>()), 0..6)) {
+    fn any_bytes_are_survived(
+        patches in proptest::collection::vec((8usize..232, any::<u8>()), 0..6),
+    ) {
         let mut bytes = file();
         for (at, byte) in patches {
             bytes[at] = byte;

@@ -262,7 +262,7 @@ impl Store {
         *self.condition_mut(area) = AreaCondition::Open;
         match area {
             FlashArea::Slot(_) => {
-                self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking))
+                self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking));
             }
             FlashArea::Half(half) => {
                 let at = area.data_offset(&self.layout);
@@ -337,7 +337,7 @@ impl Store {
     pub(super) fn drop_job(&mut self) {
         match self.job {
             FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => {
-                *self.condition_mut(area) = AreaCondition::Dirty
+                *self.condition_mut(area) = AreaCondition::Dirty;
             }
             FlashJob::Flush(_) => {}
             _ => return,

@@ -13,30 +13,7 @@ impl Store {
     /// if nothing is to be written, or the other half is not erased yet.
     pub(super) fn choose_record(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
         if let Some(compaction) = self.journal.compacting.clone() {
-            let Compaction { half, at, step, mission } = compaction;
-            return Some(match (step, self.journal.mission.clone()) {
-                (0, _) => FlashJob::Record(self.parameters_record(at)),
-                (1, _) if !self.photographed.is_empty() => {
-                    FlashJob::Record(self.photographed_record(at))
-                }
-                (1 | 2, Some(kept)) => FlashJob::Record(JournalRecord {
-                    kind: RecordKind::Mission,
-                    at,
-                    len: kept.end - kept.start,
-                    crc: self.journal.mission_crc,
-                    source: RecordSource::Flash(kept.start),
-                    step: RecordStep::Head,
-                    done: 0,
-                    sum: CRC_START,
-                }),
-                _ => {
-                    let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
-                    let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
-                    self.journal.compacting = Some(Compaction { half, at, step: 3, mission });
-                    let seal = Seal { sequence: newest + 1, len: 0, crc: 0, field: false };
-                    FlashJob::Seal(FlashArea::Half(half), seal)
-                }
-            });
+            return Some(self.continue_compaction(compaction));
         }
         let closing = self.upload == Some((File::Mission, UploadState::Closing));
         if self.journal.failures >= MAX_JOURNAL_TRIES {
@@ -74,6 +51,34 @@ impl Store {
                 JournalRecord { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
             }
         }))
+    }
+
+    /// The next step of a compaction.
+    fn continue_compaction(&mut self, compaction: Compaction) -> FlashJob {
+        let Compaction { half, at, step, mission } = compaction;
+        match (step, self.journal.mission.clone()) {
+            (0, _) => FlashJob::Record(self.parameters_record(at)),
+            (1, _) if !self.photographed.is_empty() => {
+                FlashJob::Record(self.photographed_record(at))
+            }
+            (1 | 2, Some(kept)) => FlashJob::Record(JournalRecord {
+                kind: RecordKind::Mission,
+                at,
+                len: kept.end - kept.start,
+                crc: self.journal.mission_crc,
+                source: RecordSource::Flash(kept.start),
+                step: RecordStep::Head,
+                done: 0,
+                sum: CRC_START,
+            }),
+            _ => {
+                let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
+                let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
+                self.journal.compacting = Some(Compaction { half, at, step: 3, mission });
+                let seal = Seal { sequence: newest + 1, len: 0, crc: 0, field: false };
+                FlashJob::Seal(FlashArea::Half(half), seal)
+            }
+        }
     }
 
     fn begin_compaction(&mut self, erasing: ErasePermission, closing: bool) -> Option<FlashJob> {

@@ -125,7 +125,8 @@ mod tests {
                 let pick = usize::from(order[turn % order.len()]) % missing.len().min(5);
                 let start = missing[pick] * piece;
                 let bytes = &file[start..(start + piece).min(len)];
-                if window.insert(start as u32, bytes, 20_000) == PieceOutcome::Yes && turn % 7 != 0 {
+                if window.insert(start as u32, bytes, 20_000) == PieceOutcome::Yes && turn % 7 != 0
+                {
                     missing.remove(pick);
                 }
                 turn += 1;

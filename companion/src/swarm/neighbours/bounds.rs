@@ -25,8 +25,8 @@ pub(super) const LOST_AFTER_MS: u64 = 45_000;
 /// Share of the radio's range beyond which a neighbour that falls silent is taken to be out of
 /// range, not failed.
 pub(super) const RANGE_EDGE_SHARE: f32 = 0.7;
-/// Least share of the slowest vehicle's cruise at which an unheard vehicle makes progress: it slows in corners
-/// and where it lags.
+/// Least share of the slowest vehicle's cruise at which an unheard vehicle makes progress: it slows
+/// in corners and where it lags.
 pub(super) const RECKONED_SPEED_SHARE: f32 = 0.4;
 /// Silence after which a vehicle's progress is assumed to grow at [`RECKONED_SPEED_SHARE`],
 /// seconds.

@@ -63,12 +63,16 @@ proptest::proptest! {
     /// Whatever is reported and revoked, those that a detour was planned for stay the first ones.
     #[test]
     fn obstacles_are_those_reported_and_not_revoked(
-        orders in proptest::collection::vec((0u8..24, -1.0f32..25.0, proptest::prelude::any::<bool>()), 0..200),
+        orders in proptest::collection::vec(
+            (0u8..24, -1.0f32..25.0, proptest::prelude::any::<bool>()),
+            0..200,
+        ),
     ) {
         let mut obstacles = Obstacles::default();
         let mut model: std::vec::Vec<(u8, bool)> = std::vec::Vec::new();
         for (x, radius_m, plans) in orders {
-            let result = take(&mut obstacles, &sphere(Point::new(f32::from(x), 30.0, 1.5), radius_m));
+            let result =
+                take(&mut obstacles, &sphere(Point::new(f32::from(x), 30.0, 1.5), radius_m));
             let known = model.iter().any(|(at, _)| *at == x);
             // A larger one at the same place is another; keep the model to one a place.
             if radius_m <= 0.0 {
@@ -87,13 +91,18 @@ proptest::proptest! {
                 obstacles.avoid_requested();
                 model.iter_mut().for_each(|(_, avoided)| *avoided = true);
             }
-            proptest::prop_assert!(obstacles.avoided <= obstacles.count() && obstacles.count() <= MAX_OBSTACLES);
+            proptest::prop_assert!(
+                obstacles.avoided <= obstacles.count() && obstacles.count() <= MAX_OBSTACLES
+            );
             let places: std::collections::BTreeSet<i32> =
                 obstacles.known.iter().map(|o| libm::roundf(o.from.x) as i32).collect();
-            let wanted: std::collections::BTreeSet<i32> = model.iter().map(|(x, _)| i32::from(*x)).collect();
+            let wanted: std::collections::BTreeSet<i32> =
+                model.iter().map(|(x, _)| i32::from(*x)).collect();
             proptest::prop_assert_eq!(places, wanted);
             for (x, avoided) in &model {
-                let new = obstacles.known[obstacles.avoided..].iter().any(|o| libm::roundf(o.from.x) as i32 == i32::from(*x));
+                let new = obstacles.known[obstacles.avoided..]
+                    .iter()
+                    .any(|o| libm::roundf(o.from.x) as i32 == i32::from(*x));
                 proptest::prop_assert!(*avoided || new, "{}", x);
             }
         }

@@ -82,7 +82,7 @@ impl Bench {
                 };
             }
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {
-                self.armed = c.param1 == 1.0 && !self.never_arms
+                self.armed = c.param1 == 1.0 && !self.never_arms;
             }
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
                 assert!(self.kind == AutopilotKind::ArduPilot && self.armed);

@@ -37,7 +37,11 @@ proptest! {
         blocked in any::<bool>(),
     ) {
         let mut rng = Pcg32::seed_from_u64(seed);
-        let shape = GridShape { dims, min: Point::new(-3.0, 2.0, 0.5), resolution_m: uniform(&mut rng, 0.05, 1.0) };
+        let shape = GridShape {
+            dims,
+            min: Point::new(-3.0, 2.0, 0.5),
+            resolution_m: uniform(&mut rng, 0.05, 1.0),
+        };
         let words = random_words(&shape, &mut rng);
         let outside = if blocked { Outside::Blocked } else { Outside::Free };
         let grid = VoxelGrid::new(shape, outside, &words).unwrap();

@@ -1,13 +1,15 @@
 //! Reads the scenario of a coverage mission: `[area]`, and the tables that depend on it.
 
+mod spacing;
+
 use std::path::Path;
 
 use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind, SAME_VERTEX_M};
-use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 use planner_core::coverage::pack::Heights;
-use planner_core::coverage::{CoverageError, Flat, area as core_area};
+use planner_core::coverage::{Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
+use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
 use super::terrain::TerrainFile;
 use super::{
@@ -59,12 +61,7 @@ pub(in crate::scenario) fn coverage(
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
     let mission = mission.unwrap_or_else(|| empty_table(text, "mission"));
-    for key in ["goals", "goals_file"] {
-        let goals = mission.get(key);
-        unsupported.extend(goals.map(|goals| {
-            unsupported_error(text, &goals.span, &format!("mission.{key} beside [area]"))
-        }));
-    }
+    unsupported.extend(goals_beside_area(text, &mission));
     let mission = self::read_coverage_mission(&mission, &vehicles)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = super::read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
@@ -109,6 +106,15 @@ pub(in crate::scenario) fn coverage(
         formation,
         unsupported,
     })
+}
+
+/// Errors of goals, which a coverage mission does not fly to.
+fn goals_beside_area(text: Text<'_>, mission: &Table<'_>) -> Vec<ScenarioError> {
+    let unsupported = |key: &'static str| {
+        let goals = mission.get(key)?;
+        Some(unsupported_error(text, &goals.span, &format!("mission.{key} beside [area]")))
+    };
+    ["goals", "goals_file"].into_iter().filter_map(unsupported).collect()
 }
 
 /// Keys of a vehicle that only coverage missions support.
@@ -339,16 +345,9 @@ fn rings_in_mission_frame(
     {
         let begin = vertices.len();
         for &[x, y] in ring {
-            let place = match coordinates {
-                Coordinates::Metres => Flat::new(x as f32, y as f32),
-                Coordinates::Wgs84 => {
-                    let place = Geodetic { lat_deg: y, lon_deg: x, alt_m: origin.alt_m };
-                    if !place.is_valid() {
-                        let why = format!("area: longitude {x}, latitude {y} is no place on earth");
-                        return bad(why, "metres need `coordinates = \"metres\"`");
-                    }
-                    geodetic_to_enu(origin, &place).xy()
-                }
+            let Some(place) = place_in_mission_frame([x, y], coordinates, origin) else {
+                let why = format!("area: longitude {x}, latitude {y} is no place on earth");
+                return bad(why, "metres need `coordinates = \"metres\"`");
             };
             // Vertices that are equal up to rounding, or were given twice, become one.
             let repeats = vertices[begin..]
@@ -383,6 +382,21 @@ fn rings_in_mission_frame(
                 format!("area: {}", describe_area_error(error, &rings)),
                 if far { near } else { "" },
             )
+        }
+    }
+}
+
+/// A place in the mission frame; `None` for one that is not on earth.
+fn place_in_mission_frame(
+    [x, y]: [f64; 2],
+    coordinates: Coordinates,
+    origin: &Geodetic,
+) -> Option<Flat> {
+    match coordinates {
+        Coordinates::Metres => Some(Flat::new(x as f32, y as f32)),
+        Coordinates::Wgs84 => {
+            let place = Geodetic { lat_deg: y, lon_deg: x, alt_m: origin.alt_m };
+            place.is_valid().then(|| geodetic_to_enu(origin, &place).xy())
         }
     }
 }
@@ -443,107 +457,4 @@ fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -> String {
         E::OuterInside { ring: r } => format!("{} lies inside another polygon", ring(r)),
         E::AreaFull => "it has too many vertices".to_owned(),
     }
-}
-
-fn read_camera(value: &Value<'_>) -> Result<Camera> {
-    let table = value.table()?;
-    let sensor = table.get("sensor_mm");
-    let camera = match &sensor {
-        Some(sensor) => {
-            let side = 0.1..=1000.0;
-            let sides_mm = read_pair(sensor, |v| v.f64(&side).map(|n| n as f32))?;
-            let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
-            let focal_mm = table.required("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
-            let pixels = match table.get("pixels") {
-                Some(pixels) => {
-                    read_pair(&pixels, |v| v.integer_in_range(1..=1_000_000).map(|n| n as u32))?
-                }
-                None => return Err(value.error("needs pixels beside sensor_mm")),
-            };
-            Camera::Sensor { sides_mm, focal_mm, pixels }
-        }
-        None => {
-            let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
-            let fov_deg = table.required("fov_deg", hint)?.f64(&(0.1..=175.0))? as f32;
-            Camera::Diagonal { fov_deg, aspect: table.f32("aspect", 1.5, 0.05..=20.0)? }
-        }
-    };
-    table.finish()?;
-    Ok(camera)
-}
-
-fn read_pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>) -> Result<[T; 2]> {
-    let items = value.items()?;
-    let [a, b] = items.as_slice() else { return Err(value.error("must be two numbers")) };
-    Ok([item(a)?, item(b)?])
-}
-
-/// Reads the height of the pictures, and footprint, lane and waypoint distance.
-fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)> {
-    let height = table.get("height_m");
-    let gsd = table.get("gsd_m");
-    let height_m = match (&height, &gsd) {
-        (Some(_), Some(gsd)) => {
-            return Err(gsd.error("cannot stand beside area.height_m: give one of them"));
-        }
-        (Some(height), None) => height.f64(&(0.1..=5000.0))? as f32,
-        (None, Some(gsd)) => {
-            let gsd_m = gsd.f64(&(1e-4..=100.0))? as f32;
-            let Some(camera) = camera else { return Err(gsd.error("needs area.camera")) };
-            camera.height_for_gsd(gsd_m).map_err(|_| gsd.error("needs a camera with pixels"))?
-        }
-        (None, None) => 35.0,
-    };
-    let distances = 0.1..=10_000.0;
-    let lane = table.get("lane_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
-    let waypoint =
-        table.get("waypoint_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
-    for (overlap, spacing) in [("overlap_side", &lane), ("overlap_front", &waypoint)] {
-        if let (Some(value), Some(_)) = (table.get(overlap), spacing) {
-            return Err(value
-                .error("cannot stand beside the distance that follows from it: give one of them"));
-        }
-    }
-    let side = table.f32("overlap_side", 0.6, 0.0..=0.95)?;
-    let front = table.f32("overlap_front", 0.7, 0.0..=0.95)?;
-    let footprint = match camera {
-        Some(camera) => camera.footprint(height_m).map_err(|error| spacing_error(table, &error))?,
-        // Without a camera, the given spacings are taken as the footprint of a picture.
-        None => match (&lane, &waypoint) {
-            (Some((lane_m, _)), Some((waypoint_m, _))) => {
-                Footprint { along_m: *waypoint_m, across_m: *lane_m }
-            }
-            (Some((lane_m, _)), None) => Footprint { along_m: *lane_m, across_m: *lane_m },
-            _ => {
-                let hint =
-                    "add `camera = { fov_deg = 73.7, aspect = 1.5 }`, or lane_m and waypoint_m";
-                return Err(table.text.with_hint(&table.span, "area.camera is missing", hint));
-            }
-        },
-    };
-    let lane_m = lane.as_ref().map_or(footprint.across_m * (1.0 - side), |(m, _)| *m);
-    let waypoint_m = match (&waypoint, camera) {
-        (Some((m, _)), _) => *m,
-        (None, Some(_)) => footprint.along_m * (1.0 - front),
-        (None, None) => footprint.along_m,
-    };
-    let spacing = Spacing { footprint, lane_m, waypoint_m };
-    match spacing.check() {
-        Ok(()) => Ok((height_m, spacing)),
-        Err(CoverageError::Gaps) => {
-            let wide = lane_m > footprint.across_m;
-            let (key, side) =
-                if wide { (&lane, footprint.across_m) } else { (&waypoint, footprint.along_m) };
-            let why = format!("leaves gaps: one picture shows {side:.2} m from {height_m} m");
-            match key {
-                Some((_, value)) => Err(value.error(&why)),
-                None => Err(table.text.error(&table.span, format!("area {why}"))),
-            }
-        }
-        Err(error) => Err(spacing_error(table, &error)),
-    }
-}
-
-fn spacing_error(table: &Table<'_>, error: &CoverageError) -> ScenarioError {
-    table.text.error(&table.span, format!("area: {error:?}"))
 }

@@ -155,26 +155,40 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
     #[test]
     fn no_way_meets_a_zone_or_a_thing_and_around_zones_it_is_the_shortest(
-        zones in prop::collection::vec(prop::option::of((0f32..6.3, 5f32..45.0, 0.3f32..1.0, 3u8..9)), 9),
-        things in prop::collection::vec((0f32..400.0, 0f32..400.0, 0f32..30.0, 0f32..60.0, 0.5f32..8.0, any::<bool>()), 0..12),
+        zones in prop::collection::vec(
+            prop::option::of((0f32..6.3, 5f32..45.0, 0.3f32..1.0, 3u8..9)),
+            9,
+        ),
+        things in prop::collection::vec(
+            (0f32..400.0, 0f32..400.0, 0f32..30.0, 0f32..60.0, 0.5f32..8.0, any::<bool>()),
+            0..12,
+        ),
         here in (0f32..400.0, 0f32..400.0, 5f32..60.0),
         aside in any::<bool>(),
         room_m in 0f32..40.0,
     ) {
         let here = Point::new(here.0, here.1, here.2);
         let request = request(here, aside);
-        let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| KeepOutZone {
-            kind: if lands { ZoneKind::Descending } else { ZoneKind::Static },
-            ..column(Flat::new(x, y), low_m, low_m + high_m, radius_m)
+        let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| {
+            KeepOutZone {
+                kind: if lands { ZoneKind::Descending } else { ZoneKind::Static },
+                ..column(Flat::new(x, y), low_m, low_m + high_m, radius_m)
+            }
         };
         let things: StdVec<_> = things.iter().map(thing).collect();
         let Some((way, shortest_m)) = planned(&zones, &request, &things) else { return Ok(()) };
         // A fence that holds both ends takes ways away, and adds none.
         let room = Point::repeat(room_m);
-        let fence = Some((here.inf(&OVER) - room, Point::new(here.x, here.y, LAYER_M).sup(&OVER).sup(&here) + room));
-        if let Some((Ok(fenced), _)) = planned(&zones, &DetourRequest { fence, ..request }, &things) {
+        let fence = Some((
+            here.inf(&OVER) - room,
+            Point::new(here.x, here.y, LAYER_M).sup(&OVER).sup(&here) + room,
+        ));
+        if let Some((Ok(fenced), _)) = planned(&zones, &DetourRequest { fence, ..request }, &things)
+        {
             let free = way.as_ref().expect("the same way without a fence");
-            prop_assert!(aside || length_m(free) < length_m(&fenced) + 0.1 || free[1].z != fenced[1].z);
+            prop_assert!(
+                aside || length_m(free) < length_m(&fenced) + 0.1 || free[1].z != fenced[1].z
+            );
         }
         let Some((alone, _)) = planned(&zones, &request, &[]) else { return Ok(()) };
         if !aside && shortest_m.is_finite() {

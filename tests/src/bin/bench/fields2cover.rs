@@ -7,9 +7,9 @@
 //! all lanes in order, around obstacles; theirs is the best of what it offers ([`routes`]). Its
 //! route planner on OR-tools is not built.
 //!
-//! Lengths are of all lanes and the connections between them. Ours twice: as boards plan, which look
-//! at few changes of the lanes' order, and `searched` as long as the desk does. `length with its
-//! lanes` is our order, as boards plan, of the very lanes of their best way ([`same_lanes`]).
+//! Lengths are of all lanes and the connections between them. Ours twice: as boards plan, which
+//! look at few changes of the lanes' order, and `searched` as long as the desk does. `length with
+//! its lanes` is our order, as boards plan, of the very lanes of their best way ([`same_lanes`]).
 //! `length for what is swept` divides both lengths by the share of the field that lies beside a
 //! lane, no further than half its width.
 //!
@@ -35,7 +35,7 @@ use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 
-use self::routes::{Best, Obstacles, Place};
+use self::routes::{Best, Obstacles, Place, wide};
 use crate::row::Row;
 
 /// Runs of each field; their median time counts.
@@ -196,10 +196,6 @@ struct Way {
     lanes: Vec<[Place; 2]>,
 }
 
-fn wide(at: Flat) -> Place {
-    [f64::from(at.x), f64::from(at.y)]
-}
-
 /// Rows of length and time for each field; none without a checkout.
 ///
 /// # Errors
@@ -257,7 +253,9 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
         theirs.iter().min_by(|a, b| a.total_m.total_cmp(&b.total_m)).context("theirs has a way")?;
     let (total_m, time_us) = (shortest.total_m, shortest.time_us);
     let swept = [&first.lanes, &shortest.lanes].map(|lanes| field.swept_share(lanes, lane_m));
-    let same_lanes_m = same_lanes::way_m(field, &shortest.lanes, lane_m)?;
+    let outer = &field.vertices[..usize::from(field.rings[0].end)];
+    let same_lanes_m =
+        same_lanes::way_m(outer, &field.convex_obstacles(), &shortest.lanes, lane_m)?;
     println!("  ours with its lanes: {same_lanes_m:.1} m; swept by ours {:.2} %", 100.0 * swept[0]);
     let row = |what, ours: f64, theirs: f64, required, unit| Row {
         name: format!("{name}, {what}"),

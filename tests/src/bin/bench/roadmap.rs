@@ -100,7 +100,6 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     }
     print_sizes(&theirs, &ours);
     print_parts(&whole);
-    type Value = fn(&Theirs) -> f64;
     let build: Value = |t| t.nodes_ms + t.edges_ms;
     let [by_one, by_two, labelled, matrix] = times;
     let whole = whole.iter().map(|timing| timing.roadmap_s * 1e3).collect();
@@ -113,24 +112,34 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     ];
     Ok(all
         .into_iter()
-        .map(|(name, value, required, n, times)| {
-            // One ratio a round: a slow spell of the machine strikes both programs.
-            let ratios = theirs
-                .iter()
-                .zip(times.chunks(REPEATS))
-                .map(|(t, ours)| value(t) / median(ours.to_vec()));
-            let ratio = median(ratios.collect());
-            Row {
-                name: name.into(),
-                ours: median(times),
-                theirs: median(theirs.iter().map(value).collect()),
-                ratio,
-                required,
-                unit: "ms",
-                n,
-            }
-        })
+        .map(|(name, value, required, n, times)| row(name, (required, n), times, &theirs, value))
         .collect())
+}
+
+/// A time of theirs.
+type Value = fn(&Theirs) -> f64;
+
+/// A row of times beside theirs: the ratio that is required, and of how many.
+fn row(
+    name: &str,
+    (required, n): (f64, usize),
+    times: Vec<f64>,
+    theirs: &[Theirs],
+    value: Value,
+) -> Row {
+    // One ratio a round: a slow spell of the machine strikes both programs.
+    let ratios =
+        theirs.iter().zip(times.chunks(REPEATS)).map(|(t, ours)| value(t) / median(ours.to_vec()));
+    let ratio = median(ratios.collect());
+    Row {
+        name: name.into(),
+        ours: median(times),
+        theirs: median(theirs.iter().map(value).collect()),
+        ratio,
+        required,
+        unit: "ms",
+        n,
+    }
 }
 
 /// Times of map and roadmap as a user of `host-sim plan` waits for them, with all parts, in the

@@ -143,7 +143,7 @@ impl Autopilot {
                 self.landing_commanded = true;
             }
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {
-                result = self.arm_or_disarm(now, data.param1 == 1.0)
+                result = self.arm_or_disarm(now, data.param1 == 1.0);
             }
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
                 if self.armed && self.mode == self.kind.setpoint_mode() {

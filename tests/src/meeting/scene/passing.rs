@@ -59,16 +59,7 @@ pub fn passing(seed: u64) -> Scene {
         }
     };
     let mut workspace = Box::new(ScheduleWorkspace::new());
-    let mut flights: Vec<Flight<WAYPOINTS>> = Vec::new();
-    for (i, points) in [first, second].into_iter().enumerate() {
-        let pad = at_height(points[0], 0.0);
-        let way = Way { pad, points, ground_z: 0.0 };
-        let mut flight = flight(i as u8 + 1, &way).expect("a short flight");
-        let departs =
-            schedule::earliest_departure(&SCHEDULE, &flight, 0.0, flights.iter(), &mut workspace);
-        flight.depart_s = departs.expect("room for two");
-        flights.push(flight);
-    }
+    let flights = scheduled([first, second], &mut workspace);
     let vehicles = (0..2).map(|i| vehicle(&flights, i, true, &mut workspace, &mut dice)).collect();
     let start = |vehicle| Happening { at_s: START_S, vehicle, what: What::Start };
     Scene {
@@ -82,4 +73,19 @@ pub fn passing(seed: u64) -> Scene {
         loss: 0.3,
         liar: None,
     }
+}
+
+/// The flights along these ways, the second as early as the first allows.
+fn scheduled(ways: [Vec<Point>; 2], workspace: &mut ScheduleWorkspace) -> Vec<Flight<WAYPOINTS>> {
+    let mut flights: Vec<Flight<WAYPOINTS>> = Vec::new();
+    for (i, points) in ways.into_iter().enumerate() {
+        let pad = at_height(points[0], 0.0);
+        let way = Way { pad, points, ground_z: 0.0 };
+        let mut flight = flight(i as u8 + 1, &way).expect("a short flight");
+        let departs =
+            schedule::earliest_departure(&SCHEDULE, &flight, 0.0, flights.iter(), workspace);
+        flight.depart_s = departs.expect("room for two");
+        flights.push(flight);
+    }
+    flights
 }

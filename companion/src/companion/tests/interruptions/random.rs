@@ -98,7 +98,7 @@ impl Watch {
                 self.armed_once &= b.armed || !resumed;
             }
             Land => {
-                self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted
+                self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted;
             }
             Return => _ = order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
             Start => {
@@ -129,7 +129,9 @@ impl Watch {
 }
 
 proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(if cfg!(debug_assertions) { 300 } else { 3000 }))]
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(
+        if cfg!(debug_assertions) { 300 } else { 3000 }
+    ))]
     #[test]
     fn whatever_happens_somebody_flies_and_nothing_accepted_is_forgotten(
         px4 in proptest::prelude::any::<bool>(),
@@ -138,8 +140,14 @@ proptest::proptest! {
     ) {
         let mut b = bench(if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot });
         b.start();
-        let mut watch =
-            Watch { unattended: 0, commands: 0, landing: false, piloted: 0, armed_once: false, log: Vec::new() };
+        let mut watch = Watch {
+            unattended: 0,
+            commands: 0,
+            landing: false,
+            piloted: 0,
+            armed_once: false,
+            log: Vec::new(),
+        };
         (0..begin).for_each(|_| watch.tick(&mut b));
         for (what, ticks) in script {
             watch.happen(&mut b, ALL[what]);
@@ -162,6 +170,14 @@ proptest::proptest! {
             (0..20).for_each(|_| watch.tick(&mut b));
         }
         let down = b.on_ground() && !b.armed;
-        proptest::prop_assert!(down, "{:?} {} {:?} {:#?} {:?}", b.state(), b.mode, b.enu, watch.log, b.texts);
+        proptest::prop_assert!(
+            down,
+            "{:?} {} {:?} {:#?} {:?}",
+            b.state(),
+            b.mode,
+            b.enu,
+            watch.log,
+            b.texts
+        );
     }
 }

@@ -140,7 +140,11 @@ fn widest(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<
 
 proptest! {
     #[test]
-    fn nothing_is_left_out(seed in any::<u64>(), stops in any::<bool>(), distance in any::<bool>()) {
+    fn nothing_is_left_out(
+        seed in any::<u64>(),
+        stops in any::<bool>(),
+        distance in any::<bool>(),
+    ) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
         let (pictures_m, on) = fly(&photographs, 0.0, stops, seed);
         prop_assert_eq!(widest(&photographs, &pictures_m, LATE_M), Ok(()), "{:?}", pictures_m);
@@ -148,7 +152,11 @@ proptest! {
         if !stops {
             // By distance the last of a stretch may be taken twice.
             let least = photographs.count(&path());
-            prop_assert!((least..=least + 3).contains(&(pictures_m.len() as u32)), "{:?}", pictures_m);
+            prop_assert!(
+                (least..=least + 3).contains(&(pictures_m.len() as u32)),
+                "{:?}",
+                pictures_m
+            );
         }
     }
 

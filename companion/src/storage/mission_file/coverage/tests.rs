@@ -247,7 +247,9 @@ fn what_is_not_sound_is_refused_by_name() {
 proptest! {
     /// Whatever a file with the right CRC says, it is refused or planned, soon and without a panic.
     #[test]
-    fn any_bytes_are_survived(patches in proptest::collection::vec((20usize..300, any::<u8>()), 0..8)) {
+    fn any_bytes_are_survived(
+        patches in proptest::collection::vec((20usize..300, any::<u8>()), 0..8),
+    ) {
         let mut bytes = file();
         let end = bytes.len() - 4;
         for (at, byte) in patches {
@@ -256,7 +258,13 @@ proptest! {
         let mut memory = Box::<Memory>::default();
         if let Some(Ok(())) = planned(&sealed(bytes), &mut memory) {
             for flight in &memory.2.flights {
-                prop_assert!(flight.path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite())));
+                prop_assert!(
+                    flight
+                        .path
+                        .waypoints()
+                        .iter()
+                        .all(|w| w.position.iter().all(|c| c.is_finite()))
+                );
             }
         }
     }

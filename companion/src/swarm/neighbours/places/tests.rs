@@ -196,3 +196,58 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
     }
     assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
 }
+
+#[test]
+fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
+    let mut rng = Pcg32::seed_from_u64(11);
+    for _ in 0..500 {
+        let (apart_m, stray_m) = (uniform(&mut rng, 1.0, 3.0), uniform(&mut rng, 0.0, 6.0));
+        for (flags, in_air) in
+            [(OUT_OF_PLAN, true), (0, true), (OUT_OF_PLAN | GROUNDED, false), (GROUNDED, false)]
+        {
+            let mut table = joined(0);
+            table.form_fleet(64.0, None, stray_m);
+            table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+            let told = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
+            table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+            // Whatever shape is told, no place is free that may be too near by the truth.
+            let away = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0)
+                .normalize();
+            let truly_m = apart_m + if in_air { stray_m } else { 0.0 };
+            let here = table.contacts[1].state.position;
+            let near = here + away * (0.99 * truly_m);
+            let mut free = true;
+            table.for_each_place(Instant::from_millis(100), [apart_m; 2], |off| {
+                let down_m = (off.from.z - near.z).clamp(0.0, off.from.z - off.to.z);
+                let nearest = off.from - Point::new(0.0, 0.0, down_m);
+                free &= (near - nearest).norm() >= off.radius_m;
+            });
+            assert!(!free, "{flags:#x}: {apart_m} + {stray_m}");
+        }
+    }
+}
+
+#[test]
+fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes() {
+    let mut rng = Pcg32::seed_from_u64(12);
+    for _ in 0..200 {
+        let mut table = joined(0);
+        let over_area = uniform(&mut rng, 0.0, 4.0) > 1.0;
+        if over_area {
+            table.form_fleet(64.0, None, 1.0);
+        }
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+        let told = Intent { ground_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
+        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        let here = table.contacts[1].state.position;
+        let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
+        let silent_s = uniform(&mut rng, 1.0, 1200.0);
+        let (mut kept, mut lies) = (false, false);
+        table.for_each_zone_of(1, Instant::from_millis((1000.0 * silent_s) as u64), 2.0, |off| {
+            kept |= off.from.z >= below.z && off.to.z <= below.z;
+            lies |= off.to.z <= -29.0;
+        });
+        assert_eq!(kept, !over_area || silent_s < 600.0, "{silent_s} s, {here:?}, {below:?}");
+        assert!(lies, "{silent_s} s: it lies there");
+    }
+}

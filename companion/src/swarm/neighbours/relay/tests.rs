@@ -119,7 +119,9 @@ proptest! {
         for step in 0..60 {
             let lost: List<_> = lost[step * 8..].iter().take(8).map(|draw| *draw == 0).collect();
             swarm.step(&[true; 8], &lost, true);
-            for (of, other) in (0..usize::from(count)).flat_map(|a| (0..usize::from(count)).map(move |b| (a, b))) {
+            for (of, other) in
+                (0..usize::from(count)).flat_map(|a| (0..usize::from(count)).map(move |b| (a, b)))
+            {
                 if let (true, Some(believed_m)) = (of != other, swarm.believed_m(of, other)) {
                     prop_assert!(believed_m <= swarm.progress_m(other) + 1e-3);
                 }

@@ -8,9 +8,14 @@
 //! nothing.
 
 use anyhow::{Context, Result};
+use planner_core::coverage::Flat;
 
 /// East and north, metres.
 pub type Place = [f64; 2];
+
+pub fn wide(at: Flat) -> Place {
+    [f64::from(at.x), f64::from(at.y)]
+}
 
 /// Scale of the obstacles: paths run along their borders, where its lanes end.
 const SHRUNK: f64 = 0.999;

@@ -10,20 +10,23 @@ use planner_core::coverage::given::order_given_lanes;
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
 
-use super::Field;
-use super::routes::Place;
+use super::routes::{Obstacles, Place, wide};
 
-/// Length of our way along these lanes and between them, metres: searched as long as boards search,
-/// measured as theirs is.
+/// Length of our way along these lanes and between them, around `obstacles` in the ring `outer`,
+/// metres: searched as long as boards search, measured as theirs is.
 ///
 /// # Errors
 /// The field or its lanes are refused.
-pub fn way_m(field: &Field, lanes: &[[Place; 2]], lane_m: f32) -> Result<f64> {
-    let obstacles = field.convex_obstacles();
+pub fn way_m(
+    outer: &[Flat],
+    obstacles: &Obstacles,
+    lanes: &[[Place; 2]],
+    lane_m: f32,
+) -> Result<f64> {
     // Its lanes end at the obstacles: those of our graph are as much smaller as those it is
     // measured with.
-    let mut vertices = field.vertices[..usize::from(field.rings[0].end)].to_vec();
-    let mut rings = vec![field.rings[0]];
+    let mut vertices = outer.to_vec();
+    let mut rings = vec![Ring { end: outer.len() as u16, kind: RingKind::Outer }];
     for ring in obstacles.rings() {
         vertices.extend(ring.iter().map(narrow));
         rings.push(Ring { end: vertices.len() as u16, kind: RingKind::NoFly });
@@ -38,7 +41,7 @@ pub fn way_m(field: &Field, lanes: &[[Place; 2]], lane_m: f32) -> Result<f64> {
     order_given_lanes(&given, &spacing, MAX_ORDER_CHANGES, &transit, &mut found)
         .map_err(|error| anyhow::anyhow!("{error:?}"))?;
     let ordered: Vec<[Place; 2]> =
-        found.lanes().iter().map(|lane| [lane.from, lane.to].map(super::wide)).collect();
+        found.lanes().iter().map(|lane| [lane.from, lane.to].map(wide)).collect();
     Ok(obstacles.measure(&ordered).1)
 }
 

@@ -1,0 +1,60 @@
+//! The answers to requests.
+
+use super::packet::{ACK, HEADER_LEN, MAX_DATA, NAK, NakError, Request};
+use super::{Ftp, Reply};
+
+impl Ftp {
+    /// Sends the reply, and remembers it for repetitions of the request.
+    pub(super) fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
+        self.duplicates.remember(request, result, self.now);
+        self.respond(request, result);
+    }
+
+    pub(super) fn respond(&mut self, request: &Request, result: Result<(), NakError>) {
+        match result {
+            Ok(()) => self.ack(request, &[]),
+            Err(error) => self.nak(request, error),
+        }
+    }
+
+    pub(super) fn ack(&mut self, request: &Request, data: &[u8]) {
+        self.set_reply(request, ACK, 0, data);
+    }
+
+    pub(super) fn nak(&mut self, request: &Request, error: NakError) {
+        let code = match error {
+            NakError::Errno(errno) => return self.set_reply(request, NAK, 0, &[2, errno]),
+            NakError::InvalidSize => 3,
+            NakError::InvalidSession => 4,
+            NakError::Sessions => 5,
+            NakError::EndOfFile => 6,
+            NakError::Unknown => 7,
+            NakError::Protected => 9,
+            NakError::NotFound => 10,
+        };
+        self.set_reply(request, NAK, 0, &[code]);
+    }
+
+    pub(super) fn set_reply(
+        &mut self,
+        request: &Request,
+        opcode: u8,
+        burst_complete: u8,
+        data: &[u8],
+    ) {
+        let data = &data[..data.len().min(MAX_DATA)];
+        let mut packet = [0; HEADER_LEN + MAX_DATA];
+        packet[..2].copy_from_slice(&request.sequence.wrapping_add(1).to_le_bytes());
+        packet[2..8].copy_from_slice(&[
+            request.session,
+            opcode,
+            data.len() as u8,
+            request.opcode,
+            burst_complete,
+            0,
+        ]);
+        packet[8..12].copy_from_slice(&request.offset.to_le_bytes());
+        packet[HEADER_LEN..HEADER_LEN + data.len()].copy_from_slice(data);
+        self.reply = Some(Reply { link: request.link, to: request.client, packet });
+    }
+}

@@ -1,0 +1,80 @@
+//! What calls at their limits are made of, and what becomes of their answers.
+
+use planner_core::Point;
+
+/// Numbers that make code fail which does not check its arguments.
+pub(super) const HARD_NUMBERS: [f32; 14] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.25,
+    7.5,
+    f32::MIN_POSITIVE,
+    -1e-40,
+    1e7,
+    -1e19,
+    f32::MAX,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::NAN,
+];
+
+/// Is given the name of each call before it is made, so that a panic can be attributed.
+pub trait Listener {
+    /// Called before each call; `name` is the callee's file, type (if any) and function.
+    fn next(&mut self, name: &'static str);
+}
+
+/// Makes calls and keeps a checksum of their results.
+pub struct Results<'a, L> {
+    listener: &'a mut L,
+    sum: u32,
+}
+
+impl<'a, L: Listener> Results<'a, L> {
+    /// No results yet.
+    pub fn new(listener: &'a mut L) -> Self {
+        Self { listener, sum: 0 }
+    }
+
+    /// Reports `name` to the listener, then calls `work`.
+    pub(super) fn call<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        self.listener.next(name);
+        work()
+    }
+
+    /// Adds a number to the checksum; all NaNs count as the same.
+    pub(super) fn add(&mut self, answer: f32) {
+        let bits = if answer.is_nan() { 0x7fc0_0000 } else { answer.to_bits() };
+        self.add_count(bits as usize);
+    }
+
+    pub(super) fn add_point(&mut self, answer: &Point) {
+        answer.iter().for_each(|&c| self.add(c));
+    }
+
+    pub(super) fn add_count(&mut self, answer: usize) {
+        self.sum = self.sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ answer as u32;
+    }
+
+    pub(super) fn add_bool(&mut self, answer: bool) {
+        self.add_count(usize::from(answer));
+    }
+
+    /// The checksum of all results so far.
+    pub fn sum(&self) -> u32 {
+        self.sum
+    }
+}
+
+/// Points whose coordinates are [`HARD_NUMBERS`].
+pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
+    let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
+    (0..HARD_NUMBERS.len() * 3)
+        .map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
+}
+
+pub(super) fn is_good(number: f32) -> bool {
+    number > 0.0 && number.is_finite()
+}

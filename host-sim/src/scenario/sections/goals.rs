@@ -1,0 +1,203 @@
+//! Reads the scenario of a mission with goals.
+
+use std::path::Path;
+
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+use planner_core::roadmap::MAX_COORDINATE_M;
+
+use super::checks::{
+    VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins,
+};
+use super::{
+    Common, DEFAULT_TIME_LIMIT_S, check_list_len, empty_table, fence_and_ground_stations,
+    read_common, read_faults, read_map, read_place, read_roadmap, read_unsupported, read_vehicles,
+    unsupported_error,
+};
+use crate::capacity::VEHICLES;
+use crate::files;
+use crate::margins;
+use crate::quote::{quoted, quoted_path};
+use crate::scenario::error::ScenarioError;
+use crate::scenario::reader::{Result, Span, Table, Text, Value};
+use crate::scenario::{Mission, Mode, Objective, Scenario, Vehicle};
+
+/// Reads the scenario of a mission with goals.
+pub(in crate::scenario) fn goals_mission(
+    text: Text<'_>,
+    root: &Table<'_>,
+    folder: &Path,
+) -> Result<Scenario> {
+    let mut unsupported = Vec::new();
+    let Common { seed, deconfliction, simulation, estimator_span } =
+        read_common(text, root, (margins::PAIR_STRAY_M, DEFAULT_TIME_LIMIT_S))?;
+    let map_table =
+        root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
+    let (map, has_origin) = read_map(&map_table, folder)?;
+    let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
+    let roadmap = read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
+    let origin = has_origin.then_some(map.origin);
+    let mission_value = root.get("mission");
+    let vehicles = read_vehicles(
+        &root.required("vehicles", "add a `[[vehicles]]` with `id` and `start` for each")?,
+        origin.as_ref(),
+        &mut unsupported,
+    )?;
+    let mission_table = mission_value.as_ref().map(Value::table).transpose()?;
+    let mission_table = mission_table.unwrap_or_else(|| empty_table(text, "mission"));
+    let (mission, mode_span) = read_mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
+    let faults = read_faults(root, &vehicles)?;
+    if let Some(area) = root.get("area") {
+        unsupported.push(unsupported_error(text, &area.span, "[area] beside [map]"));
+    }
+    let formation = read_unsupported(root, "formation", &mut unsupported)?;
+    if let Some(span) = &mode_span {
+        check_mode(text, root, mission.mode, span, &mut unsupported)?;
+    }
+    check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
+    check_goals(text, &vehicles, &mission)?;
+    check_inside(&mission_table, &vehicles, &mission)?;
+    let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
+    let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    check_goals_apart(
+        &mission_table,
+        &mission,
+        deconfliction.safety_distance_m,
+        &simulation,
+        &vehicles,
+    )?;
+    if let Some(span) = &estimator_span {
+        check_margins(text, span, Some(&roadmap), &deconfliction, &simulation, &vehicles)?;
+    }
+    Ok(Scenario {
+        path: text.file.to_owned(),
+        text: text.text.to_owned(),
+        seed,
+        map,
+        roadmap,
+        mission,
+        vehicles,
+        vehicle_places,
+        deconfliction,
+        simulation,
+        faults,
+        area: None,
+        formation,
+        unsupported,
+    })
+}
+
+/// Whether goals are flown to in this mode.
+fn check_mode(
+    text: Text<'_>,
+    root: &Table<'_>,
+    mode: Mode,
+    span: &Span,
+    unsupported: &mut Vec<ScenarioError>,
+) -> Result<()> {
+    match mode {
+        Mode::Coverage if root.get("area").is_none() => {
+            let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
+            return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
+        }
+        Mode::Formation => unsupported.push(unsupported_error(text, span, "this mission.mode")),
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Reads `[mission]`; the span is where its `mode` stands, if it is given.
+fn read_mission(
+    table: &Table<'_>,
+    folder: &Path,
+    origin: Option<&Geodetic>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+) -> Result<(Mission, Option<Span>)> {
+    let mode_span = table.get("mode").map(|v| v.span);
+    let mode = table.one_of(
+        "mode",
+        Mode::Unlabelled,
+        &[
+            ("unlabelled", Mode::Unlabelled),
+            ("labelled", Mode::Labelled),
+            ("single-goal", Mode::SingleGoal),
+            ("coverage", Mode::Coverage),
+            ("formation", Mode::Formation),
+            ("unlabeled", Mode::Unlabelled),
+            ("labeled", Mode::Labelled),
+        ],
+    )?;
+    let objective = table.one_of(
+        "objective",
+        Objective::Total,
+        &[("total", Objective::Total), ("makespan", Objective::Makespan)],
+    )?;
+    let cruise_mps = table.f32("cruise_mps", 2.0, 0.01..=100.0)?;
+    let (given, file) = (table.get("goals"), table.get("goals_file"));
+    let goals = match (&given, &file) {
+        (Some(_), Some(file)) => {
+            return Err(file.error("cannot stand beside mission.goals: give one of them"));
+        }
+        (Some(list), None) => {
+            let goals = list.items()?;
+            check_list_len(list, goals.len(), VEHICLES, "goals")?;
+            goals
+                .iter()
+                .map(|v| Ok((read_place(v, origin)?, table.text.line(&v.span))))
+                .collect::<Result<_>>()?
+        }
+        (None, Some(file)) => read_goals_file(file, folder)?,
+        (None, None) => Vec::new(),
+    };
+    let (goals, goal_places): (Vec<Point>, Vec<String>) = goals.into_iter().unzip();
+    let takes_goals = !matches!(mode, Mode::Coverage | Mode::Formation);
+    if takes_goals && goals.is_empty() {
+        let span = given.or(file).map_or(table.span.clone(), |v| v.span);
+        let hint = "add `goals = [[east, north, up], …]` in metres, or `goals_file = \"FILE\"`, to [mission]";
+        return Err(table.text.with_hint(&span, "mission.goals is missing or empty", hint));
+    }
+    if mode == Mode::SingleGoal && goals.len() != 1 {
+        let span = given.or(file).map_or(table.span.clone(), |v| v.span);
+        let why = format!("mission.mode \"single-goal\" takes one goal, not {}", goals.len());
+        return Err(table.text.error(&span, why));
+    }
+    let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
+    table.finish()?;
+    let mission =
+        Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
+    Ok((mission, mode_span))
+}
+
+/// Reads goals, one `x y z` a line, each with its `FILE:LINE`; skips empty lines and `#` lines.
+fn read_goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
+    let path = folder.join(value.str()?);
+    let text = files::read_text(&path).map_err(|error| {
+        value.error(&format!("cannot be read: {}: {error}", quoted_path(&path)))
+    })?;
+    let mut goals = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let numbers: Vec<f32> = line.split_whitespace().map_while(|w| w.parse().ok()).collect();
+        match numbers.as_slice() {
+            &[x, y, z]
+                if line.split_whitespace().count() == 3
+                    && numbers.iter().all(|n| n.is_finite() && n.abs() <= MAX_COORDINATE_M) =>
+            {
+                let place = format!("{}:{}", quoted_path(&path), index + 1);
+                goals.push((Point::new(x, y, z), place));
+                check_list_len(value, goals.len(), VEHICLES, "goals")?;
+            }
+            _ => {
+                let place = format!("{}:{}", quoted_path(&path), index + 1);
+                return Err(value.error(&format!(
+                    "is malformed: {place}: expected `x y z` in metres, found `{}`",
+                    quoted(line)
+                )));
+            }
+        }
+    }
+    Ok(goals)
+}

@@ -1,0 +1,54 @@
+//! A vehicle as the referee sees it.
+
+use companion::State;
+
+use super::SimulatedVehicle;
+use crate::swarm::board::Board;
+use crate::swarm::referee::{Observation, Phase};
+
+impl SimulatedVehicle {
+    /// The vehicle's true position and phase, for the referee.
+    pub fn observation(&self) -> Observation {
+        let truth = self.autopilot.true_state();
+        let state = self.state();
+        // A board's reported state is up to a second old; the autopilot's landing is known at once.
+        let lands = self.board.is_some() && self.autopilot.is_landing();
+        let phase = match (truth.touching, on_path(state) && !lands) {
+            (touching, _) if self.wrecked => {
+                if touching {
+                    Phase::Wreck
+                } else {
+                    Phase::Falling
+                }
+            }
+            (true, _) if !truth.armed => Phase::Grounded,
+            (false, true) => Phase::Flying,
+            _ => Phase::TakeOffOrLanding,
+        };
+        // A vehicle that stands by command of operator or pilot is not deadlocked.
+        let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
+        let progress_m = self
+            .board
+            .as_ref()
+            .map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
+        Observation { position: truth.position, phase, ordered, progress_m }
+    }
+}
+
+fn on_path(state: State) -> bool {
+    use State::*;
+    matches!(
+        state,
+        Follow
+            | Paused
+            | Alone
+            | Blocked
+            | Replanning
+            | Dividing
+            | Stopping
+            | AutopilotSilent
+            | PositionLost
+            | PilotControl
+            | PilotReturned
+    )
+}

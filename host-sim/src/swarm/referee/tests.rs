@@ -1,0 +1,132 @@
+use super::*;
+use planner_core::voxel::{GridShape, Outside};
+
+/// A floor at z < 1 and a wall at x > 8 in a 10 m cube of 1 m cells.
+fn with_monitor(test: impl FnOnce(Referee<'_>)) {
+    let shape = GridShape { dims: [10; 3], min: Point::zeros(), resolution_m: 1.0 };
+    let mut words = vec![0; shape.brick_count()];
+    for i in 0..10 {
+        for j in 0..10 {
+            for k in 0..10 {
+                if k == 0 || i >= 8 {
+                    let (word, mask) = shape.address([i, j, k]);
+                    words[word] |= mask;
+                }
+            }
+        }
+    }
+    let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
+    let field = ClearanceField::new(&grid);
+    test(Referee::new(grid, &field, 1.5, &[(7, 0.5), (9, 0.5)]));
+}
+
+fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
+    Observation { position: Point::new(x, y, z), phase, ordered: false, progress_m: Some(x) }
+}
+
+#[test]
+fn a_body_in_the_wall_is_one_contact_however_long() {
+    with_monitor(|mut referee| {
+        let far = at(2.0, 8.0, 5.0, Phase::Flying);
+        for (step, x) in [7.0, 7.6, 7.7, 7.0, 7.6].into_iter().enumerate() {
+            referee.observe(step as f64 * 0.004, &[at(x, 2.0, 5.0, Phase::Flying), far]);
+        }
+        assert_eq!(referee.wall_contacts, 2);
+        assert!((referee.min_clearance_m - 0.3).abs() < 1e-5, "{}", referee.min_clearance_m);
+    });
+}
+
+#[test]
+fn the_floor_is_none_while_landing_but_a_wall_is() {
+    with_monitor(|mut referee| {
+        let far = at(2.0, 8.0, 5.0, Phase::Flying);
+        referee.observe(0.0, &[at(4.0, 2.0, 1.4, Phase::TakeOffOrLanding), far]);
+        assert_eq!(referee.wall_contacts, 0);
+        referee.observe(0.1, &[at(4.0, 2.0, 1.4, Phase::Flying), far]);
+        assert_eq!(referee.wall_contacts, 1);
+        referee.observe(0.2, &[at(4.0, 2.0, 5.0, Phase::Flying), far]);
+        referee.observe(0.3, &[at(7.7, 2.0, 1.6, Phase::TakeOffOrLanding), far]);
+        assert_eq!(referee.wall_contacts, 2);
+    });
+}
+
+#[test]
+fn a_near_pair_is_one_violation_unless_both_stand() {
+    with_monitor(|mut referee| {
+        let pair = |apart: f32, phase| {
+            [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)]
+        };
+        referee.observe(0.0, &pair(1.0, Phase::Grounded));
+        assert_eq!(referee.violations, 0);
+        referee.observe(0.1, &pair(1.4, Phase::Flying));
+        referee.observe(0.2, &pair(1.3, Phase::Flying));
+        assert_eq!(referee.violations, 1);
+        // Of the two vehicles the text names the other one, by its id.
+        assert_eq!(
+            (referee.incidents[0].1, &*referee.incidents[0].2),
+            (1, "nearer than the safety distance to vehicle 7")
+        );
+        assert!((referee.min_separation_m - 1.3).abs() < 1e-6);
+    });
+}
+
+#[test]
+fn a_wreck_may_be_passed_near_but_not_touched() {
+    with_monitor(|mut referee| {
+        let wreck = at(2.0, 2.0, 1.5, Phase::Wreck);
+        for (step, z) in [3.0, 2.6, 2.4, 2.3, 2.6].into_iter().enumerate() {
+            referee.observe(step as f64 * 0.004, &[at(2.0, 2.0, z, Phase::Flying), wreck]);
+        }
+        assert_eq!((referee.wall_contacts, referee.violations), (1, 0));
+    });
+}
+
+#[test]
+fn hovering_on_for_twenty_seconds_is_a_deadlock() {
+    with_monitor(|mut referee| {
+        let seen = [at(2.0, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        for step in 0..300 {
+            referee.observe(f64::from(step) * 0.1, &seen);
+        }
+        assert_eq!(referee.deadlocks, 1);
+    });
+}
+
+#[test]
+fn one_that_tells_of_no_progress_makes_some_by_flying_on() {
+    with_monitor(|mut referee| {
+        let silent = |x| Observation { progress_m: None, ..at(x, 2.0, 5.0, Phase::Flying) };
+        let rests = at(5.0, 5.0, 5.0, Phase::Grounded);
+        for step in 0..300 {
+            referee.observe(f64::from(step) * 0.1, &[silent(2.0 + step as f32 * 0.02), rests]);
+        }
+        assert_eq!(referee.deadlocks, 0);
+        for step in 300..600 {
+            let sways = if step % 20 < 10 { 0.2 } else { -0.2 };
+            referee.observe(f64::from(step) * 0.1, &[silent(5.0 + sways), rests]);
+        }
+        assert_eq!(referee.deadlocks, 1);
+    });
+}
+
+#[test]
+fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
+    with_monitor(|mut referee| {
+        referee.waits_end = true;
+        let on_path = |x| [at(x, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        for step in 0..300 {
+            referee.observe(f64::from(step) * 0.1, &on_path(2.0));
+        }
+        assert_eq!(referee.deadlocks, 1);
+        referee.observe(30.0, &on_path(2.5));
+        assert_eq!(referee.deadlocks, 0);
+        for step in 301..600 {
+            referee.observe(f64::from(step) * 0.1, &on_path(2.5));
+        }
+        assert_eq!(referee.deadlocks, 1);
+        let lands =
+            [at(2.5, 2.0, 5.0, Phase::TakeOffOrLanding), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        referee.observe(60.0, &lands);
+        assert_eq!(referee.deadlocks, 0);
+    });
+}

@@ -1,0 +1,108 @@
+//! The path of a flight, made leg by leg: straight, around no-fly zones, or along the ground at the
+//! height of pictures.
+
+use heapless::Vec;
+
+use super::super::Flat;
+use super::super::transit::Transit;
+use crate::Point;
+use crate::field::follow::TerrainFollowing;
+use crate::flight::{Path, PathError};
+
+pub(super) fn point_at_height(place: &Flat, height_m: f32) -> Point {
+    Point::new(place.x, place.y, height_m)
+}
+
+/// A flight path that is extended leg by leg.
+pub(super) struct FlightPathBuilder<'a, const N: usize, const W: usize> {
+    pub(super) path: Path<W>,
+    transit: &'a Transit<'a, N>,
+    clearance_m: f32,
+    following: Option<TerrainFollowing<'a>>,
+    /// Last point of the path so far.
+    pub(super) here: Point,
+}
+
+impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
+    /// A path without waypoints; the caller adds the first one, above the pad.
+    pub(super) const fn new(
+        transit: &'a Transit<'a, N>,
+        clearance_m: f32,
+        following: Option<TerrainFollowing<'a>>,
+        here: Point,
+    ) -> Self {
+        Self { path: Path::new(), transit, clearance_m, following, here }
+    }
+
+    /// Appends a straight leg to `place`. Returns the index of its waypoint.
+    pub(super) fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
+        self.path.push(place, self.clearance_m)?;
+        self.here = place;
+        self.path.last().ok_or(PathError::NotFinite)
+    }
+
+    /// Writes the corners of the path from here to `to` around no-fly zones to `corners`.
+    #[inline(never)]
+    fn find_corners_around_zones(&self, to: &Flat, corners: &mut Vec<Flat, N>) {
+        // The routes have finite lengths, so there is a path between all their points.
+        if self.transit.shortest_path(&self.here.xy(), to, corners).is_err() {
+            corners.clear();
+        }
+    }
+
+    /// Appends level legs at `height_m` to `to`, around no-fly zones.
+    pub(super) fn add_legs_around_zones(
+        &mut self,
+        to: &Flat,
+        height_m: f32,
+    ) -> Result<(), PathError> {
+        let mut corners = Vec::new();
+        self.find_corners_around_zones(to, &mut corners);
+        for corner in &corners {
+            self.add_straight_leg(point_at_height(corner, height_m))?;
+        }
+        self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
+    }
+
+    /// Appends the descent to the first lane, which begins below and leads to `end`. Returns the
+    /// index of the waypoint where the lane begins.
+    pub(super) fn descend_to_lane(
+        &mut self,
+        end: &Flat,
+        mission_m: f32,
+    ) -> Result<usize, PathError> {
+        let here = self.here.xy();
+        let begin = self.following.map_or(point_at_height(&here, mission_m), |following| {
+            following.start_point(&here, end)
+        });
+        self.add_straight_leg(begin)
+    }
+
+    /// Appends a leg at picture height, along terrain. Returns the index of its last waypoint.
+    pub(super) fn add_picture_leg(
+        &mut self,
+        to: &Flat,
+        mission_m: f32,
+    ) -> Result<usize, PathError> {
+        let Some(following) = self.following else {
+            return self.add_straight_leg(point_at_height(to, mission_m));
+        };
+        let here = self.here;
+        following.corners_to(&here, to, |corner| self.add_straight_leg(corner).map(|_| ()))?;
+        self.path.last().ok_or(PathError::NotFinite)
+    }
+
+    /// As `add_picture_leg`, but around no-fly zones.
+    pub(super) fn add_picture_legs_around_zones(
+        &mut self,
+        to: &Flat,
+        mission_m: f32,
+    ) -> Result<usize, PathError> {
+        let mut corners = Vec::new();
+        self.find_corners_around_zones(to, &mut corners);
+        for corner in &corners {
+            self.add_picture_leg(corner, mission_m)?;
+        }
+        self.add_picture_leg(to, mission_m)
+    }
+}

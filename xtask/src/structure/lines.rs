@@ -1,0 +1,119 @@
+//! Files and lines beyond the limits. rustfmt breaks lines, but not in macros that it cannot parse,
+//! attributes and comments.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow};
+use proc_macro2::{Delimiter, LineColumn, TokenStream, TokenTree};
+
+/// Lines of a file.
+const LINES: usize = 500;
+/// Characters of a line, as in `rustfmt.toml`.
+const WIDTH: usize = 100;
+/// Folders without sources of ours.
+const OTHERS: [&str; 2] = ["target", ".git"];
+
+/// Exceptions from either limit: file and reason.
+const EXCEPTIONS: &[(&str, &str)] =
+    &[("planner-core/src/safety/tests.rs", "inputs of its properties, on one line each")];
+
+/// What is beyond the limits in all Rust files of the repository, and why it may be.
+pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
+    let mut files = Vec::new();
+    find_sources(Path::new(""), &mut files)?;
+    files.sort();
+    let mut found = Vec::new();
+    for file in files {
+        let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+        let name = file.display().to_string();
+        let exception = EXCEPTIONS.iter().find(|(of, _)| *of == name);
+        for what in beyond_in(&text).with_context(|| name.clone())? {
+            found.push((format!("{name}{what}"), exception.map(|(_, reason)| *reason)));
+        }
+    }
+    Ok(found)
+}
+
+/// The Rust files below a folder of the repository.
+fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    for entry in fs::read_dir(here)? {
+        let entry = entry?;
+        let path = folder.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            if !OTHERS.iter().any(|other| entry.file_name() == *other) {
+                find_sources(&path, files)?;
+            }
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// What is beyond the limits in one file.
+fn beyond_in(text: &str) -> Result<Vec<String>> {
+    let mut found = Vec::new();
+    let count = text.lines().count();
+    if count > LINES {
+        found.push(format!(" has {count} lines, more than {LINES}"));
+    }
+    let is_long = |line: &str| line.chars().count() > WIDTH;
+    if !text.lines().any(is_long) {
+        return Ok(found);
+    }
+    let mut may_be_long = vec![false; count];
+    let tokens = text.parse().map_err(|error| anyhow!("{error}"))?;
+    mark_unbreakable(tokens, &mut may_be_long);
+    for (index, line) in text.lines().enumerate() {
+        let comment = line.trim_start().strip_prefix("//");
+        // Neither a row of a table nor a command can be broken.
+        let is_whole =
+            |comment: &str| comment.trim_start_matches(['/', '!', ' ']).starts_with(['|', '`']);
+        if is_long(line) && !comment.map_or(may_be_long[index], is_whole) {
+            let length = line.chars().count();
+            found.push(format!(":{} has {length} characters, more than {WIDTH}", index + 1));
+        }
+    }
+    Ok(found)
+}
+
+/// Marks the lines of `rustfmt::skip`, those of strings of several lines, and those that a string
+/// makes long.
+fn mark_unbreakable(tokens: TokenStream, lines: &mut [bool]) {
+    let mut is_skipped = false;
+    let mut may_skip = false;
+    for token in tokens {
+        let (start, end) = (token.span().start(), token.span().end());
+        if is_skipped || is_string_beyond(&token, start, end) {
+            lines[start.line - 1..end.line].fill(true);
+        }
+        match token {
+            TokenTree::Punct(punct) => {
+                may_skip = punct.as_char() == '#';
+                is_skipped &= punct.as_char() != ';';
+            }
+            TokenTree::Group(group) => {
+                let is_attribute = may_skip && group.delimiter() == Delimiter::Bracket;
+                may_skip = false;
+                if is_attribute && group.to_string().replace(' ', "").contains("rustfmt::skip") {
+                    is_skipped = true;
+                } else if group.delimiter() == Delimiter::Brace {
+                    is_skipped = false;
+                }
+                mark_unbreakable(group.stream(), lines);
+            }
+            _ => may_skip = false,
+        }
+    }
+}
+
+/// Whether this is a string of several lines, or one across the width.
+fn is_string_beyond(token: &TokenTree, start: LineColumn, end: LineColumn) -> bool {
+    let is_string = matches!(token, TokenTree::Literal(text) if text.to_string().contains('"'));
+    is_string && (end.line > start.line || (start.column < WIDTH && end.column >= WIDTH))
+}
+
+#[cfg(test)]
+mod tests;
