@@ -144,7 +144,7 @@ impl ReachableSet {
     }
 }
 
-/// What [`ReachableSet::segments`] gives: a board takes twice as long for a chain of iterators.
+/// What [`ReachableSet::segments`] gives: from point to point, and the column at last.
 struct Segments<'a> {
     from: &'a Point,
     next: core::slice::Iter<'a, Point>,
