@@ -23,6 +23,7 @@ use fpu::sqrtf;
 use heapless::Vec;
 
 pub use self::own::{Legs, OwnSet};
+use crate::geometry::clamp_share;
 use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision of the filter to the first motion that follows it, seconds: two setpoints.
@@ -84,17 +85,19 @@ impl ReachableSet {
         self.points.push(to).is_ok()
     }
 
-    /// The set from `place` to the first point of `ahead`, then along these points for `length_m`,
-    /// or to the last of them.
-    // Inlined: returning the set by value takes a board long to copy.
-    #[inline(always)]
+    /// The set from `place` along the points `ahead`, for `length_m` from the first of them. The
+    /// set ends where the points end.
+    #[inline]
     pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
         let mut set = Self::at(place);
         set.extend_along(ahead, length_m);
         set
     }
 
-    fn extend_along(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
+    /// Adds to a set of one place what [`Self::along`] leads it along: a board takes long to copy
+    /// what that returns.
+    #[inline]
+    pub fn extend_along(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
         let (mut left_m, mut last) = (length_m, None);
         for point in ahead {
             let Some(from) = last.replace(point) else {
@@ -132,10 +135,35 @@ impl ReachableSet {
         self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
     }
 
-    /// The legs of the polyline, at least one (of length 0 for a single point), and the column.
-    fn segments(&self) -> impl Iterator<Item = (&Point, &Point)> {
+    /// Legs of the set, at least one, and the column.
+    #[inline]
+    fn segments(&self) -> Segments<'_> {
+        let first = &self.points[0];
         let next = if self.points.len() > 1 { &self.points[1..] } else { &self.points[..] };
-        self.points.iter().zip(next).chain(self.foot.as_ref().map(|foot| (&self.points[0], foot)))
+        Segments {
+            from: first,
+            next: next.iter(),
+            column: self.foot.as_ref().map(|foot| (first, foot)),
+        }
+    }
+}
+
+/// What [`ReachableSet::segments`] gives: from point to point, and the column at last.
+struct Segments<'a> {
+    from: &'a Point,
+    next: core::slice::Iter<'a, Point>,
+    column: Option<(&'a Point, &'a Point)>,
+}
+
+impl<'a> Iterator for Segments<'a> {
+    type Item = (&'a Point, &'a Point);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        match self.next.next() {
+            Some(to) => Some((core::mem::replace(&mut self.from, to), to)),
+            None => self.column.take(),
+        }
     }
 }
 
@@ -256,7 +284,7 @@ fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
     let leg = to - from;
     let length_sq = leg.norm_squared();
     let share = if length_sq > 0.0 { (position - from).dot(&leg) / length_sq } else { 0.0 };
-    from + leg * share.clamp(0.0, 1.0)
+    from + leg * clamp_share(share)
 }
 
 /// Bounds of a neighbour's motion, from which its reachable set is computed.
@@ -280,6 +308,13 @@ impl MotionBounds {
             ("silent_s", self.silent_s),
         ])
     }
+}
+
+/// The lesser of two, `b` where `a` is no number. A board takes three times as long for `min`,
+/// which asks the same of `b`.
+#[inline]
+fn less(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 impl NeighbourMotion<'_> {
@@ -307,8 +342,8 @@ impl NeighbourMotion<'_> {
             self.place_on_points.flown_beyond_m()
         };
         if first_m < OFF_REPORTED_PATH_M {
-            // The neighbour is on its points, so it gets no further than these lead.
-            return (along_m + more_m + OFF_REPORTED_PATH_M).min(first_m + self.extent_m);
+            // On its points, and no further than those lead.
+            return less(along_m + more_m + OFF_REPORTED_PATH_M, first_m + self.extent_m);
         }
         along_m + more_m + self.lateral_reach_m(bounds) + OFF_REPORTED_PATH_M
     }
@@ -321,8 +356,8 @@ impl NeighbourMotion<'_> {
 
     #[inline]
     fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
-        // The neighbour notices that no vehicle hears it by messages that are as late as its own.
-        bounds.speed_max_mps * self.data_age_s().min(bounds.silent_s + 2.0 * self.delay_s)
+        // The neighbour learns that no vehicle hears it by messages that are as late as its own.
+        bounds.speed_max_mps * less(self.data_age_s(), bounds.silent_s + 2.0 * self.delay_s)
     }
 
     /// Distance that the neighbour may fly until it has stopped, with `ahead_s` more seconds of
@@ -334,8 +369,9 @@ impl NeighbourMotion<'_> {
         }
         // The neighbour may have begun to accelerate since it was heard.
         let gained_mps = bounds.braking.accel_mps2 * (self.data_age_s() + REACTION_S);
-        let most_mps = self.speed_mps.max(bounds.speed_max_mps);
-        let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
+        let max_mps = bounds.speed_max_mps;
+        let most_mps = if self.speed_mps > max_mps { self.speed_mps } else { max_mps };
+        let speed_mps = less(less(self.speed_mps + gained_mps, most_mps), 2.0 * max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
         speed_mps * (self.data_age_s() + REACTION_S + MAX_LAG_S)
             + stop_m

@@ -108,11 +108,16 @@ impl<'a> OwnSet<'a> {
         apart(0) || apart(1) || apart(2)
     }
 
-    /// Square of the least distance between the two sets without their widening, at most `most_m`
-    /// squared, m².
-    fn centreline_distance_sq(&self, other: &ReachableSet, most_m: f32) -> f32 {
+    /// Square of the least distance between the polylines of both sets, and the segment of the
+    /// other one that is so near; none where they are no nearer than `most_m`.
+    #[inline(always)]
+    fn nearest_segment<'o>(
+        &self,
+        other: &'o ReachableSet,
+        most_m: f32,
+    ) -> Option<(f32, (&'o Point, &'o Point))> {
         let mut wide_m = most_m + BOUNDS_ROUNDING_M;
-        let mut least_sq = most_m * most_m;
+        let (mut least_sq, mut found) = (most_m * most_m, None);
         for (from, to) in other.segments() {
             let half = (to - from) * 0.5;
             if self.is_outside(&(from + half), &half, wide_m) {
@@ -123,29 +128,28 @@ impl<'a> OwnSet<'a> {
                 if !leg.is_apart(&other, wide_m) {
                     let apart_sq = segments_distance_sq((from, to), (leg.from, leg.to));
                     if apart_sq < least_sq {
-                        least_sq = apart_sq;
+                        (least_sq, found) = (apart_sq, Some((from, to)));
                         wide_m = sqrtf(apart_sq) + BOUNDS_ROUNDING_M;
                     }
                 }
             }
         }
-        least_sq
+        found.map(|segment| (least_sq, segment))
     }
 
     /// Whether this set comes nearer than `apart_m` to a neighbour's set, and this motion brings
     /// the vehicle nearer than it is already. `place` is the neighbour's present position.
     pub fn conflicts(&self, other: &ReachableSet, place: &Point, apart_m: f32) -> bool {
         let most_m = apart_m + other.widened_by_m + self.set.widened_by_m;
-        let most_sq = most_m * most_m;
-        let motion_sq = self.centreline_distance_sq(other, most_m);
-        motion_sq < most_sq && self.comes_nearer(motion_sq, other, place, most_m)
+        let found = self.nearest_segment(other, most_m);
+        found.is_some_and(|nearest| self.comes_nearer(nearest, other, place, most_m))
     }
 
     /// Whether a motion that comes too near also comes nearer than the vehicle is now.
     #[inline(never)]
     fn comes_nearer(
         &self,
-        motion_sq: f32,
+        (motion_sq, nearest): (f32, (&Point, &Point)),
         other: &ReachableSet,
         place: &Point,
         most_m: f32,
@@ -158,7 +162,8 @@ impl<'a> OwnSet<'a> {
         // set.
         let here_m = sqrtf(motion_sq) + APPROACH_ROUNDING_M;
         let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
-        if here_m < most_m && !other.segments().any(is_here) {
+        // Most often that is the leg that the motion comes nearest to.
+        if here_m < most_m && !is_here(nearest) && !other.segments().any(is_here) {
             return true;
         }
         // The vehicle stays as far from the neighbour's set as it is, but it must not fly towards

@@ -32,17 +32,17 @@ const STOPPING_SWAY_MPS: f32 = 0.3;
 const LANDING_WAITED_LONG: Duration = Duration::from_secs(40);
 
 impl Guidance {
-    /// The places that the vehicle can no longer avoid on its path, or `back` along it, and
-    /// `extra_m` beyond them. The set begins at the setpoint: no stop keeps the vehicle from flying
-    /// on to there.
-    pub(super) fn own_set<const W: usize>(
+    /// Adds to the place of the setpoint what the vehicle can no longer avoid on its path, and
+    /// `extra_m`. The set begins at the setpoint, which is all that a stop can hold back: the
+    /// vehicle flies on to the setpoint in any case.
+    pub(super) fn extend_own_set<const W: usize>(
         &self,
+        set: &mut ReachableSet,
         path: &Path<W>,
         telemetry: &Telemetry,
         bounds: &MotionBounds,
-        extra_m: f32,
-        back: bool,
-    ) -> ReachableSet {
+        (extra_m, back): (f32, bool),
+    ) {
         let velocity_mps = fpu::sqrtf(telemetry.velocity.norm_squared());
         // Beside its path the vehicle flies straight to where it continues on it.
         let joins =
@@ -59,18 +59,14 @@ impl Guidance {
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);
             let behind = points[..next].iter().rev().map(|w| w.position);
-            return ReachableSet::along(
-                here,
-                core::iter::once(here).chain(join).chain(behind),
-                fly_m,
-            );
+            return set.extend_along(core::iter::once(here).chain(join).chain(behind), fly_m);
         }
         // Forward, advice stops the vehicle at `stops_at_m` in any case.
         let join_m = join.map_or(0.0, |join| (join - here).length());
         let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
         let ahead = points[next..].iter().map(|w| w.position);
-        ReachableSet::along(here, core::iter::once(here).chain(join).chain(ahead), fly_m)
+        set.extend_along(core::iter::once(here).chain(join).chain(ahead), fly_m);
     }
 
     /// The first neighbour that may come nearer to `own` than the distance kept from it.
@@ -109,7 +105,8 @@ impl Guidance {
         let mut next = 0;
         while let Some((i, contact, dead)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
-            let mut met = neighbours.for_filter(contact, dead, now);
+            let mut met = contact.as_heard(dead, now);
+            neighbours.add_silence(contact, now, &mut met);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
                 // The neighbour is out of radio range, and where its gates let it be.

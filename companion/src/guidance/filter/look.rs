@@ -86,9 +86,10 @@ impl Guidance {
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_CLEAR_M } else { 0.0 };
         let bounds = bounds(&self.track, self.fastest_mps);
-        let set = match way {
+        let mut set;
+        match way {
             FlightDirection::Vertical { to_m, .. } if whole_column => {
-                ReachableSet::vertical(*position, to_m)
+                set = ReachableSet::vertical(*position, to_m);
             }
             FlightDirection::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
@@ -102,13 +103,16 @@ impl Guidance {
                 } else {
                     (reference_m + fly_m).min(to_m).max(reference_m)
                 };
-                ReachableSet::vertical(Point::new(position.x, position.y, reference_m), end_m)
+                let here = Point::new(position.x, position.y, reference_m);
+                set = ReachableSet::vertical(here, end_m);
             }
             FlightDirection::Path { back } => {
-                self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back)
+                set = ReachableSet::at(self.smoother.position());
+                let way = (extra_m, back);
+                self.extend_own_set(&mut set, &plan.path, scene.telemetry, &bounds, way);
             }
             FlightDirection::Stands => return,
-        };
+        }
         let mut legs = Legs::new();
         let own = OwnSet::new(&set, &mut legs);
         let mut found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);

@@ -55,9 +55,9 @@ pub(crate) struct ReachQuery<'a> {
 }
 
 impl NeighbourEntry {
-    /// `None` if the neighbour stays out of reach wherever it can be, as most do: found without
-    /// computing its set. Else whether it counts as dead. Never `None` where the set of
-    /// [`Neighbours::for_filter`] would come within reach.
+    /// Whether it counts as dead, where it may come within reach; `None` where it stays out of
+    /// reach wherever it can be: what most of them do, seen without making a set of it. Never
+    /// `None` where [`Neighbours::add_silence`] and its reach say otherwise.
     #[inline(always)]
     fn within_reach(&self, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> Option<bool> {
         let placed_at = self.position_at?;
@@ -85,9 +85,7 @@ impl NeighbourEntry {
             column_to_m: None,
         };
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
-        let column = !heard.grounded
-            && (self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan());
-        let above_m = if column { 0.0 } else { away.z };
+        let above_m = if !heard.grounded && self.has_column() { 0.0 } else { away.z };
         let beyond = across_sq + above_m * above_m >= most_m * most_m;
         (!beyond).then_some(false)
     }
@@ -137,13 +135,53 @@ impl NeighbourEntry {
         away_sq >= most_m * most_m
     }
 
-    /// Points along which it may have flown, all of them once it is dead; and an upper bound of the
-    /// distance from the first to any other of them, metres.
-    fn points_flown(&self, dead: bool) -> (&[Point], f32) {
-        match dead {
-            true if self.is_leased() => (&self.points, self.unheard_distance_m()),
-            true => (&self.points, self.extent_m),
-            false => (self.points_for_now(), self.extent_m),
+    /// Whether it may come down from where it is.
+    #[inline]
+    fn has_column(&self) -> bool {
+        self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan()
+    }
+
+    /// Height of the ground below it, as far as a column leads from this height, metres.
+    #[inline]
+    fn floor_m(&self, height_m: f32) -> f32 {
+        if self.ground_m.is_nan() { height_m - MAX_COLUMN_M } else { self.ground_m }
+    }
+
+    /// Age of its position; of one that was never placed as if it had been at the start.
+    #[inline(always)]
+    fn placed_for(&self, now: Instant) -> Duration {
+        now - self.position_at.unwrap_or(Instant::ZERO)
+    }
+
+    /// As the safety filter sees it, `dead` or not, if it is heard; where it is not,
+    /// [`Neighbours::add_silence`] has to follow.
+    #[inline(always)]
+    pub(crate) fn as_heard(&self, dead: bool, now: Instant) -> FilterNeighbour<'_> {
+        let grounded = self.reports(GROUNDED | LANDED);
+        let comes_down = !grounded && self.has_column();
+        FilterNeighbour {
+            id: self.id,
+            stranger: self.rank == STRANGER_RANK,
+            on_plan: self.on_plan(),
+            out_of_range: false,
+            shares_plan: self.shares_plan,
+            lost: dead,
+            waits: self.reports(WAITING) && self.heard_within(now, HEARD_WITHIN),
+            stands: grounded || now - self.moved_at >= STANDS_AFTER,
+            motion: NeighbourMotion {
+                position: self.state.position,
+                velocity: self.state.velocity,
+                speed_mps: self.speed_mps,
+                age_s: self.placed_for(now).as_secs_f32(),
+                delay_s: self.message_delay.delay_s,
+                points: self.points_for_now(),
+                place_on_points: self.place_on_points,
+                extent_m: self.extent_m,
+                rests_within_m: 0.0,
+                grounded,
+                column_to_m: comes_down.then(|| self.floor_m(self.state.position.z)),
+            },
+            before_climb: None,
         }
     }
 
@@ -239,84 +277,86 @@ impl<const V: usize> Neighbours<V> {
         None
     }
 
-    /// A contact as the safety filter sees it, `dead` or not; one without a position counts as last
-    /// heard at the shell's start.
+    /// Changes what [`NeighbourEntry::as_heard`] says of a contact that has had no position for
+    /// long. Not in one call with that: a board takes long to copy what it returns.
     #[inline(always)]
-    pub(crate) fn for_filter<'a>(
+    pub(crate) fn add_silence<'a>(
         &'a self,
         contact: &'a NeighbourEntry,
-        dead: bool,
         now: Instant,
-    ) -> FilterNeighbour<'a> {
-        let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
-        let placed_s = placed_for.as_secs_f32();
-        // Most neighbours are heard: then nothing of what follows for silent ones applies.
-        let silent = placed_for >= MAX_HEIGHT_AGE;
-        // Where positions are lost, a newer intent gives the place: that of its setpoint.
-        let told_at = contact
-            .intent_at
-            .filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
+        met: &mut FilterNeighbour<'a>,
+    ) {
+        let placed_for = contact.placed_for(now);
+        // Most are heard.
+        if placed_for >= MAX_HEIGHT_AGE {
+            self.change_to_silent(contact, placed_for, now, met);
+        }
+    }
+
+    #[inline(never)]
+    fn change_to_silent<'a>(
+        &'a self,
+        contact: &'a NeighbourEntry,
+        placed_for: Duration,
+        now: Instant,
+        met: &mut FilterNeighbour<'a>,
+    ) {
+        let (motion, dead) = (&mut met.motion, met.lost);
+        let placed_s = motion.age_s;
+        // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
+        let told_at =
+            contact.intent_at.filter(|_| placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
         let told_s =
             told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
-        // Silent for `down`, or on the ground without a valid position, a vehicle lies on the
-        // ground below its last position.
-        let down = silent
-            && (placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise()));
+        // Dead, or without a position of its own, it rests by then where a reroute keeps off; later
+        // on the ground below.
+        let down = placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise());
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
-        let at = contact.points.first().filter(|_| by_intent);
-        let mut here = at.copied().unwrap_or(contact.state.position);
-        // Unheard in its climb the neighbour may have come to the top, and a little further.
-        let top =
-            if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
+        if let Some(first) = contact.points.first().filter(|_| by_intent) {
+            motion.position = *first;
+        }
+        // Unheard in its climb it may have come to the top of it, and a little further.
+        let top = if age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
         if lies {
+            let field = self.area_ground();
             highest_m =
-                self.area_ground().map_or(contact.ground_m, |g| contact.max_ground_m(g, &here));
-            here.z = libm::fminf(highest_m, here.z);
+                field.map_or(contact.ground_m, |g| contact.max_ground_m(g, &motion.position));
+            motion.position.z = libm::fminf(highest_m, motion.position.z);
         } else if let Some(top) = top {
-            here.z = top;
+            motion.position.z = top;
         }
-        let grounded = (contact.reports(GROUNDED | LANDED) && top.is_none()) || lies;
-        let down = dead
-            || contact.may_come_down
-            || contact.reports(OUT_OF_PLAN)
-            || contact.ground_m.is_nan();
-        let floor_m =
-            if contact.ground_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.ground_m };
-        let (rests, unknown) = (dead || top.is_some(), by_intent || lies || top.is_some());
-        let (points, extent_m) = contact.points_flown(dead);
-        let heard = NeighbourMotion {
-            position: here,
-            velocity: contact.state.velocity,
-            speed_mps: if rests { 0.0 } else { contact.speed_mps },
-            // A dead vehicle stopped on its points, or climbed to its top, and rests there: no ball
-            // grows around it.
-            age_s: if rests { 0.0 } else { age_s },
-            delay_s: match (dead, top) {
-                (false, Some(_)) => UNHEARD_BEYOND_TOP_S,
-                (true, _) => 0.0,
-                _ => contact.message_delay.delay_s,
-            },
-            points: if top.is_some() || lies { &[] } else { points },
-            place_on_points: if unknown { PlaceOnPoints::Unknown } else { contact.place_on_points },
-            extent_m,
-            rests_within_m: if dead && top.is_none() { contact.unheard_distance_m() } else { 0.0 },
-            grounded,
-            column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),
-        };
-        FilterNeighbour {
-            id: contact.id,
-            stranger: contact.rank == STRANGER_RANK,
-            on_plan: contact.on_plan(),
-            out_of_range: silent && contact.is_out_of_range(now),
-            shares_plan: contact.shares_plan,
-            lost: dead,
-            waits: contact.reports(WAITING) && contact.heard_within(now, HEARD_WITHIN),
-            stands: grounded
-                || (now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S),
-            motion: heard,
-            before_climb: top.map(|_| contact.state.position),
+        motion.grounded = (motion.grounded && top.is_none()) || lies;
+        let floor_m = contact.floor_m(motion.position.z);
+        // A vehicle that flew along its points stopped on them, and rests where a reroute keeps
+        // off.
+        motion.age_s = age_s;
+        if dead || top.is_some() {
+            (motion.speed_mps, motion.age_s) = (0.0, 0.0);
+            motion.delay_s = if dead { 0.0 } else { UNHEARD_BEYOND_TOP_S };
         }
+        if dead {
+            motion.points = &contact.points;
+            if contact.is_leased() {
+                motion.extent_m = contact.unheard_distance_m();
+            }
+            if top.is_none() {
+                motion.rests_within_m = contact.unheard_distance_m();
+            }
+        }
+        if top.is_some() || lies {
+            motion.points = &[];
+        }
+        if by_intent || lies || top.is_some() {
+            motion.place_on_points = PlaceOnPoints::Unknown;
+        }
+        let column =
+            (dead || contact.has_column()) && (!motion.grounded || (lies && highest_m > floor_m));
+        motion.column_to_m = column.then_some(floor_m);
+        met.out_of_range = contact.is_out_of_range(now);
+        let stands = now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S;
+        met.stands = motion.grounded || stands;
+        met.before_climb = top.map(|_| contact.state.position);
     }
 }
