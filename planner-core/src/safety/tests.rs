@@ -37,10 +37,17 @@ proptest! {
 
     #[test]
     fn sets_conflict_where_their_places_do(
-        own in points(5), other in points(5), length_m in 0.0_f32..6.0, grow_m in 0.0_f32..2.0, floor in -3.0_f32..6.0,
+        own in points(5),
+        other in points(5),
+        length_m in 0.0_f32..6.0,
+        grow_m in 0.0_f32..2.0,
+        floor in -3.0_f32..6.0,
     ) {
         let own = ReachableSet::along(own[0], own[1..].iter().copied(), length_m);
-        let mut other = ReachableSet { widened_by_m: grow_m, ..ReachableSet::along(other[0], other[1..].iter().copied(), length_m) };
+        let mut other = ReachableSet {
+            widened_by_m: grow_m,
+            ..ReachableSet::along(other[0], other[1..].iter().copied(), length_m)
+        };
         other.add_column((floor > 0.0).then_some(floor));
         let (here, there) = (places(&own), places(&other));
         let motion_m = least(&here, &there) - grow_m;
@@ -55,13 +62,19 @@ proptest! {
         let nearer_m = least(&here, &[place]);
         if conflict {
             let towards = nearer_m < (own.points[0] - place).norm();
-            prop_assert!(motion_m < now_m || towards, "a motion that takes nobody nearer is allowed");
+            prop_assert!(
+                motion_m < now_m || towards,
+                "a motion that takes nobody nearer is allowed"
+            );
         }
     }
 
     #[test]
     fn a_vehicle_that_holds_to_its_limits_stays_inside_its_set(
-        path in points(8), speed_mps in 0.0_f32..2.0, age_s in 0.0_f32..0.99, goes_on_s in 0.0_f32..0.1,
+        path in points(8),
+        speed_mps in 0.0_f32..2.0,
+        age_s in 0.0_f32..0.99,
+        goes_on_s in 0.0_f32..0.1,
     ) {
         prop_assume!(path.len() > 1);
         let heard = NeighbourMotion {
@@ -90,7 +103,12 @@ proptest! {
 
     #[test]
     fn no_set_reaches_further_than_its_bound(
-        path in points(8), east in -1.0_f32..1.0, north in -1.0_f32..1.0, by_m in 0.0_f32..2.0, speed_mps in 0.0_f32..2.0, age_s in 0.0_f32..2.0,
+        path in points(8),
+        east in -1.0_f32..1.0,
+        north in -1.0_f32..1.0,
+        by_m in 0.0_f32..2.0,
+        speed_mps in 0.0_f32..2.0,
+        age_s in 0.0_f32..2.0,
         ahead_s in 0.0_f32..4.0,
     ) {
         let way = Point::new(east, north, 0.2).normalize();
