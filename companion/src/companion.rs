@@ -98,7 +98,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             config.slowest_mps,
             config.fastest_mps.max(config.climb_mps),
         );
-        if let Some(down_s) = config.division {
+        if let Some(down_s) = config.lost_vehicle_down_s {
             let stray_m =
                 margins::pair_position_error_m(config.required_clearance_m, config.radius_m);
             neighbours.form_fleet(down_s, config.ground, stray_m);
@@ -136,7 +136,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// The autopilot that flies the vehicle, PX4 or ArduPilot; PX4 until a HEARTBEAT has been
     /// received.
-    pub(crate) fn kind(&self) -> AutopilotKind {
+    pub(crate) fn autopilot_kind(&self) -> AutopilotKind {
         self.telemetry.kind()
     }
 
@@ -310,7 +310,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// limits, and returns to their defaults until these are read.
     fn request_streams(&mut self) {
         let situation = self.request_context();
-        if self.requests.start_on_connect(
+        if self.requests.begin_requesting_streams(
             &self.telemetry,
             &situation,
             &mut self.timers,

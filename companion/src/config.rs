@@ -80,12 +80,12 @@ pub struct Config<const V: usize> {
     pub geofence: Option<(Point, Point)>,
     /// `Some` for a coverage mission, whose area is divided again after the loss of a vehicle: the
     /// longest time that a lost vehicle takes to come down, seconds.
-    pub division: Option<f32>,
+    pub lost_vehicle_down_s: Option<f32>,
     /// Height range of the ground below a coverage mission whose ground is not level.
     pub ground: Option<Ground>,
     /// Whether a coverage mission that starts again leaves out the waypoints that are photographed
     /// already.
-    pub resumes: bool,
+    pub skips_photographed: bool,
     /// System ids of the senders whose commands, parameter changes and file transfers are accepted;
     /// 0 fills an unused entry.
     pub ground_stations: [u8; GROUND_STATIONS],
@@ -153,9 +153,9 @@ impl<const V: usize> Config<V> {
             battery_low_percent: 15,
             swarm_hz: 5,
             geofence: None,
-            division: None,
+            lost_vehicle_down_s: None,
             ground: None,
-            resumes: true,
+            skips_photographed: true,
             ground_stations: USUAL_GROUND_STATIONS,
         }
     }

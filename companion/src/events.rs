@@ -21,8 +21,8 @@ pub enum PlanKind {
     /// A detour around an obstacle, or a path aside: [`crate::Companion::detour_request`] has its
     /// start, its end and its keep-out zones.
     Detour,
-    /// The plan that divides the rest of an area after losses: [`crate::Companion::losses`] has the
-    /// vehicles and waypoints.
+    /// The plan that divides the rest of an area after losses:
+    /// [`crate::Companion::division_inputs`] has the vehicles and waypoints.
     Division,
 }
 

@@ -30,7 +30,7 @@ mod waypoints;
 
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, OwnVehicle};
 use planner_core::flight::Path;
-use planner_core::track::{TrackConfig, Tracker};
+use planner_core::track::{ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
@@ -114,15 +114,15 @@ pub struct Guidance {
     /// Speed of the mission's fastest vehicle, m/s.
     fastest_mps: f32,
     /// Share of the speed that the error bound of the position estimate allows; 0 stops.
-    pub pace: f32,
+    pub estimate_speed_share: f32,
     /// The smoother, which makes setpoints of raw points.
     pub smoother: SetpointSmoother,
     phase: Phase,
-    tracker: Tracker,
+    tracker: ReferenceState,
     /// The straight leg of a climb, a join or a descent; `None` until the next step makes it, from
     /// where the setpoint stands.
     leg: Option<Path<2>>,
-    leg_tracker: Tracker,
+    leg_tracker: ReferenceState,
     /// The waypoint that the vehicle flies to by Algorithm 2 of the paper.
     waypoints: Algorithm2Waypoints,
     /// Whether the raw point was set back to where the setpoint stands.
@@ -200,12 +200,12 @@ impl Guidance {
             leg_track,
             deconflict,
             fastest_mps,
-            pace: 1.0,
+            estimate_speed_share: 1.0,
             smoother,
             phase: Phase::Hold,
-            tracker: Tracker::default(),
+            tracker: ReferenceState::default(),
             leg: None,
-            leg_tracker: Tracker::default(),
+            leg_tracker: ReferenceState::default(),
             waypoints: Algorithm2Waypoints::default(),
             raw_point_at_rest: true,
             position_unknown: false,
@@ -257,7 +257,7 @@ impl Guidance {
 
     /// Forgets the flight before: phase, leg, path progress, advice and filter. The setpoint stays.
     pub fn reset(&mut self) {
-        self.tracker = Tracker::default();
+        self.tracker = ReferenceState::default();
         self.phase = Phase::Hold;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
@@ -296,7 +296,7 @@ impl Guidance {
                 position,
                 along_m,
                 path: &plan.path,
-                detours: scene.detours,
+                detours: scene.is_on_detour,
             };
             self.advice =
                 deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.states_at(now));
@@ -322,11 +322,11 @@ impl Guidance {
                 _ => self.setpoint_m + self.smoother.stopping_distance_m(false),
             };
         }
-        self.filter(state, scene, neighbours, now);
+        self.step_filter(state, scene, neighbours, now);
         let urgent = self.filter.is_stopping(now);
         let known = scene.telemetry.position_at.is_some();
         if !state.streams_setpoints() {
-            self.smoother.stop();
+            self.smoother.end_stream();
             return true;
         }
         let kind = scene.telemetry.kind();
@@ -378,7 +378,7 @@ impl Guidance {
         let holds = (!wanted || back_up)
             && self.on_path
             && matches!(self.phase, Phase::Path | Phase::Join | Phase::Descent)
-            && state.holds_place()
+            && state.is_on_path()
             && self.smoother.is_standing();
         let yields = self.filter.is_yielding() || state != State::Follow;
         let late_s = if holds { neighbours.max_message_delay_s() } else { 0.0 };
@@ -466,7 +466,7 @@ impl Guidance {
         now: Instant,
     ) -> u8 {
         let before = self.filter;
-        self.filter(state, scene, neighbours, now);
+        self.step_filter(state, scene, neighbours, now);
         let blocker = self.filter.blocker();
         self.filter = before;
         blocker

@@ -69,7 +69,7 @@ pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link, PlanKind, PlanRequests};
 pub use mission::State;
-pub use mission::photographed::MAX_DONE_RANGES;
+pub use mission::photographed::MAX_PHOTOGRAPHED_RANGES;
 pub use time::{Duration, Instant};
 
 /// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.

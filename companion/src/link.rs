@@ -16,16 +16,16 @@ use self::commands::{Command, CommandHistory};
 use self::echo::{IntentEcho, SentIntents};
 use self::frame::{Counters, Frame, Framer, Header};
 use self::outbox::{Outbox, Outgoing};
-use self::rate_limit::RateLimit;
+use self::rate_limit::RadioTokenBucket;
 use crate::events::Link;
 use crate::time::Instant;
 
 /// Free entries of a link's queue below which no answer to a ground station is queued: they are
 /// kept for texts, commands to the autopilot, and acks of its requests.
-const KEPT_FREE: usize = 8;
+const RESERVED_QUEUE_ENTRIES: usize = 8;
 /// Further free entries below which no answer to another sender is queued: room for the answers to
 /// a ground station, a list of all parameters and two more.
-const KEPT_FOR_GROUND: usize = 12;
+const RESERVED_FOR_GROUND_STATIONS: usize = 12;
 const BOTH_LINKS: [Link; 2] = [Link::Autopilot, Link::Swarm];
 
 /// A message that is made from the newest state when its link is polled, instead of waiting in a
@@ -60,7 +60,7 @@ pub(crate) struct Links {
     outboxes: [Outbox; 2],
     /// For each link, the [`OnDemandMessage`]s that are due: bit n for the n-th variant.
     due: [u16; 2],
-    radio: RateLimit,
+    radio: RadioTokenBucket,
     sent: SentIntents,
     rates: AnswerTokenBuckets,
     repeats: CommandHistory,
@@ -131,8 +131,10 @@ impl Links {
         kind: AnswerKind,
     ) -> bool {
         let kept = match sender {
-            SenderKind::GroundStation => KEPT_FREE,
-            SenderKind::Autopilot | SenderKind::Other => KEPT_FREE + KEPT_FOR_GROUND,
+            SenderKind::GroundStation => RESERVED_QUEUE_ENTRIES,
+            SenderKind::Autopilot | SenderKind::Other => {
+                RESERVED_QUEUE_ENTRIES + RESERVED_FOR_GROUND_STATIONS
+            }
         };
         self.outboxes[link as usize].free_entries() > kept
             && self.rates.take_token(now, link, sender, kind)
@@ -213,8 +215,8 @@ impl Links {
     }
 
     /// Takes the bytes of a frame other than a state message from the radio's token bucket.
-    pub(crate) fn count_radio_bytes(&mut self, bytes: usize) {
-        self.radio.count_bytes(bytes);
+    pub(crate) fn take_radio_tokens(&mut self, bytes: usize) {
+        self.radio.take_tokens(bytes);
     }
 
     /// The header of the next frame on a link, with the next sequence number.

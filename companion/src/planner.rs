@@ -73,7 +73,7 @@ fn plan_failure(error: &PlanError) -> PlanFailure {
         PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
         | PlanError::SwarmFull
         | PlanError::Path(..)
-        | PlanError::Schedule(_, ScheduleError::PiecesFull | ScheduleError::GatesFull) => {
+        | PlanError::Schedule(_, ScheduleError::SegmentsFull | ScheduleError::GatesFull) => {
             PlanFailure::Capacity
         }
         PlanError::Schedule(_, ScheduleError::Blocked | ScheduleError::BadIndex) => {

@@ -83,7 +83,7 @@ impl Services {
     }
 
     /// Stores the photographed waypoints in flash.
-    pub(crate) fn store_photographed(&mut self, photographed: store::Photographed) {
+    pub(crate) fn store_photographed(&mut self, photographed: store::PhotographedRecord) {
         if let Some(store) = &mut self.store {
             store.store_photographed(photographed);
         }
@@ -138,7 +138,7 @@ impl Services {
         }
         let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
         match heard.frame.message_id {
-            ftp::MESSAGE if (p[1], p[2]) == own => {
+            ftp::MESSAGE_ID if (p[1], p[2]) == own => {
                 // An FTP request of another sender gets no answer: there are few sessions.
                 if self.store.is_some() && heard.sender == SenderKind::GroundStation {
                     if ftp::changes_files(p) {

@@ -102,7 +102,7 @@ async fn board() {
     SHELL.start(companion);
     let memory = PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM.take(), own: OWN.take() };
     let mut planner =
-        Planner { roadmap: None, field: None, mission: None, system_id, files: 0, memory };
+        Planner { roadmap: None, field: None, mission: None, system_id, files_checksum: 0, memory };
     let links = join5(
         SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, false),
         SHELL.receive(Link::Swarm, &FROM_RADIO, false),

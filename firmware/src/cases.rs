@@ -10,7 +10,7 @@ use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
 use planner_core::flight::{Gate, Path};
-use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
+use planner_core::plan::{GoalMode, Objective, PlanRequest, VehicleTask};
 use planner_core::prm::{Config, Sampling};
 use planner_core::roadmap::{Edge, HalfEdge, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
@@ -43,7 +43,7 @@ pub const SCHEDULE: ScheduleConfig = ScheduleConfig {
 pub const CLEARANCE_M: f32 = 0.8;
 /// How goals are assigned to vehicles in these cases: any vehicle to any goal, least total
 /// distance.
-pub const ASSIGNMENT_MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
+pub const ASSIGNMENT_MODE: GoalMode = GoalMode::Unlabelled(Objective::TotalDistance);
 
 /// The tasks of a swarm with one vehicle at each start of the roadmap, at most [`VEHICLES`].
 pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {

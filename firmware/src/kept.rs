@@ -10,11 +10,11 @@ use heapless::String;
 use crate::chips::ResetCause;
 
 /// Length of a STATUSTEXT's text, bytes.
-pub const TEXT: usize = 50;
+pub const MAX_TEXT_LEN: usize = 50;
 /// 32-bit words of the whole record: contents, then the checksum.
 pub const RECORD_WORDS: usize = 25;
 /// 32-bit words of the record's text.
-const TEXT_WORDS: usize = TEXT.div_ceil(4);
+const TEXT_WORDS: usize = MAX_TEXT_LEN.div_ceil(4);
 /// 32-bit words of the record before the text.
 const HEADER_WORDS: usize = 5 + 2 * WORK_KINDS;
 /// Number of kinds of [`FileWork`], without `None`.
@@ -41,7 +41,7 @@ enum RunEnd {
     /// The program ended by a panic or a fault.
     Crashed = 0x464c_4b21,
     /// An operator requested the restart.
-    Asked = 0x464c_4b23,
+    RestartRequested = 0x464c_4b23,
 }
 
 /// A kind of work on uploaded files that may crash because of their contents.
@@ -66,7 +66,7 @@ type Task = (FileWork, u32);
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CrashRecord {
     end: RunEnd,
-    text: String<TEXT>,
+    text: String<MAX_TEXT_LEN>,
     /// File work that runs now; `FileWork::None` between.
     task: Task,
     /// For each kind of work: checksum of the files on which it crashed last, and number of starts
@@ -74,14 +74,14 @@ pub struct CrashRecord {
     failed_work: [(u32, u32); WORK_KINDS],
     /// Bit of each kind of work that ended without a crash in this run, on the files in
     /// `failed_work`.
-    done: u32,
+    completed_work: u32,
 }
 
 impl CrashRecord {
     /// Evaluates the record at a start: `kept` is the record found in memory, `cause` the chip's
     /// reset cause. Returns the record to keep from now on, and the STATUSTEXT about the end of the
     /// last run; `None` if there is nothing to report. After power-on `kept` is ignored.
-    pub fn on_start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<TEXT>>) {
+    pub fn on_start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<MAX_TEXT_LEN>>) {
         let mut kept = kept.filter(|_| cause != ResetCause::Power).unwrap_or_default();
         let crashed = kept.end == RunEnd::Crashed;
         let said = match (kept.end, cause) {
@@ -99,7 +99,7 @@ impl CrashRecord {
         for (i, failed) in kept.failed_work.iter_mut().enumerate() {
             if work as usize != i + 1 {
                 // This kind of work ended without a crash in the last run: its count begins again.
-                if kept.done >> i & 1 == 1 {
+                if kept.completed_work >> i & 1 == 1 {
                     failed.1 = 0;
                 }
             } else if crashed || kept.end == RunEnd::Runs && by_itself {
@@ -107,7 +107,7 @@ impl CrashRecord {
                 *failed = (files, before.saturating_add(1));
             }
         }
-        (kept.task, kept.done, kept.end) = (Task::default(), 0, RunEnd::Runs);
+        (kept.task, kept.completed_work, kept.end) = (Task::default(), 0, RunEnd::Runs);
         (kept, said)
     }
 
@@ -126,7 +126,7 @@ impl CrashRecord {
 
     /// Notes that an operator requested the restart.
     pub fn note_requested_restart(&mut self) {
-        self.end = RunEnd::Asked;
+        self.end = RunEnd::RestartRequested;
     }
 
     /// Whether `work` on the files with checksum `files` may begin: false if it crashed three
@@ -152,7 +152,7 @@ impl CrashRecord {
         if let Some(i) = (work as usize).checked_sub(1)
             && self.failed_work[i].0 == files
         {
-            self.done |= 1 << i;
+            self.completed_work |= 1 << i;
         }
     }
 
@@ -161,8 +161,13 @@ impl CrashRecord {
         let mut text = [0; 4 * TEXT_WORDS];
         text[..self.text.len()].copy_from_slice(self.text.as_bytes());
         let mut words = [0; RECORD_WORDS];
-        let head =
-            [self.end as u32, self.text.len() as u32, self.task.0 as u32, self.task.1, self.done];
+        let head = [
+            self.end as u32,
+            self.text.len() as u32,
+            self.task.0 as u32,
+            self.task.1,
+            self.completed_work,
+        ];
         let failed = self.failed_work.iter().flat_map(|(files, times)| [*files, *times]);
         let text = text.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let all = head.into_iter().chain(failed).chain(text);
@@ -173,7 +178,7 @@ impl CrashRecord {
 
     /// Decodes a record; `None` where the checksum is wrong or a field has no valid value.
     pub fn from_words(words: &[u32; RECORD_WORDS]) -> Option<Self> {
-        let end = [RunEnd::None, RunEnd::Runs, RunEnd::Crashed, RunEnd::Asked]
+        let end = [RunEnd::None, RunEnd::Runs, RunEnd::Crashed, RunEnd::RestartRequested]
             .into_iter()
             .find(|e| *e as u32 == words[0])?;
         if checksum(words) != words[RECORD_WORDS - 1] {
@@ -194,7 +199,7 @@ impl CrashRecord {
             text: String::try_from(text).ok()?,
             task: (work(words[2])?, words[3]),
             failed_work: array::from_fn(|i| (words[5 + 2 * i], words[6 + 2 * i])),
-            done: words[4],
+            completed_work: words[4],
         })
     }
 }
@@ -213,7 +218,7 @@ mod tests {
     use super::*;
 
     /// A start from what the one before left.
-    fn start(kept: &CrashRecord, cause: ResetCause) -> (CrashRecord, Option<String<TEXT>>) {
+    fn start(kept: &CrashRecord, cause: ResetCause) -> (CrashRecord, Option<String<MAX_TEXT_LEN>>) {
         let words = kept.to_words();
         let read = CrashRecord::from_words(&words);
         assert_eq!(read.as_ref(), Some(kept), "as it was written");

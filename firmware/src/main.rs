@@ -23,7 +23,7 @@ use firmware::kept::FileWork;
 use firmware::lent::LentFlash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
 use firmware::scratch::WorkspaceOverlay;
-use firmware::shell::{CHECK_IN_EVERY, ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id};
+use firmware::shell::{CHECK_IN_EVERY, SYSTEM_ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id};
 use heapless::{String, Vec};
 use planner_core::Point;
 use planner_core::field::FieldView;
@@ -115,13 +115,13 @@ async fn planner_and_flash_task(
     let field = lent.as_deref().and_then(|bytes| FieldView::parse(bytes).ok());
     let map_crc =
         roadmap.as_ref().map(RoadmapView::crc).or(field.as_ref().map(FieldView::crc)).unwrap_or(0);
-    let FoundMission { mission, files, set_aside: mission_aside, refused } =
+    let FoundMission { mission, files_checksum: files, set_aside: mission_aside, refused } =
         find_mission(&store, &mut flash, roadmap.as_ref(), map_crc);
     let known = match store.parameters().system_id() {
         Some(id) => Some(id),
         None => wait_for_system_id(&mut autopilot.0).await,
     };
-    let system_id = known.unwrap_or(ID_WITHOUT_AUTOPILOT);
+    let system_id = known.unwrap_or(SYSTEM_ID_WITHOUT_AUTOPILOT);
     defmt::info!(
         "system {=u8}, roadmap {=bool}, mission {=bool}",
         system_id,
@@ -160,7 +160,7 @@ async fn planner_and_flash_task(
     start_links(links, shell, known.is_none(), autopilot, swarm);
     let memory =
         PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
-    let mut planner = Planner { roadmap, field, mission, system_id, files, memory };
+    let mut planner = Planner { roadmap, field, mission, system_id, files_checksum: files, memory };
     shell.run_planner_and_flash(&mut planner, &mut flash).await
 }
 
@@ -195,7 +195,7 @@ struct FoundMission {
     /// The mission, if it parses and fits the roadmap in use, or needs no roadmap.
     mission: Option<MissionView<'static>>,
     /// Checksum over mission and roadmap (or field), by which the crash record names the pair.
-    files: u32,
+    files_checksum: u32,
     /// Whether the mission is not used because reading or planning it brought three starts in a row
     /// down.
     set_aside: bool,
@@ -224,13 +224,13 @@ fn find_mission(
     // Both kinds of work may have crashed on these files: reading the mission, and planning it.
     if !crash::may_begin(FileWork::Plan, files) || !crash::begin_work(FileWork::ReadMission, files)
     {
-        return FoundMission { files, set_aside: true, ..FoundMission::default() };
+        return FoundMission { files_checksum: files, set_aside: true, ..FoundMission::default() };
     }
     let read = MissionView::parse(bytes);
     crash::finish_work();
     let refused = read.err();
     let mission = read.ok().filter(|mission| mission.can_be_planned_with(roadmap));
-    FoundMission { mission, files, refused, set_aside: false }
+    FoundMission { mission, files_checksum: files, refused, set_aside: false }
 }
 
 fn start_links(

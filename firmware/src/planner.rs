@@ -6,7 +6,7 @@ use companion::planner::coverage::{self, Request};
 use companion::storage::mission_file::coverage::CoverageView;
 use companion::storage::mission_file::{MissionKind, MissionView};
 use companion::swarm::fleet::{DivisionInputs, MAX_DIVISIONS};
-use companion::{MAX_DONE_RANGES, PlanFailure, PlanKind, planner};
+use companion::{MAX_PHOTOGRAPHED_RANGES, PlanFailure, PlanKind, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOutZone};
 use planner_core::field::FieldView;
@@ -41,7 +41,7 @@ pub struct OwnPlanMemory {
     obstacles: Vec<KeepOutZone, MAX_ZONES>,
     /// Whether a keep-out zone had no room in `obstacles`.
     too_many_zones: bool,
-    done: Vec<WaypointRange, MAX_DONE_RANGES>,
+    done: Vec<WaypointRange, MAX_PHOTOGRAPHED_RANGES>,
     losses: Vec<DivisionInputs<VEHICLES>, MAX_DIVISIONS>,
     nodes: Vec<u16, WAYPOINTS>,
 }
@@ -78,7 +78,7 @@ pub struct Planner<'a> {
     /// System id of this vehicle.
     pub system_id: u8,
     /// Checksum of mission and roadmap (or field), by which the crash record names them.
-    pub files: u32,
+    pub files_checksum: u32,
     /// Memory that the planner works in.
     pub memory: PlanningMemory<'a>,
 }
@@ -103,7 +103,9 @@ impl Planner<'_> {
         if wanted == PlanKind::Division {
             // Cannot overflow: it has room for the divisions that the companion keeps and for the
             // one in progress.
-            companion.losses().for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
+            companion
+                .division_inputs()
+                .for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
         }
         if wanted != PlanKind::Detour {
             return None;
@@ -124,7 +126,7 @@ impl Planner<'_> {
         if wanted == PlanKind::Detour && detour.is_none() {
             return Err(PlanFailure::Unreachable);
         }
-        if !boards::begin_work(FileWork::Plan, self.files) {
+        if !boards::begin_work(FileWork::Plan, self.files_checksum) {
             return Err(PlanFailure::Invalid);
         }
         let outcome = self.plan(detour);
@@ -185,7 +187,7 @@ fn plan_area_detour<'m>(
     if own.too_many_zones {
         return Err(PlanFailure::Capacity);
     }
-    let ws = &mut scratch.area().area;
+    let ws = &mut scratch.coverage_plan().area;
     coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
         area,
         field,
@@ -208,7 +210,7 @@ fn plan_area<'m>(
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
     let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
     let PlanningMemory { scratch, swarm, own } = memory;
-    let ws = scratch.area();
+    let ws = scratch.coverage_plan();
     coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
         &Request { mission, view, field, max_gates: GATES, photographed: &own.done },
         own.losses.iter().map(|lots| &lots[..]),

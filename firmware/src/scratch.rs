@@ -27,21 +27,21 @@ use crate::capacity::{
 pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Workspace for planning a coverage mission.
-pub struct AreaWorkspace {
+pub struct CoveragePlanWorkspace {
     /// Workspace for lanes and routes.
     pub area: coverage::Workspace<AREA_VERTICES, LANES, VEHICLES>,
     /// Workspace for scheduling the flights.
     pub schedule: ScheduleWorkspace,
 }
 
-impl AreaWorkspace {
+impl CoveragePlanWorkspace {
     /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self { area: coverage::Workspace::new(), schedule: ScheduleWorkspace::new() }
     }
 }
 
-impl Default for AreaWorkspace {
+impl Default for CoveragePlanWorkspace {
     fn default() -> Self {
         Self::new()
     }
@@ -57,21 +57,21 @@ pub struct WorkspaceOverlay {
 enum OverlayUse {
     Plan,
     Build,
-    Coverage,
-    Area,
+    CoverageBench,
+    CoveragePlan,
 }
 
 union Memory {
     plan: ManuallyDrop<Planner>,
     build: ManuallyDrop<RoadmapBuilder>,
-    coverage: ManuallyDrop<CoverageWorkspace>,
-    area: ManuallyDrop<AreaWorkspace>,
+    coverage: ManuallyDrop<CoverageBenchWorkspace>,
+    area: ManuallyDrop<CoveragePlanWorkspace>,
 }
 
 /// All-zero values of the four types: this constant compiles only if all zeros is a valid value of
 /// each.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageWorkspace, AreaWorkspace) = {
+const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageBenchWorkspace, CoveragePlanWorkspace) = {
     // SAFETY: the compiler evaluates this and rejects an invalid value.
     unsafe {
         let zeroed = (
@@ -113,15 +113,15 @@ impl WorkspaceOverlay {
 
     /// The memory as workspaces of coverage's separate steps. It is zeroed if it had another use
     /// before.
-    pub fn coverage(&mut self) -> &mut CoverageWorkspace {
-        self.switch_use(OverlayUse::Coverage);
+    pub fn coverage_bench(&mut self) -> &mut CoverageBenchWorkspace {
+        self.switch_use(OverlayUse::CoverageBench);
         // SAFETY: as in `planner`; all zeros is an empty workspace.
         unsafe { &mut self.memory.coverage }
     }
 
     /// The memory as workspace of coverage plans. It is zeroed if it had another use before.
-    pub fn area(&mut self) -> &mut AreaWorkspace {
-        self.switch_use(OverlayUse::Area);
+    pub fn coverage_plan(&mut self) -> &mut CoveragePlanWorkspace {
+        self.switch_use(OverlayUse::CoveragePlan);
         // SAFETY: as in `planner`; all zeros is an area without vertices.
         unsafe { &mut self.memory.area }
     }
@@ -143,13 +143,13 @@ impl Default for WorkspaceOverlay {
 }
 
 /// Workspaces of the separate steps of coverage planning, for measuring them.
-pub struct CoverageWorkspace {
+pub struct CoverageBenchWorkspace {
     /// All lanes of the area, along one path.
     pub tracks: Tracks<LANES>,
     /// Lanes that are not photographed after a vehicle was lost.
     pub left: Tracks<LANES>,
     /// Workspace for computing lanes.
-    pub build: tracks::Workspace<AREA_VERTICES>,
+    pub build: tracks::LaneWorkspace<AREA_VERTICES>,
     /// Workspace for dividing lanes among vehicles.
     pub powell: powell::Workspace<VEHICLES>,
     /// Each vehicle's route over its lanes.
@@ -160,13 +160,13 @@ pub struct CoverageWorkspace {
     pub schedule: ScheduleWorkspace,
 }
 
-impl CoverageWorkspace {
+impl CoverageBenchWorkspace {
     /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
             left: Tracks::new(),
-            build: tracks::Workspace::new(),
+            build: tracks::LaneWorkspace::new(),
             powell: powell::Workspace::new(),
             plan: Plan::new(),
             losses: losses::Workspace::new(),
@@ -175,7 +175,7 @@ impl CoverageWorkspace {
     }
 }
 
-impl Default for CoverageWorkspace {
+impl Default for CoverageBenchWorkspace {
     fn default() -> Self {
         Self::new()
     }
@@ -185,7 +185,7 @@ impl Default for CoverageWorkspace {
 pub struct RoadmapBuilder {
     nodes: [Point; ROADMAP_NODES],
     node_count: usize,
-    index: prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>,
+    index: prm::NodeIndex<ROADMAP_NODES, ROADMAP_CUBES>,
     edges: [Edge; HALF_EDGES / 2],
     edge_count: usize,
 }

@@ -4,7 +4,7 @@
 //! run on the executor of higher priority; [`run_planner_and_flash`](Shell::run_planner_and_flash)
 //! runs on the one below it, so a long plan never delays a setpoint. The companion is locked only
 //! for the time of one of its calls, never across an `await`; neither executor runs another task
-//! meanwhile ([`HoldsExecutors`]).
+//! meanwhile ([`BasepriRawMutex`]).
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -20,7 +20,7 @@ use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
 use heapless::Vec;
 
-use crate::boards::HoldsExecutors;
+use crate::boards::BasepriRawMutex;
 use crate::capacity::BoardCompanion;
 use crate::flash::Flash;
 use crate::planner::Planner;
@@ -33,9 +33,9 @@ const UART_POLL_EVERY: Duration = Duration::from_millis(1);
 /// A task without work checks in this often; the watchdog is fed only while all tasks check in.
 pub const CHECK_IN_EVERY: Duration = Duration::from_millis(100);
 /// Least time between two STATUSTEXTs about the errors of one UART; the first is sent at once.
-const LINE_REPORT_EVERY: Duration = Duration::from_secs(10);
+const UART_REPORT_EVERY: Duration = Duration::from_secs(10);
 /// STATUSTEXT of each link: errors of its UART, and frames with a bad CRC or cut short.
-const LINE_TEXTS: [&str; 2] =
+const UART_ERROR_TEXTS: [&str; 2] =
     ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
 /// Time from the request of a restart to the restart, milliseconds: queued messages are sent.
@@ -45,7 +45,7 @@ type TaskSignal<T> = Signal<CriticalSectionRawMutex, T>;
 
 /// The companion, and signals and counters that all tasks share.
 pub struct Shell {
-    companion: Mutex<HoldsExecutors, RefCell<Option<&'static mut BoardCompanion>>>,
+    companion: Mutex<BasepriRawMutex, RefCell<Option<&'static mut BoardCompanion>>>,
     /// For each link: wakes its transmit task, because the companion may have a frame to send.
     send_due: [TaskSignal<()>; 2],
     /// Wakes `run_timers`, because the companion's next timeout may have changed.
@@ -55,7 +55,7 @@ pub struct Shell {
     /// Wakes `run_planner_and_flash`, because a plan or a flash operation may have been requested.
     work_due: TaskSignal<()>,
     /// Time at which a restart was requested, milliseconds since the start; 0 without a request.
-    restart_ms: AtomicU32,
+    restart_requested_ms: AtomicU32,
     /// Whether an erasure, programming or reading of the flash runs.
     flash_busy: AtomicBool,
     /// Time of each task's last check-in, milliseconds since the start: receive tasks of both
@@ -69,7 +69,7 @@ pub struct Shell {
 }
 
 /// A [`FlashRequest`] without the bytes to program: offset and length in bytes.
-enum Request {
+enum FlashOperation {
     Erase(u32),
     Program(u32, usize),
     Read(u32, usize),
@@ -97,7 +97,7 @@ pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
 
 /// System id of a board that has heard no autopilot and has none set: files can be uploaded to it.
 /// When it hears an autopilot, it restarts and takes that one's id.
-pub const ID_WITHOUT_AUTOPILOT: u8 = 250;
+pub const SYSTEM_ID_WITHOUT_AUTOPILOT: u8 = 250;
 /// Time to wait for the first HEARTBEAT; an autopilot sends one each second.
 const FIRST_AUTOPILOT_WITHIN: Duration = Duration::from_secs(3);
 /// Time after the first HEARTBEAT in which other autopilots' HEARTBEATs are awaited.
@@ -164,7 +164,7 @@ impl Shell {
             timer_changed: Signal::new(),
             plan_requests: PlanRequests::new(),
             work_due: Signal::new(),
-            restart_ms: AtomicU32::new(0),
+            restart_requested_ms: AtomicU32::new(0),
             flash_busy: AtomicBool::new(false),
             checked_in_ms: [const { AtomicU32::new(0) }; TASK_COUNT],
             started: AtomicBool::new(false),
@@ -234,7 +234,7 @@ impl Shell {
 
     /// Requests a restart of the board. A repeated request does not delay it.
     fn request_restart(&self) {
-        let _ = self.restart_ms.compare_exchange(
+        let _ = self.restart_requested_ms.compare_exchange(
             0,
             now_ms().max(1),
             Ordering::Relaxed,
@@ -273,13 +273,13 @@ impl Shell {
             }
             let count = errors.load(Ordering::Relaxed);
             if count != reported && Instant::now() >= tells_at {
-                (reported, tells_at) = (count, Instant::now() + LINE_REPORT_EVERY);
+                (reported, tells_at) = (count, Instant::now() + UART_REPORT_EVERY);
                 self.with_companion(|companion, _| {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
                     companion.send_text_with_numbers(
                         true,
-                        LINE_TEXTS[link as usize],
+                        UART_ERROR_TEXTS[link as usize],
                         [count, damaged],
                     );
                 });
@@ -352,17 +352,17 @@ impl Shell {
     /// Executes one flash request of the companion. Returns false if there is none, or if a restart
     /// was requested: the restart must not tear a word that is being programmed.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
-        if self.restart_ms.load(Ordering::Relaxed) != 0 {
+        if self.restart_requested_ms.load(Ordering::Relaxed) != 0 {
             return false;
         }
         let mut bytes = [0; MAX_READ];
         let request = self.lock_companion(|companion| {
             Some(match companion.poll_flash()? {
-                FlashRequest::Erase { at } => Request::Erase(at),
-                FlashRequest::Read { at, len } => Request::Read(at, len),
+                FlashRequest::Erase { at } => FlashOperation::Erase(at),
+                FlashRequest::Read { at, len } => FlashOperation::Read(at, len),
                 FlashRequest::Program { at, bytes: given } => {
                     bytes[..given.len()].copy_from_slice(given);
-                    Request::Program(at, given.len())
+                    FlashOperation::Program(at, given.len())
                 }
             })
         });
@@ -373,9 +373,9 @@ impl Shell {
         };
         self.flash_busy.store(true, Ordering::Relaxed);
         let outcome = match request {
-            Request::Erase(at) => flash.erase(at).await.map(|()| 0),
-            Request::Program(at, len) => flash.program(at, &bytes[..len]).await.map(|()| 0),
-            Request::Read(at, len) => flash.read(at, &mut bytes[..len]).map(|()| len),
+            FlashOperation::Erase(at) => flash.erase(at).await.map(|()| 0),
+            FlashOperation::Program(at, len) => flash.program(at, &bytes[..len]).await.map(|()| 0),
+            FlashOperation::Read(at, len) => flash.read(at, &mut bytes[..len]).map(|()| len),
         };
         self.flash_busy.store(false, Ordering::Relaxed);
         let outcome = outcome.map(|len| &bytes[..len]);
@@ -386,7 +386,7 @@ impl Shell {
     /// Whether the board may restart now: a restart was requested over 200 ms ago, so queued
     /// messages have been sent, and no flash operation runs.
     pub fn is_restart_due(&self) -> bool {
-        let asked = self.restart_ms.load(Ordering::Relaxed);
+        let asked = self.restart_requested_ms.load(Ordering::Relaxed);
         asked != 0
             && now_ms().wrapping_sub(asked) > FLUSH_BEFORE_RESTART_MS
             && !self.flash_busy.load(Ordering::Relaxed)
@@ -423,14 +423,18 @@ struct SetpointGaps {
     count: AtomicU32,
     /// Longest gap, milliseconds: between two setpoints, from the stream's begin to the first one,
     /// or from the last one to the stream's end.
-    gap_ms: AtomicU32,
+    longest_gap_ms: AtomicU32,
     /// Time of the last setpoint or the stream's begin, milliseconds; 0 while no stream runs.
     last_ms: AtomicU32,
 }
 
 impl SetpointGaps {
     const fn new() -> Self {
-        Self { count: AtomicU32::new(0), gap_ms: AtomicU32::new(0), last_ms: AtomicU32::new(0) }
+        Self {
+            count: AtomicU32::new(0),
+            longest_gap_ms: AtomicU32::new(0),
+            last_ms: AtomicU32::new(0),
+        }
     }
 
     /// Counts a setpoint that is sent now.
@@ -457,7 +461,7 @@ impl SetpointGaps {
 
     fn set_last(&self, now_ms: u32, next_ms: u32) {
         if let Some(gap_ms) = elapsed_ms(self.last_ms.swap(next_ms, Ordering::Relaxed), now_ms) {
-            self.gap_ms.fetch_max(gap_ms, Ordering::Relaxed);
+            self.longest_gap_ms.fetch_max(gap_ms, Ordering::Relaxed);
         }
     }
 
@@ -465,7 +469,8 @@ impl SetpointGaps {
     /// and clears both; `None` if no setpoint was sent.
     fn take_setpoint_stats(&self, now_ms: u32) -> Option<[u32; 2]> {
         self.end_stream(now_ms);
-        let reported = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
+        let reported =
+            [&self.count, &self.longest_gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
         (reported[0] > 0).then_some(reported)
     }
 }

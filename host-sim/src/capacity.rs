@@ -48,7 +48,7 @@ pub struct BoardCapacity {
     /// Most gates of one vehicle.
     pub gates: usize,
     /// Most timed segments of all flights in a schedule.
-    pub pieces: usize,
+    pub timed_segments: usize,
     /// Most bytes of a roadmap file.
     pub roadmap_bytes: usize,
     /// Most vertices of an area, over all its rings.
@@ -71,19 +71,19 @@ pub const NUCLEO_H743: BoardCapacity = BoardCapacity {
     half_edges: 65_536,
     vehicles: 32,
     gates: 128,
-    pieces: 2048,
+    timed_segments: 2048,
     roadmap_bytes: roadmap_bytes(&FlashLayout::H743),
     vertices: 256,
     lanes: 512,
 };
 
 /// Capacities of the Pico 2 (RP2350), which has half the memory of the STM32H743.
-pub const HALF: BoardCapacity = BoardCapacity {
+pub const PICO2: BoardCapacity = BoardCapacity {
     name: "pico2",
     nodes: 2048,
     half_edges: 32_768,
     vehicles: 16,
-    pieces: 1024,
+    timed_segments: 1024,
     roadmap_bytes: roadmap_bytes(&FlashLayout::PICO2),
     lanes: 256,
     ..NUCLEO_H743
@@ -91,7 +91,7 @@ pub const HALF: BoardCapacity = BoardCapacity {
 
 /// All boards; the first has the greatest capacities.
 pub const BOARDS: [BoardCapacity; 3] =
-    [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, HALF];
+    [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, PICO2];
 
 impl BoardCapacity {
     /// The board of this name.

@@ -15,10 +15,10 @@ use tempfile::{NamedTempFile, TempPath};
 use crate::quote::quoted_path;
 
 /// Longest text file that is read, bytes: a scenario, a list of goals or an area.
-pub const TEXT_BYTES: u64 = 1 << 20;
+pub const MAX_TEXT_BYTES: u64 = 1 << 20;
 /// Longest roadmap, mission or plan file that is read, bytes (64 MiB); the largest that this
 /// program writes have some 20 MB.
-pub const BINARY_BYTES: u64 = 1 << 26;
+pub const MAX_BINARY_BYTES: u64 = 1 << 26;
 
 /// Reads all bytes of a regular file of at most `most` bytes.
 ///
@@ -37,12 +37,13 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > most { Err(too_long()) } else { Ok(bytes) }
 }
 
-/// Reads the text of a regular file of at most [`TEXT_BYTES`] bytes.
+/// Reads the text of a regular file of at most [`MAX_TEXT_BYTES`] bytes.
 ///
 /// # Errors
 /// As [`read`], or it is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    String::from_utf8(read(path, TEXT_BYTES)?).map_err(|_| io::Error::other("it is not UTF-8 text"))
+    String::from_utf8(read(path, MAX_TEXT_BYTES)?)
+        .map_err(|_| io::Error::other("it is not UTF-8 text"))
 }
 
 /// Length of a regular file, bytes.
@@ -163,7 +164,10 @@ impl ResultFiles {
                 file.persist(&target).map(drop).map_err(|error| error.error)
             });
             if let Err(error) = kept {
-                replaced.into_iter().rev().for_each(|(target, before)| put_back(&target, before));
+                replaced
+                    .into_iter()
+                    .rev()
+                    .for_each(|(target, before)| undo_rename(&target, before));
                 return Err(error)
                     .with_context(|| format!("cannot write: {}", quoted_path(&target)));
             }
@@ -186,7 +190,7 @@ impl ResultFiles {
 }
 
 /// Undoes one rename: restores the old file, or deletes the new one where there was no old file.
-fn put_back(target: &Path, before: Option<TempPath>) {
+fn undo_rename(target: &Path, before: Option<TempPath>) {
     // A failure here is ignored: the caller reports that the results could not be written.
     let _ = match before {
         Some(before) => before.persist(target).map_err(|error| error.error),

@@ -12,7 +12,7 @@ use crate::files;
 use crate::quote::quoted_path;
 
 /// Flash layout of a companion on the desk: that of the STM32H743 board.
-pub const LAYOUT: FlashLayout = FlashLayout::H743;
+pub const DESK_FLASH_LAYOUT: FlashLayout = FlashLayout::H743;
 
 /// A simulated flash bank.
 pub struct DeskFlash {
@@ -27,7 +27,7 @@ impl DeskFlash {
     /// # Errors
     /// The file cannot be read or created, or its length is not that of the bank.
     pub fn open(path: Option<&Path>) -> anyhow::Result<Self> {
-        let mut bytes = vec![0xFF; LAYOUT.len() as usize];
+        let mut bytes = vec![0xFF; DESK_FLASH_LAYOUT.len() as usize];
         let Some(path) = path else { return Ok(Self { bytes, file: None }) };
         let failed = || format!("cannot keep a flash: {}", quoted_path(path));
         if path.exists() {
@@ -37,14 +37,14 @@ impl DeskFlash {
         let mut file = opened.with_context(failed)?;
         match file.metadata().with_context(failed)?.len() {
             0 => file.write_all(&bytes).with_context(failed)?,
-            length if length == u64::from(LAYOUT.len()) => {
+            length if length == u64::from(DESK_FLASH_LAYOUT.len()) => {
                 file.read_exact(&mut bytes).with_context(failed)?;
             }
             length => {
                 bail!(
                     "no flash image: {}: it has {length} bytes, not {}",
                     quoted_path(path),
-                    LAYOUT.len()
+                    DESK_FLASH_LAYOUT.len()
                 )
             }
         }
@@ -65,7 +65,9 @@ impl DeskFlash {
                 return Ok(out);
             }
             FlashRequest::Erase { at } => {
-                self.modify_range(at, LAYOUT.sector_len as usize, |part| part.fill(0xFF))?;
+                self.modify_range(at, DESK_FLASH_LAYOUT.sector_len as usize, |part| {
+                    part.fill(0xFF)
+                })?;
             }
             FlashRequest::Program { at, bytes } => self.modify_range(at, bytes.len(), |part| {
                 // As in NOR flash, programming can only clear bits.

@@ -96,7 +96,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         bail!("no command given\nhint: `{help}` lists them");
     }
-    let text = quote::about_arguments(&error.to_string(), arguments.into_iter().skip(1));
+    let text = quote::quote_arguments(&error.to_string(), arguments.into_iter().skip(1));
     let mut lines = text.lines().map(str::trim);
     let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
     // clap's tip how to pass `-x` as a value is dropped: that is never what was meant.

@@ -27,7 +27,7 @@
 
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use sim_autopilot::{AutopilotKind, Estimator};
+use sim_autopilot::{AutopilotKind, EstimatorErrors};
 
 use crate::scenario::{Simulation, Vehicle};
 
@@ -46,11 +46,11 @@ pub const STRAY_PER_GUST_S: f32 = 0.05;
 
 /// Greatest horizontal distance of a position estimate from the truth, beyond the part that the
 /// tracking margin covers, metres.
-pub fn max_estimate_error_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
+pub fn max_estimate_error_m(estimator: EstimatorErrors, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
-        (Estimator::Perfect | Estimator::Rtk, _) => 0.0,
-        (Estimator::Recorded, AutopilotKind::Px4) => 0.65,
-        (Estimator::Recorded, AutopilotKind::Ardupilot) => 0.12,
+        (EstimatorErrors::Perfect | EstimatorErrors::Rtk, _) => 0.0,
+        (EstimatorErrors::Recorded, AutopilotKind::Px4) => 0.65,
+        (EstimatorErrors::Recorded, AutopilotKind::Ardupilot) => 0.12,
     }
 }
 
@@ -112,11 +112,11 @@ fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
 }
 
 /// Greatest height of a vehicle's estimate above its true height, metres.
-pub fn max_height_error_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
+pub fn max_height_error_m(estimator: EstimatorErrors, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
-        (Estimator::Perfect | Estimator::Rtk, _) => 0.15,
-        (Estimator::Recorded, AutopilotKind::Px4) => 1.1,
-        (Estimator::Recorded, AutopilotKind::Ardupilot) => 0.3,
+        (EstimatorErrors::Perfect | EstimatorErrors::Rtk, _) => 0.15,
+        (EstimatorErrors::Recorded, AutopilotKind::Px4) => 1.1,
+        (EstimatorErrors::Recorded, AutopilotKind::Ardupilot) => 0.3,
     }
 }
 

@@ -26,7 +26,7 @@ use crate::capacity::{
     BoardCapacity, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
     on_heap,
 };
-use crate::coverage::check_ground;
+use crate::coverage::check_starts_on_ground;
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{Left, Timing};
@@ -70,7 +70,7 @@ impl Mission {
         progress: &Progress,
     ) -> anyhow::Result<Self> {
         if scenario.area.is_some() {
-            check_ground(&scenario)?;
+            check_starts_on_ground(&scenario)?;
             return coverage::prepare(scenario, board);
         }
         let mut timing = Timing::default();
@@ -108,19 +108,19 @@ impl Mission {
         let mut mission = Self {
             goals,
             roadmap,
-            roadmap_file,
+            roadmap_or_field_file: roadmap_file,
             descents_m,
             timing,
             ..Self::new(scenario, map, tasks, schedule, board)
         };
-        mission.mission_file = mission.goals_file()?;
+        mission.mission_file = mission.encode_goals_mission()?;
         mission.timing.roadmap_s = begun.elapsed().as_secs_f64();
         drop(stage);
         Ok(mission)
     }
 
     /// Encodes the mission file of a mission with goals.
-    fn goals_file(&self) -> anyhow::Result<Vec<u8>> {
+    fn encode_goals_mission(&self) -> anyhow::Result<Vec<u8>> {
         let goals: Vec<_> = self
             .goals
             .iter()
@@ -142,7 +142,7 @@ impl Mission {
     ) -> anyhow::Result<()> {
         (self.schedule.separation_m, self.schedule.parked_separation_m) =
             (separation_m, parked_separation_m);
-        self.mission_file = self.goals_file()?;
+        self.mission_file = self.encode_goals_mission()?;
         Ok(())
     }
 
@@ -154,7 +154,7 @@ impl Mission {
             self.timing.plan_s = begun.elapsed().as_secs_f64();
             return Ok(plan);
         }
-        let view = self.view();
+        let view = self.roadmap_view();
         let mission = self.mission_view();
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
@@ -196,7 +196,7 @@ impl Mission {
                     "vehicle {id} meets too many others: {path}: its plan holds at most {most} gates"
                 )
             }
-            PlanError::Schedule(id, ScheduleError::PiecesFull) => {
+            PlanError::Schedule(id, ScheduleError::SegmentsFull) => {
                 anyhow!(
                     "vehicle {id} meets too many others: {path}: the swarm has at most {TIMED_SEGMENTS} timed segments"
                 )
@@ -265,12 +265,12 @@ impl Mission {
         match wanted {
             PlanKind::Mission if companion.excluded_waypoints().is_empty() => own(plan),
             PlanKind::Mission | PlanKind::Division => {
-                let losses = companion.losses().take(if wanted == PlanKind::Division {
+                let losses = companion.division_inputs().take(if wanted == PlanKind::Division {
                     usize::MAX
                 } else {
                     0
                 });
-                let rest = self.plan_rest(companion.excluded_waypoints(), losses);
+                let rest = self.plan_remaining(companion.excluded_waypoints(), losses);
                 own(&*rest.map_err(|_| PlanFailure::Unreachable)?)
             }
             PlanKind::Detour => {
@@ -298,7 +298,7 @@ impl Mission {
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();
         detour::plan_vehicle_detour(
-            &self.view(),
+            &self.roadmap_view(),
             request,
             obstacles,
             &mut search,

@@ -58,7 +58,7 @@ pub fn quote_message(text: &str) -> String {
 }
 
 /// An error message about the command line; each of the arguments that appears in it is quoted.
-pub fn about_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
+pub fn quote_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
     let mut text = text.to_owned();
     for argument in arguments {
         let value = argument.split_once('=').map_or("", |(_, value)| value);
@@ -91,7 +91,7 @@ mod tests {
     fn arguments_are_quoted_inside_a_message() {
         let arguments = ["--id=\x07".to_owned(), "y".repeat(1000)];
         let text = format!("error: invalid value '\x07' or '{}'", arguments[1]);
-        let message = about_arguments(&text, arguments.into_iter());
+        let message = quote_arguments(&text, arguments.into_iter());
         assert!(message.starts_with("error: invalid value '\\u{7}' or 'yyy"), "{message}");
         assert!(message.chars().count() < 240, "{message}");
     }

@@ -16,7 +16,7 @@ use std::time::Instant;
 use anyhow::{anyhow, bail};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use planner_core::prm::{self, Config, PrmError, Workspace};
+use planner_core::prm::{self, Config, NodeIndex, PrmError};
 use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapError, RoadmapHeader};
 use planner_core::search::SearchWorkspace;
 use planner_core::voxel::{GridShape, VoxelGrid};
@@ -80,8 +80,9 @@ pub fn build(
         rayon::join(|| timed(|| BoxTree::new(&grid)), || timed(sampled));
     let (nodes, heights_m) = sampled?;
     let joining = Instant::now();
-    let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
-    let edges = join(&grid, &tree, &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
+    let mut workspace = Box::new(NodeIndex::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    let edges = connect_with_clearances(&grid, &tree, &nodes, config, &mut workspace)
+        .map_err(|e| describe(&e))?;
     let parts = BuildTimes {
         boxes_s,
         nodes_s,
@@ -111,9 +112,9 @@ pub fn add_passages(
     }
     roadmap.heights_m.extend(added.iter().map(|node| height_m(map, node)));
     roadmap.nodes.extend(&added);
-    let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
-    roadmap.edges =
-        join(&grid, &tree, &roadmap.nodes, config, &mut workspace).map_err(|e| describe(&e))?;
+    let mut workspace = Box::new(NodeIndex::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    roadmap.edges = connect_with_clearances(&grid, &tree, &roadmap.nodes, config, &mut workspace)
+        .map_err(|e| describe(&e))?;
     Ok(added.len())
 }
 
@@ -136,7 +137,7 @@ pub fn sample(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::R
         bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
     }
     let mut nodes = vec![Point::zeros(); total];
-    let never_sample = map.never_sample();
+    let never_sample = map.never_sample_grid();
     prm::sample_nodes(&map.grid(), Some(&never_sample), terminals, config, &mut nodes)
         .map_err(|e| describe(&e))?;
     Ok(nodes)
@@ -147,7 +148,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
     config: &Config,
-    workspace: &mut Workspace<NODES, CUBES>,
+    workspace: &mut NodeIndex<NODES, CUBES>,
 ) -> Result<Vec<prm::Edge>, PrmError> {
     workspace.build_index(nodes, config)?;
     map_nodes_in_parallel(nodes.len(), |range, edges| {
@@ -162,12 +163,12 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
 /// [`MAX_STORED_CLEARANCE_M`]. `tree` is built over `grid`: its distances also decide which
 /// segments are clear; only a segment within rounding of the required clearance is checked cell by
 /// cell.
-pub fn join<const NODES: usize, const CUBES: usize>(
+pub fn connect_with_clearances<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     tree: &BoxTree,
     nodes: &[Point],
     config: &Config,
-    workspace: &mut Workspace<NODES, CUBES>,
+    workspace: &mut NodeIndex<NODES, CUBES>,
 ) -> Result<Vec<Edge>, PrmError> {
     workspace.build_index(nodes, config)?;
     // The clearance of an edge is at most that of either end, and mostly equal to the smaller one.
@@ -310,7 +311,7 @@ mod tests {
             sampling: Sampling::Uniform,
         };
         let nodes = sample(&map, &[], &config).unwrap();
-        let mut workspace = Box::new(Workspace::<512, 4096>::new());
+        let mut workspace = Box::new(NodeIndex::<512, 4096>::new());
         let mut alone = vec![prm::Edge::default(); 20_000];
         let count = prm::connect(&map.grid(), &nodes, &config, &mut workspace, &mut alone).unwrap();
         assert!(count > 500);

@@ -17,7 +17,7 @@ use crate::map::VoxelMap;
 use crate::mission::{Mission, SwarmPlan};
 
 /// Step in which path widths are measured, metres.
-const SAME_WIDTH_M: f32 = 0.05;
+const WIDTH_STEP_M: f32 = 0.05;
 /// Largest map that is flooded, cells: the queues take up to 12 bytes a cell.
 const MAX_FLOODED_CELLS: usize = 1 << 25;
 /// Most goals that get a line of their own; `and N more` counts the rest.
@@ -75,7 +75,7 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     let why = match (reachable, bound, labelled) {
         (false, bound, _) => {
             let vehicle = bound.map_or_else(|| smallest_vehicle(mission), |(vehicle, _)| vehicle);
-            format!("no way in the roadmap leads there; {}", what_helps(asked, vehicle, goal))
+            format!("no way in the roadmap leads there; {}", remedy_text(asked, vehicle, goal))
         }
         (true, _, true) => "no vehicle names it as its goal".to_owned(),
         (true, _, false) if vehicles < mission.goals.len() => {
@@ -99,7 +99,7 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String 
     let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
         let helps =
-            if asks { format!("; {}", what_helps(asked, vehicle, goal)) } else { String::new() };
+            if asks { format!("; {}", remedy_text(asked, vehicle, goal)) } else { String::new() };
         format!("no way in the roadmap leads from it to a goal{helps}")
     } else if goals < mission.tasks.len() {
         format!("{goals} goals are for at most {goals} of {} vehicles", mission.tasks.len())
@@ -116,7 +116,7 @@ fn smallest_vehicle(mission: &Mission) -> usize {
 }
 
 /// Text: what would give this vehicle a path to this goal, or that nothing would.
-fn what_helps(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
+fn remedy_text(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
     let (radius_m, required_m) = (settings.radius_m, mission.tasks[vehicle].required_clearance_m);
@@ -165,7 +165,7 @@ struct Reachability {
 
 impl Reachability {
     fn new(mission: &Mission) -> Self {
-        let view = mission.view();
+        let view = mission.roadmap_view();
         let vehicles = mission.tasks.len();
         let row = |vehicle: usize| {
             let seen =
@@ -207,18 +207,18 @@ fn widest_path_clearances_m(
     most_m: f32,
 ) -> Option<Vec<f32>> {
     let (shape, grid) = (&map.shape, map.grid());
-    let steps = (most_m / SAME_WIDTH_M).ceil() as usize;
+    let steps = (most_m / WIDTH_STEP_M).ceil() as usize;
     let [nx, ny, nz] = shape.dims.map(|d| d as usize);
     let cells = nx.checked_mul(ny)?.checked_mul(nz)?;
     if cells > MAX_FLOODED_CELLS {
         return None;
     }
     let steps_at = |place: &Point| {
-        let most_m = SAME_WIDTH_M * steps as f32;
+        let most_m = WIDTH_STEP_M * steps as f32;
         if at_least_m(place) >= most_m {
             return steps;
         }
-        ((point_clearance(&grid, place, most_m) / SAME_WIDTH_M + 1e-3) as usize).min(steps)
+        ((point_clearance(&grid, place, most_m) / WIDTH_STEP_M + 1e-3) as usize).min(steps)
     };
     // A start or goal may be nearer to an obstacle than the centre of its cell, above all to the
     // ground, so its own clearance counts too.
@@ -243,7 +243,7 @@ fn widest_path_clearances_m(
             continue;
         };
         for goal in (0..goals.len()).filter(|&goal| goals[goal] == Some(cell)) {
-            widths[goal] = width.min(at_goals[goal]) as f32 * SAME_WIDTH_M;
+            widths[goal] = width.min(at_goals[goal]) as f32 * WIDTH_STEP_M;
             missing -= 1;
         }
         for axis in 0..3 {

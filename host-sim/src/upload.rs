@@ -11,7 +11,7 @@ use std::time::{Duration, Instant as Clock};
 
 use anyhow::{Context, bail};
 use companion::link::frame::{self, Frame, Framer, Header};
-use companion::services::ftp::{MAX_DATA, MESSAGE, PAYLOAD_LEN};
+use companion::services::ftp::{MAX_DATA, MESSAGE_ID, PAYLOAD_LEN};
 use companion::storage::store::File;
 use companion::{COMPANION_COMPONENT, Instant};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
@@ -50,7 +50,7 @@ pub struct FtpClient {
 }
 
 /// A WRITE request that is not answered yet.
-struct PendingPiece {
+struct PendingWrite {
     request: [u8; PAYLOAD_LEN],
     length: usize,
     sent_at: Clock,
@@ -61,7 +61,7 @@ struct Answer {
     sequence: u16,
     session: u8,
     yes: bool,
-    answers: u8,
+    request_opcode: u8,
     data: Vec<u8>,
 }
 
@@ -168,8 +168,8 @@ impl FtpClient {
 
     fn send_request(&mut self, payload: &[u8; PAYLOAD_LEN]) -> anyhow::Result<()> {
         let mut out = [0; frame::MAX_FRAME_LEN];
-        let extra = frame::extra_crc(MESSAGE).context("the dialect has FTP")?;
-        let length = frame::encode_raw(self.header(), MESSAGE, extra, payload, &mut out);
+        let extra = frame::extra_crc(MESSAGE_ID).context("the dialect has FTP")?;
+        let length = frame::encode_raw(self.header(), MESSAGE_ID, extra, payload, &mut out);
         self.send(&out[..length])
     }
 
@@ -179,12 +179,12 @@ impl FtpClient {
             .iter()
             .map(Frame::padded)
             .zip(&frames)
-            .filter(|(p, frame)| frame.message_id == MESSAGE && (p[1], p[2]) == us);
+            .filter(|(p, frame)| frame.message_id == MESSAGE_ID && (p[1], p[2]) == us);
         let read = |p: &[u8; 255]| Answer {
             sequence: u16::from_le_bytes([p[3], p[4]]),
             session: p[5],
             yes: p[6] == ACK,
-            answers: p[8],
+            request_opcode: p[8],
             data: p[15..15 + usize::from(p[7]).min(MAX_DATA)].to_vec(),
         };
         Ok(for_us.map(|(p, _)| read(p)).collect())
@@ -197,12 +197,12 @@ impl FtpClient {
         let mut asked_at = began;
         self.send_request(&request)?;
         while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
-            if self.retransmission.is_over(asked_at, self.link.now()) {
+            if self.retransmission.check_timeout(asked_at, self.link.now()) {
                 self.send_request(&request)?;
                 asked_at = self.link.now();
             }
             let sequence = self.sequence;
-            let mine = |a: &Answer| a.sequence == sequence && a.answers == opcode;
+            let mine = |a: &Answer| a.sequence == sequence && a.request_opcode == opcode;
             if let Some(answer) = self.receive_answers()?.into_iter().find(mine) {
                 if !answer.yes {
                     bail!("{}", nak_reason(&answer.data));
@@ -231,7 +231,7 @@ impl FtpClient {
         // Erasing the companion's flash took time that says nothing about the link's round trips.
         self.retransmission = Retransmission::new(self.link.now());
         let mut pieces = bytes.chunks(MAX_DATA).enumerate();
-        let mut under_way: BTreeMap<u16, PendingPiece> = BTreeMap::new();
+        let mut under_way: BTreeMap<u16, PendingWrite> = BTreeMap::new();
         let (mut arrived, mut heard_at) = (0, self.link.now());
         loop {
             while under_way.len() < self.retransmission.window()
@@ -239,7 +239,7 @@ impl FtpClient {
             {
                 let request = self.request_payload(WRITE, (i * MAX_DATA) as u32, piece);
                 self.send_request(&request)?;
-                let piece = PendingPiece {
+                let piece = PendingWrite {
                     request,
                     length: piece.len(),
                     sent_at: self.link.now(),
@@ -251,7 +251,7 @@ impl FtpClient {
                 break;
             }
             for answer in self.receive_answers()? {
-                if answer.answers != WRITE {
+                if answer.request_opcode != WRITE {
                     continue;
                 }
                 if !answer.yes {
@@ -272,7 +272,7 @@ impl FtpClient {
                 bail!("the companion does not answer any more, after {arrived} bytes");
             }
             for piece in under_way.values_mut() {
-                if self.retransmission.is_over(piece.sent_at, self.link.now()) {
+                if self.retransmission.check_timeout(piece.sent_at, self.link.now()) {
                     self.send_request(&piece.request)?;
                     (piece.sent_at, piece.repeated) = (self.link.now(), true);
                 }

@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::frames::Geodetic;
 use planner_core::plan::{
-    self, Mode, Objective, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
+    self, GoalMode, Objective, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::prm::{self, Sampling};
 use planner_core::roadmap::{self, RoadmapHeader, RoadmapView};
@@ -15,9 +15,9 @@ use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 fn main() {
     // A hall of 40 m × 24 m × 6 m in cells of 0.5 m. A wall at x = 20 m leaves a gap at each end.
     let shape = GridShape { dims: [80, 48, 12], min: Point::zeros(), resolution_m: 0.5 };
-    let mut words = vec![0; shape.brick_count()];
+    let mut words = vec![0; shape.word_count()];
     for (y, z) in (6..42).flat_map(|y| (0..12).map(move |z| (y, z))) {
-        let (word, bit) = shape.address([40, y, z]);
+        let (word, bit) = shape.word_and_mask([40, y, z]);
         words[word] |= bit;
     }
     let grid =
@@ -59,7 +59,7 @@ fn main() {
     let task = |id| VehicleTask { id, required_clearance_m: clearance_m, climb_m: 2.0, goal: None };
     let vehicles: Vec<_> = (1..=10).map(task).collect();
     let (descents_m, mode, gates_most) =
-        (&[2.0; 10], Mode::Unlabelled(Objective::TotalDistance), 64);
+        (&[2.0; 10], GoalMode::Unlabelled(Objective::TotalDistance), 64);
     let (separation_m, parked_separation_m, cruise_mps, vertical_mps) = (2.0, 1.6, 2.0, 1.0);
     let schedule = ScheduleConfig { separation_m, parked_separation_m, cruise_mps, vertical_mps };
     let request =

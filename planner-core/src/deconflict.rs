@@ -188,7 +188,7 @@ fn advise_by_priority<const W: usize>(
         }
     }
     let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
-    let ahead = PathAhead::new(cfg, own);
+    let ahead = PathSamples::new(cfg, own);
     for n in neighbours.iter().filter(|n| !n.grounded).filter(unplanned) {
         if let Some(distance) = ahead.distance_to_conflict_m(cfg, own, n) {
             stop(distance, n.id);
@@ -206,12 +206,12 @@ fn find_neighbour(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
 }
 
 /// Samples of the own path ahead of the reference, at equal distances.
-struct PathAhead {
+struct PathSamples {
     points: Vec<Point, MAX_PATH_SAMPLES>,
     step_m: f32,
 }
 
-impl PathAhead {
+impl PathSamples {
     fn new<const W: usize>(cfg: &DeconflictConfig, own: &OwnVehicle<'_, W>) -> Self {
         let step_m = cfg.cruise_mps * PATH_SAMPLE_S;
         let points =
@@ -308,7 +308,7 @@ mod tests {
             };
             prop_assume!(distance(0) > cfg.safety_distance_m);
             let contact = (0..4000).find(|&ms| distance(ms) < cfg.safety_distance_m - 0.01);
-            let found = PathAhead::new(&cfg, &own).distance_to_conflict_m(&cfg, &own, &n);
+            let found = PathSamples::new(&cfg, &own).distance_to_conflict_m(&cfg, &own, &n);
             if let Some(ms) = contact {
                 let within_m = found.expect("a contact is found");
                 prop_assert!(within_m <= cruise_mps * ms as f32 * 1e-3 + 1e-3);

@@ -176,7 +176,7 @@ pub fn is_path_blocked<const W: usize>(
     let climbs =
         along_m < 0.0 && obstacle.intersects(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
-    let next = count_legs_begun(path, along_m);
+    let next = count_waypoints_up_to(path, along_m);
     let descends = until_m > path.length_m() && obstacle.intersects(&last.position, &ground);
     if climbs || descends {
         return true;
@@ -209,11 +209,11 @@ pub fn is_path_blocked<const W: usize>(
 /// Number of segments that [`is_path_blocked`] checks: the legs ahead of an arc length, the climb
 /// and the descent.
 pub fn count_segments_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
-    path.waypoints().len() - count_legs_begun(path, along_m) + 2
+    path.waypoints().len() - count_waypoints_up_to(path, along_m) + 2
 }
 
 /// Number of waypoints at or before an arc length.
-fn count_legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
+fn count_waypoints_up_to<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
 

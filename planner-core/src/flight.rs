@@ -58,13 +58,13 @@ impl<const W: usize> Path<W> {
     }
 
     /// Index of the path's last waypoint; `None` if the path is empty.
-    pub fn last(&self) -> Option<usize> {
+    pub fn last_index(&self) -> Option<usize> {
         self.waypoints.len().checked_sub(1)
     }
 
     /// Sets the times of all waypoints for a flight without stops: `first_s` at the first one, and
     /// `seconds` of each leg later at the one that ends it.
-    pub fn label_times_by(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
+    pub fn set_times_by_leg(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
         let mut before: Option<(Point, f32)> = None;
         for waypoint in &mut self.waypoints {
             waypoint.arrive_s =
@@ -101,7 +101,7 @@ impl<const W: usize> Path<W> {
 
     /// Sets the times of all waypoints for a flight without stops: `first_s` at the first one, at
     /// the others later by arc length over `speed_mps`.
-    pub fn label_times(&mut self, first_s: f32, speed_mps: f32) {
+    pub fn set_times_at_speed(&mut self, first_s: f32, speed_mps: f32) {
         for waypoint in &mut self.waypoints {
             waypoint.arrive_s = first_s + waypoint.along_m / speed_mps;
             waypoint.leave_s = waypoint.arrive_s;

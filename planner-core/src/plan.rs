@@ -19,7 +19,7 @@ mod workspace;
 
 use heapless::Vec;
 
-pub use self::request::{Mode, Objective, PlanError, PlanRequest, VehicleTask};
+pub use self::request::{GoalMode, Objective, PlanError, PlanRequest, VehicleTask};
 pub use self::workspace::{PlanWorkspace, SwarmPlan};
 use crate::assignment;
 use crate::file::CRC32;
@@ -69,7 +69,7 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     let targets: Vec<u16, V> = (starts as u16..(starts + goals) as u16).collect();
     let costs = &mut ws.costs.as_flattened_mut()[..starts * goals];
     let Some(first) = request.vehicles.first() else { return Ok(()) };
-    let labelled = request.mode == Mode::Labelled;
+    let labelled = request.mode == GoalMode::Labelled;
     if !labelled
         && request.vehicles.iter().all(|v| v.required_clearance_m == first.required_clearance_m)
     {
@@ -110,9 +110,9 @@ pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     assigned.clear();
     let _ = assigned.resize(starts, None);
     let solve = match request.mode {
-        Mode::Unlabelled(Objective::TotalDistance) => assignment::assign,
-        Mode::Unlabelled(Objective::Makespan) => assignment::assign_bottleneck,
-        Mode::Labelled => {
+        GoalMode::Unlabelled(Objective::TotalDistance) => assignment::assign,
+        GoalMode::Unlabelled(Objective::Makespan) => assignment::assign_bottleneck,
+        GoalMode::Labelled => {
             for (i, vehicle) in request.vehicles.iter().enumerate() {
                 let Some(goal) = vehicle.goal else { continue };
                 let row = &costs[i * goals..(i + 1) * goals];

@@ -6,7 +6,7 @@
 //! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The set of edges is the one
 //! of a loop over all pairs ([`connect_all_pairs`]); only the work is less:
 //!
-//! nodes are sorted into cubes ([`Workspace`]), so that only near pairs are measured;
+//! nodes are sorted into cubes ([`NodeIndex`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
 //!    a neighbour inside it is clear, and a ray that leaves it mostly does so into a wall. Both
 //! the segments that are left go to the exact check, without their part inside the box.
@@ -30,7 +30,7 @@ pub use self::config::{
     Config, Edge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length,
 };
 use self::free_box::NodeVisibility;
-pub use self::neighbours::Workspace;
+pub use self::neighbours::NodeIndex;
 use crate::Point;
 use crate::segment::{point_clearance, segment_clearance, segment_is_clear};
 use crate::voxel::VoxelGrid;
@@ -87,7 +87,7 @@ pub fn sample_nodes(
 
 /// Whether a point is farther than the edges' clearance from every obstacle; with clearance 0,
 /// whether its cell is free.
-fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
+fn point_has_clearance(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
     match config.clearance_m > 0.0 {
         true => segment_is_clear(grid, p, p, config.clearance_m),
         false => !grid.is_blocked_at(p),
@@ -102,7 +102,7 @@ fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Po
     let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
     [p + offset, p - offset]
         .iter()
-        .all(|end| grid.shape().cell_of(end).is_some() && !keeps_clear(grid, config, end))
+        .all(|end| grid.shape().cell_of(end).is_some() && !point_has_clearance(grid, config, end))
 }
 
 /// Sequence of pseudo-random or Halton points of the unit cube, [0, 1) on each axis.
@@ -164,7 +164,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
     config: &Config,
-    workspace: &mut Workspace<NODES, CUBES>,
+    workspace: &mut NodeIndex<NODES, CUBES>,
     edges: &mut [Edge],
 ) -> Result<usize, PrmError> {
     workspace.build_index(nodes, config)?;
@@ -183,7 +183,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
 /// result.
 pub fn connect_range<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
-    workspace: &Workspace<NODES, CUBES>,
+    workspace: &NodeIndex<NODES, CUBES>,
     config: &Config,
     range: Range<usize>,
     mut found: impl FnMut(Edge) -> Result<(), PrmError>,
@@ -197,7 +197,7 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
 /// distance of the edge to obstacles, metres, right to 2⁻¹¹ cell; 0 where the free box gives none.
 pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
-    workspace: &Workspace<NODES, CUBES>,
+    workspace: &NodeIndex<NODES, CUBES>,
     config: &Config,
     range: Range<usize>,
     hint: impl Fn(Edge) -> Option<bool>,
@@ -206,7 +206,7 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     config.check()?;
     let mut sight = NodeVisibility::new(grid, config);
     for place in range.start..range.end.min(workspace.len()) {
-        sight.move_to(workspace.point(place));
+        sight.set_node(workspace.point(place));
         let edge = |other: usize| {
             let (a, b) = (workspace.node(place), workspace.node(other));
             Edge { a: a.min(b), b: a.max(b) }

@@ -169,7 +169,7 @@ impl RoadmapHeader {
 
     /// Least and greatest clearance that a half-edge of this roadmap may store, metres. The least
     /// is a millimetre below the tested clearance: the test is exact, the distance is rounded.
-    fn clearances(&self) -> (f32, f32) {
+    fn clearance_limits_m(&self) -> (f32, f32) {
         let metres = |millimetres: u16| f32::from(millimetres) / 1000.0;
         let most = millimetres_down(self.max_clearance_m);
         (
@@ -199,23 +199,23 @@ impl HalfEdge {
     #[inline]
     fn from_bytes(bytes: &[u8; WORD_LEN]) -> Self {
         let millimetres = u16::from_le_bytes([bytes[2], bytes[3]]);
-        Self { target: target_of(bytes), clearance_m: f32::from(millimetres) / 1000.0 }
+        Self { target: decode_target(bytes), clearance_m: f32::from(millimetres) / 1000.0 }
     }
 }
 
 /// Whether all coordinates are at most [`MAX_COORDINATE_M`] in magnitude; false for NaN.
-fn in_range(node: &Point) -> bool {
+fn has_valid_coordinates(node: &Point) -> bool {
     node.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
 }
 
 /// Index of the target node, decoded from a half-edge's bytes in the file.
 #[inline]
-pub(crate) fn target_of(bytes: &[u8; WORD_LEN]) -> u16 {
+pub(crate) fn decode_target(bytes: &[u8; WORD_LEN]) -> u16 {
     u16::from_le_bytes([bytes[0], bytes[1]])
 }
 
 #[inline(always)]
-fn node_of(b: &[u8; NODE_LEN]) -> Point {
+fn decode_node(b: &[u8; NODE_LEN]) -> Point {
     let at = |i: usize| f32::from_le_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
     Point::new(at(0), at(4), at(8))
 }
@@ -344,14 +344,14 @@ impl<'a> RoadmapView<'a> {
     /// [`Self::node_count`].
     #[inline]
     pub fn node(&self, node: u16) -> Point {
-        self.nodes.get(usize::from(node)).map_or(Point::from_element(f32::NAN), node_of)
+        self.nodes.get(usize::from(node)).map_or(Point::from_element(f32::NAN), decode_node)
     }
 
     /// The half-edges that lead out of a node, targets ascending; none for a node that does not
     /// exist.
     #[inline]
     pub fn half_edges(&self, node: u16) -> impl ExactSizeIterator<Item = HalfEdge> + use<'a> {
-        self.half_edges_of(node).1.iter().map(HalfEdge::from_bytes)
+        self.half_edge_row(node).1.iter().map(HalfEdge::from_bytes)
     }
 
     /// The half-edge with index `k` in the file.
@@ -362,8 +362,8 @@ impl<'a> RoadmapView<'a> {
 
     /// The half-edge from `a` to `b`; `None` if the nodes are not joined. O(log degree).
     pub fn edge_between(&self, a: u16, b: u16) -> Option<HalfEdge> {
-        let (_, row) = self.half_edges_of(a);
-        row.binary_search_by_key(&b, target_of).ok().map(|i| HalfEdge::from_bytes(&row[i]))
+        let (_, row) = self.half_edge_row(a);
+        row.binary_search_by_key(&b, decode_target).ok().map(|i| HalfEdge::from_bytes(&row[i]))
     }
 
     /// Straight-line distance between two nodes, metres; NaN if either does not exist.
@@ -382,7 +382,7 @@ impl<'a> RoadmapView<'a> {
 
     /// Index of a node's first half-edge, and the bytes of all its half-edges.
     #[inline]
-    pub(crate) fn half_edges_of(&self, node: u16) -> (usize, &'a [[u8; WORD_LEN]]) {
+    pub(crate) fn half_edge_row(&self, node: u16) -> (usize, &'a [[u8; WORD_LEN]]) {
         let at = usize::from(node);
         match self.offsets.get(at..at + 2) {
             Some([from, to]) => {

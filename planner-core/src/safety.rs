@@ -235,7 +235,7 @@ impl PlaceOnPoints {
         let (mut least_m, mut along_m, mut left) = (OFF_REPORTED_PATH_M, 0.0, false);
         let mut start_m = away_m(from);
         for (i, to) in points.iter().enumerate() {
-            let place = nearest(position, from, to);
+            let place = nearest_point_on_leg(position, from, to);
             let (apart_m, upto_m) = (away_m(&place), sqrtf((place - from).norm_squared()));
             if !left && apart_m < least_m {
                 (found, least_m, along_m) = (Some(i as u8), apart_m, -upto_m);
@@ -266,7 +266,7 @@ impl PlaceOnPoints {
         // No leg ends at the first point: it is the place itself, and would take up the room of
         // another point.
         let ahead = &points[leg.max(1).min(points.len())..];
-        Some((nearest(position, &points[leg.saturating_sub(1)], to), ahead))
+        Some((nearest_point_on_leg(position, &points[leg.saturating_sub(1)], to), ahead))
     }
 
     /// Distance along the points beyond the first place that the vehicle may have flown already,
@@ -280,7 +280,7 @@ impl PlaceOnPoints {
 /// The point of the leg from `from` to `to` that is nearest to `position`. Not inlined: a board has
 /// little flash.
 #[inline(never)]
-fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
+fn nearest_point_on_leg(position: &Point, from: &Point, to: &Point) -> Point {
     let leg = to - from;
     let length_sq = leg.norm_squared();
     let share = if length_sq > 0.0 { (position - from).dot(&leg) / length_sq } else { 0.0 };

@@ -30,7 +30,7 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use self::blocks::{
-    Bits, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
+    BlockSet, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
 };
 pub use self::config::{ScheduleConfig, ScheduleError};
 pub use self::pieces::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
@@ -42,7 +42,7 @@ use crate::sort;
 /// merged with the nearest, which only forbids more.
 const MAX_INTERVALS: usize = 128;
 /// Height above its pad from which a vehicle counts as having left the pad, metres.
-const OFF_PAD_M: f32 = 0.02;
+const OFF_PAD_HEIGHT_M: f32 = 0.02;
 
 /// Memory of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
@@ -51,7 +51,7 @@ pub struct ScheduleWorkspace {
     other: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     /// The segments of `own`, in blocks.
     blocks: Blocks,
-    forbidden: Forbidden,
+    forbidden: ForbiddenIntervals,
 }
 
 impl ScheduleWorkspace {
@@ -62,9 +62,9 @@ impl ScheduleWorkspace {
 }
 
 /// Forbidden intervals of take-off times, seconds, which do not overlap.
-type Forbidden = Vec<(f32, f32), MAX_INTERVALS>;
+type ForbiddenIntervals = Vec<(f32, f32), MAX_INTERVALS>;
 
-fn add_forbidden_interval(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
+fn add_forbidden_interval(forbidden: &mut ForbiddenIntervals, mut low: f32, mut high: f32) {
     // Merged with all that overlap; if there is no room, with the nearest as well.
     while let Some(i) = forbidden.iter().position(|&(l, h)| l <= high && low <= h) {
         let (l, h) = forbidden.swap_remove(i);
@@ -103,14 +103,14 @@ pub(crate) fn departure_with_handover<'a, const W: usize>(
     mut scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
-    departure_and_conflicts(cfg, flight, times, &mut scheduled, ws, &mut |_, _| {})
+    departure_with_conflict_counts(cfg, flight, times, &mut scheduled, ws, &mut |_, _| {})
 }
 
 /// As [`departure_with_handover`]. Calls `met` for each flight of `scheduled`, with its index and
 /// two counts: the timed segments of `flight` in conflict with it, and its timed segments in
 /// conflict with `flight`. Neither vehicle has more gates for the other than its count.
 #[inline(never)]
-pub(crate) fn departure_and_conflicts<const W: usize>(
+pub(crate) fn departure_with_conflict_counts<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
     (not_before_s, handover_s): (f32, f32),
@@ -127,7 +127,7 @@ pub(crate) fn departure_and_conflicts<const W: usize>(
         let (mut own_in_conflict, mut others_in_conflict) =
             ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
         for (part, near) in blocks.parts_near(cfg, other) {
-            part.check_count(other.segment_m, MAX_TIMED_SEGMENTS)?;
+            part.check_segment_count(other.segment_m, MAX_TIMED_SEGMENTS)?;
             let mut compare = |some: &[TimedSegment]| {
                 let (Some(first), Some(last)) = (some.first(), some.last()) else { return };
                 blocks.segments_near_line(near, own, (first.from, last.to), &mut near_own);
@@ -218,11 +218,11 @@ fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
 /// Where the segment ends the vehicle may have to wait at a gate, for a vehicle that waits until
 /// this segment is left. So what a standing vehicle may report too little is subtracted. The next
 /// segment begins at that place: it is in conflict too and counts by itself, or it is clear, and
-/// then so is the place. A vehicle has left its pad when it is above it by [`OFF_PAD_M`], however
-/// low its climb ends, and its descent when it stands on the ground.
-fn cleared_at_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
+/// then so is the place. A vehicle has left its pad when it is above it by [`OFF_PAD_HEIGHT_M`],
+/// however low its climb ends, and its descent when it stands on the ground.
+fn progress_when_left_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     if q.to_m < flight.path.length_m() + flight.descent_m {
-        fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_M - flight.climb_m)
+        fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_HEIGHT_M - flight.climb_m)
     } else {
         q.to_m + 0.01
     }
@@ -278,7 +278,7 @@ const GATE_MERGE_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
 /// For each block of `ws.own` the blocks of `ws.other` that may be in conflict with it, a bit each;
 /// `None` if there are none.
 #[inline(never)]
-fn conflicting_blocks(ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
+fn conflicting_blocks(ws: &ScheduleWorkspace) -> Option<[BlockSet; MAX_BLOCKS]> {
     let mut near = [0; MAX_BLOCKS];
     let mut some = false;
     for (bit, block) in ws.other.chunks(SEGMENTS_PER_BLOCK).enumerate() {
@@ -323,7 +323,7 @@ fn for_each_gate<const W: usize>(
             for q in
                 segments_in_blocks(near, &ws.other).map(|(_, q)| q).filter(moves).filter(earlier)
             {
-                let left_m = cleared_at_m(q, other);
+                let left_m = progress_when_left_m(q, other);
                 if left_m > until_m {
                     (until_m, open_s) = (left_m, other.depart_s + q.to_s);
                 }

@@ -17,7 +17,7 @@
 use heapless::Vec;
 
 use crate::Point;
-use crate::roadmap::{HalfEdge, RoadmapView, target_of};
+use crate::roadmap::{HalfEdge, RoadmapView, decode_target};
 
 pub(crate) mod heap;
 use heap::{Heap, SETTLED};
@@ -26,7 +26,7 @@ use heap::{Heap, SETTLED};
 /// more.
 const HALF_EDGE_CHUNK: usize = 64;
 /// Indices into a chunk of half-edges. 256 entries, so that a `u8` index needs no bounds check.
-type Improvements = [u8; 256];
+type HalfEdgeIndices = [u8; 256];
 
 /// Most targets for which [`search`] runs A* to each target in turn, not Dijkstra: a board's 32
 /// vehicles.
@@ -66,7 +66,7 @@ impl<const N: usize> SearchWorkspace<N> {
     /// the search did not settle `node`.
     pub fn distance_m(&self, node: u16) -> f32 {
         match self.distance.get(usize::from(node)) {
-            Some(&distance) if self.heap.entry_index(node) == SETTLED => distance,
+            Some(&distance) if self.heap.node_mark(node) == SETTLED => distance,
             _ => f32::INFINITY,
         }
     }
@@ -80,7 +80,7 @@ impl<const N: usize> SearchWorkspace<N> {
         out: &mut Vec<u16, P>,
     ) -> Result<(), SearchError> {
         out.clear();
-        if usize::from(node) >= N || self.heap.entry_index(node) != SETTLED {
+        if usize::from(node) >= N || self.heap.node_mark(node) != SETTLED {
             return Err(SearchError::NoPath);
         }
         let mut at = node;
@@ -126,7 +126,7 @@ pub trait Graph {
         here: &Point,
         reached: f32,
         distance: &[f32; N],
-        out: &mut Improvements,
+        out: &mut HalfEdgeIndices,
     ) -> usize;
 }
 
@@ -148,7 +148,7 @@ impl Graph for RoadmapView<'_> {
         here: &Point,
         reached: f32,
         distance: &[f32; N],
-        out: &mut Improvements,
+        out: &mut HalfEdgeIndices,
     ) -> usize {
         // The bound is raised a little, so that rounding hides no improvement; the exact comparison
         // follows in [`relax_edges`]. 1e-6 is eight times the rounding of the three products.
@@ -157,7 +157,7 @@ impl Graph for RoadmapView<'_> {
         let mut count = 0_u8;
         for (place, half_edge) in half_edges.iter().enumerate() {
             let room = distance[target_index::<N>(half_edge)] - reached;
-            let squared = (self.node(target_of(half_edge)) - here).norm_squared();
+            let squared = (self.node(decode_target(half_edge)) - here).norm_squared();
             out[usize::from(count)] = place as u8;
             count =
                 count.wrapping_add(u8::from(squared <= room * libm::fabsf(room) * BOUND_ROUNDING));
@@ -180,9 +180,9 @@ impl<'a> RoadmapWithLengths<'a> {
         let lengths =
             lengths.get_mut(..view.half_edge_count()).ok_or(SearchError::WorkspaceTooSmall)?;
         for node in 0..view.node_count() as u16 {
-            let (first, row) = view.half_edges_of(node);
+            let (first, row) = view.half_edge_row(node);
             for (length, half_edge) in lengths[first..].iter_mut().zip(row) {
-                *length = view.distance_m(node, target_of(half_edge));
+                *length = view.distance_m(node, decode_target(half_edge));
             }
         }
         Ok(Self { view, lengths })
@@ -207,7 +207,7 @@ impl Graph for RoadmapWithLengths<'_> {
         _here: &Point,
         reached: f32,
         distance: &[f32; N],
-        out: &mut Improvements,
+        out: &mut HalfEdgeIndices,
     ) -> usize {
         let mut count = 0_u8;
         let lengths = &self.lengths[first..first + half_edges.len()];
@@ -386,11 +386,11 @@ fn search<const N: usize>(
             let straight = fpu::sqrtf((view.node(node) - goal).norm_squared());
             straight.max(libm::fabsf(a - goal_a)).max(libm::fabsf(b - goal_b))
         };
-        if informed && ws.heap.entry_index(target) != SETTLED {
+        if informed && ws.heap.node_mark(target) != SETTLED {
             let distance = &ws.distance;
-            ws.heap.reorder(|node| distance[usize::from(node)] + heuristic(node));
+            ws.heap.recompute_costs(|node| distance[usize::from(node)] + heuristic(node));
         }
-        while ws.heap.entry_index(target) != SETTLED
+        while ws.heap.node_mark(target) != SETTLED
             && let Some(node) = ws.heap.pop()
         {
             relax_edges(graph, node, &passable, heuristic, ws, &mut gains);
@@ -427,21 +427,21 @@ fn relax_edges<const N: usize>(
     passable: &impl Fn(u16, &HalfEdge) -> bool,
     heuristic: impl Fn(u16) -> f32,
     ws: &mut SearchWorkspace<N>,
-    gains: &mut Improvements,
+    gains: &mut HalfEdgeIndices,
 ) {
     let view = graph.view();
     let distance = &mut ws.distance;
     let (here, reached) = (view.node(node), distance[usize::from(node)]);
-    let (first, row) = view.half_edges_of(node);
+    let (first, row) = view.half_edge_row(node);
     for (chunk, half_edges) in row.chunks(HALF_EDGE_CHUNK).enumerate() {
         let first = first + chunk * HALF_EDGE_CHUNK;
         let count = graph.find_improvements(first, half_edges, &here, reached, distance, gains);
         for &place in gains.iter().take(count) {
             let (k, target) =
-                (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
+                (first + usize::from(place), decode_target(&half_edges[usize::from(place)]));
             let length = reached + graph.length(k, &here, target);
             let gain =
-                length < distance[usize::from(target)] && ws.heap.entry_index(target) != SETTLED;
+                length < distance[usize::from(target)] && ws.heap.node_mark(target) != SETTLED;
             if gain && passable(node, &view.half_edge(k)) {
                 distance[usize::from(target)] = length;
                 ws.parent[usize::from(target)] = node;

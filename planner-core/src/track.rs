@@ -89,7 +89,7 @@ impl Default for TrackConfig {
 
 /// State of the reference on its path. All zero at the first waypoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tracker {
+pub struct ReferenceState {
     /// Arc length of the reference on its path, metres.
     pub along_m: f32,
     /// Speed of the reference along the path, m/s; negative where it flies back.
@@ -113,7 +113,7 @@ pub struct Reference {
 const MIN_LEAD_M: f32 = 0.4;
 /// Additional lead in the open per m/s above [`WALKING_SPEED_MPS`], seconds: twice the delay of
 /// setpoint, response and report together, since the reference slows from half the lead.
-const LEAD_S: f32 = 0.8;
+const LEAD_PER_SPEED_S: f32 = 0.8;
 /// Walking speed, m/s: at this speed [`MIN_LEAD_M`] covers an autopilot's lag.
 const WALKING_SPEED_MPS: f32 = 2.0;
 /// Distance from the end of the path at which the path counts as flown, metres.
@@ -220,7 +220,7 @@ impl PathAhead<'_> {
 pub fn advance<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
-    tracker: &mut Tracker,
+    tracker: &mut ReferenceState,
     advice: &Advice,
     dt_s: f32,
 ) -> Option<Reference> {
@@ -229,7 +229,7 @@ pub fn advance<const W: usize>(
     let dt_s = if dt_s > 0.0 { fminf(dt_s, 1.0) } else { 0.0 };
     let length_m = path.length_m();
     let next = points.partition_point(|w| w.along_m <= tracker.along_m);
-    let leg = next.clamp(1, max_index(points.len(), 2) - 1);
+    let leg = next.clamp(1, max_usize(points.len(), 2) - 1);
     let along_leg = |i: usize| match (points.get(i.wrapping_sub(1)), points.get(i)) {
         (Some(from), Some(to)) => unit_direction(from, to),
         _ => Point::zeros(),
@@ -272,13 +272,17 @@ fn max_lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
     let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, MIN_LEAD_M));
     // Between walls the lead does not grow with the speed: a vehicle that lags could cut a corner.
     let open = deviation_m >= cfg.deviation_max_m;
-    if open { lead_m + LEAD_S * fmaxf(fabsf(speed_mps) - WALKING_SPEED_MPS, 0.0) } else { lead_m }
+    if open {
+        lead_m + LEAD_PER_SPEED_S * fmaxf(fabsf(speed_mps) - WALKING_SPEED_MPS, 0.0)
+    } else {
+        lead_m
+    }
 }
 
 /// A reference slower than this is about to stop, m/s.
 const ABOUT_TO_STOP_MPS: f32 = 0.05;
 
-fn max_index(a: usize, b: usize) -> usize {
+fn max_usize(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
 }
 
@@ -290,7 +294,7 @@ mod tests {
     #[test]
     fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {
         let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
-        let mut tracker = Tracker::default();
+        let mut tracker = ReferenceState::default();
         let (mut at_corner, mut fastest, mut steps) = (f32::INFINITY, 0.0_f32, 0);
         let vehicle = loop {
             let reference = advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.05).unwrap();
@@ -310,7 +314,7 @@ mod tests {
     #[test]
     fn stops_before_the_distance_advised_and_goes_on_when_freed() {
         let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
-        let mut tracker = Tracker::default();
+        let mut tracker = ReferenceState::default();
         for _ in 0..400 {
             let advice = Advice { stop_within_m: 4.0 - tracker.along_m, ..Advice::FREE };
             advance(&cfg, &path, &mut tracker, &advice, 0.05).unwrap();
@@ -331,7 +335,7 @@ mod tests {
         for (x, z) in [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (6.0, 1.0), (9.0, 1.2)] {
             path.push(Point::new(x, 0.0, z), 0.8).unwrap();
         }
-        let mut tracker = Tracker::default();
+        let mut tracker = ReferenceState::default();
         let (mut last, mut steps) = (Point::zeros(), 0);
         loop {
             let before = tracker;

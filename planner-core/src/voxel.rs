@@ -17,7 +17,7 @@ pub enum GridError {
     /// A dimension is zero or above [`MAX_DIM`], or the grid needs more words than 32 bits can
     /// index.
     Dimensions,
-    /// The length of the word slice is not [`GridShape::brick_count`].
+    /// The length of the word slice is not [`GridShape::word_count`].
     WordCount,
     /// The minimum corner or the resolution is not finite, or the resolution is not positive.
     NotFinite,
@@ -49,7 +49,7 @@ impl GridShape {
 
     /// Number of bricks in the grid, which is the number of 64-bit words that it needs;
     /// `usize::MAX` on overflow.
-    pub fn brick_count(&self) -> usize {
+    pub fn word_count(&self) -> usize {
         self.bricks().iter().fold(1, |count: usize, &b| count.saturating_mul(b as usize))
     }
 
@@ -83,7 +83,7 @@ impl GridShape {
     /// Word index and bit mask of a cell. For a cell outside the grid the word is that of another
     /// cell, or an index beyond the words.
     #[inline]
-    pub fn address(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
+    pub fn word_and_mask(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
         let [bx, by, _] = self.bricks();
         let word = (k / 4).wrapping_mul(by).wrapping_add(j / 4).wrapping_mul(bx).wrapping_add(i / 4)
             as usize;
@@ -108,7 +108,7 @@ impl GridShape {
                 (0..bricks[v]).all(|at_v| {
                     let mut cell = [0; 3];
                     (cell[axis], cell[u], cell[v]) = (bricks[axis] - 1, at_u, at_v);
-                    let (word, _) = self.address(cell.map(|brick| brick * BRICK_CELLS));
+                    let (word, _) = self.word_and_mask(cell.map(|brick| brick * BRICK_CELLS));
                     words[word] & padding == 0
                 })
             })
@@ -117,7 +117,7 @@ impl GridShape {
 
     fn check(&self) -> Result<(), GridError> {
         // Words are indexed by 32 bits, on boards and on desktops.
-        let countable = self.brick_count() < u32::MAX as usize;
+        let countable = self.word_count() < u32::MAX as usize;
         if self.dims.iter().any(|&d| d == 0 || d > MAX_DIM) || !countable {
             return Err(GridError::Dimensions);
         }
@@ -147,7 +147,7 @@ impl<'a> VoxelGrid<'a> {
     /// Checks shape, number of words and padding bits. Reads the bricks at the upper faces only.
     pub fn new(shape: GridShape, outside: Outside, words: &'a [u64]) -> Result<Self, GridError> {
         shape.check()?;
-        if words.len() != shape.brick_count() {
+        if words.len() != shape.word_count() {
             return Err(GridError::WordCount);
         }
         if !shape.padding_is_clear(words) {
@@ -180,7 +180,7 @@ impl<'a> VoxelGrid<'a> {
         if (0..3).any(|axis| cell[axis] >= self.shape.dims[axis]) {
             return self.outside == Outside::Blocked;
         }
-        let (word, mask) = self.shape.address(cell);
+        let (word, mask) = self.shape.word_and_mask(cell);
         self.words[word] & mask != 0
     }
 

@@ -5,7 +5,7 @@ use planner_core::frames::{Geodetic, Projection};
 
 use super::estimator::EstimateErrors;
 use super::vehicle::VehicleLimits;
-use crate::{AutopilotKind, Estimator};
+use crate::{AutopilotKind, EstimatorErrors};
 
 impl AutopilotKind {
     /// Factor on the airframe's drag. ArduCopter's follows from recorded flights of its simulated
@@ -61,7 +61,7 @@ pub struct Config {
     /// Standard deviation of a random error of the position estimate, metres.
     pub position_noise_m: f32,
     /// Error model of the estimator.
-    pub estimator: Estimator,
+    pub estimator: EstimatorErrors,
     /// Whether PX4 has a distance sensor, as in the recordings: then it lands at `MPC_LAND_CRWL`
     /// over the last metre.
     pub distance_sensor: bool,
@@ -98,7 +98,7 @@ impl Default for Config {
             wind: Point::zeros(),
             gust_mps: 0.0,
             position_noise_m: 0.0,
-            estimator: Estimator::Perfect,
+            estimator: EstimatorErrors::Perfect,
             distance_sensor: false,
             seed: 1,
             boot_unix_us: 1_767_225_600_000_000,

@@ -18,10 +18,10 @@
 
 use planner_core::Point;
 
-use super::noise::{Gaussian, SLOT_S};
-use crate::{AutopilotKind, Estimator};
+use super::noise::{Gaussian, UPDATE_PERIOD_S};
+use crate::{AutopilotKind, EstimatorErrors};
 
-impl Estimator {
+impl EstimatorErrors {
     /// Horizontal and vertical accuracy that ESTIMATOR_STATUS reports, metres. Recorded PX4s
     /// reported 0.02 to 0.29 and 0.07 to 0.3, whatever their error was.
     pub(super) fn accuracy_m(self) -> [f32; 2] {
@@ -39,34 +39,34 @@ struct ErrorModel {
     sigma_mps: f32,
     tau_s: f32,
     pull_s: f32,
-    most_m: f32,
+    max_error_m: f32,
 }
 
 impl ErrorModel {
-    const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, pull_s: 1.0, most_m: 0.0 };
+    const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, pull_s: 1.0, max_error_m: 0.0 };
 }
 
 /// Models of the horizontal axes and of the height, and the range of the constant height error,
 /// metres.
 fn error_models(
-    estimator: Estimator,
+    estimator: EstimatorErrors,
     autopilot: AutopilotKind,
 ) -> (ErrorModel, ErrorModel, [f32; 2]) {
     match (estimator, autopilot) {
-        (Estimator::Perfect, _) => (ErrorModel::NONE, ErrorModel::NONE, [0.0, 0.0]),
-        (Estimator::Rtk, _) => (
-            ErrorModel { sigma_mps: 0.02, tau_s: 3.0, pull_s: 1.5, most_m: 0.1 },
-            ErrorModel { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, most_m: 0.15 },
+        (EstimatorErrors::Perfect, _) => (ErrorModel::NONE, ErrorModel::NONE, [0.0, 0.0]),
+        (EstimatorErrors::Rtk, _) => (
+            ErrorModel { sigma_mps: 0.02, tau_s: 3.0, pull_s: 1.5, max_error_m: 0.1 },
+            ErrorModel { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, max_error_m: 0.15 },
             [0.0, 0.0],
         ),
-        (Estimator::Recorded, AutopilotKind::Px4) => (
-            ErrorModel { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, most_m: 0.75 },
-            ErrorModel { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, most_m: 0.7 },
+        (EstimatorErrors::Recorded, AutopilotKind::Px4) => (
+            ErrorModel { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, max_error_m: 0.75 },
+            ErrorModel { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, max_error_m: 0.7 },
             [-0.43, 0.34],
         ),
-        (Estimator::Recorded, AutopilotKind::Ardupilot) => (
-            ErrorModel { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, most_m: 0.11 },
-            ErrorModel { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, most_m: 0.08 },
+        (EstimatorErrors::Recorded, AutopilotKind::Ardupilot) => (
+            ErrorModel { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, max_error_m: 0.11 },
+            ErrorModel { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, max_error_m: 0.08 },
             [0.0, 0.0],
         ),
     }
@@ -89,7 +89,7 @@ pub struct EstimateErrors {
 
 impl EstimateErrors {
     /// Stationary errors: the first values have the same distribution as later ones.
-    pub fn new(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Self {
+    pub fn new(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
         let (across, up, height_m) = error_models(estimator, autopilot);
         // A number within ±1.75 becomes a share of the range from 0 to 1; the generator's others,
@@ -105,7 +105,7 @@ impl EstimateErrors {
             rate: Point::zeros(),
         };
         // After 30 s the start at zero has no effect any more.
-        for _ in 0..(30.0 / SLOT_S) as usize {
+        for _ in 0..(30.0 / UPDATE_PERIOD_S) as usize {
             errors.advance();
         }
         errors
@@ -116,22 +116,22 @@ impl EstimateErrors {
         self.height_m
     }
 
-    /// Updates the errors by one period of [`SLOT_S`].
+    /// Updates the errors by one period of [`UPDATE_PERIOD_S`].
     pub fn advance(&mut self) {
         for (k, axis) in self.axes.iter().enumerate() {
-            let keep = libm::expf(-SLOT_S / axis.tau_s);
+            let keep = libm::expf(-UPDATE_PERIOD_S / axis.tau_s);
             let kick = axis.sigma_mps * libm::sqrtf(1.0 - keep * keep);
             self.velocity[k] = keep * self.velocity[k] + kick * self.random.sample();
             self.rate[k] = self.velocity[k] - self.drift[k] / axis.pull_s;
-            self.drift[k] += self.rate[k] * SLOT_S;
+            self.drift[k] += self.rate[k] * UPDATE_PERIOD_S;
         }
         let across = libm::sqrtf(self.drift.x * self.drift.x + self.drift.y * self.drift.y);
-        let most_m = self.axes[0].most_m;
+        let most_m = self.axes[0].max_error_m;
         if across > most_m {
             self.drift.x *= most_m / across;
             self.drift.y *= most_m / across;
         }
-        let up_m = self.axes[2].most_m;
+        let up_m = self.axes[2].max_error_m;
         self.drift.z = self.drift.z.clamp(-up_m, up_m);
         self.position = self.drift + Point::new(0.0, 0.0, self.height_m);
     }
@@ -149,7 +149,7 @@ mod tests {
         velocity: [f32; 2],
     }
 
-    fn flight(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Flight {
+    fn flight(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> Flight {
         let mut errors = EstimateErrors::new(estimator, autopilot, seed);
         let (mut positions, mut across_v, mut up_v) = (Vec::new(), 0.0, 0.0);
         for _ in 0..3000 {
@@ -203,7 +203,7 @@ mod tests {
         ];
         for (autopilot, across, up, velocity) in ranges {
             let flights: Vec<Flight> =
-                (0..100).map(|seed| flight(Estimator::Recorded, autopilot, seed)).collect();
+                (0..100).map(|seed| flight(EstimatorErrors::Recorded, autopilot, seed)).collect();
             for k in 0..4 {
                 let what = ["RMS", "greatest", "RMS of drift", "greatest drift"][k];
                 holds(
@@ -229,7 +229,7 @@ mod tests {
     fn rtk_stays_within_what_it_promises() {
         for seed in 0..200 {
             for autopilot in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
-                let f = flight(Estimator::Rtk, autopilot, seed);
+                let f = flight(EstimatorErrors::Rtk, autopilot, seed);
                 assert!(f.across[1] <= 0.1 && f.up[1] <= 0.15 && f.across[1] > 0.01);
             }
         }
@@ -237,9 +237,9 @@ mod tests {
 
     #[test]
     fn the_same_seed_errs_alike_and_a_perfect_estimate_never() {
-        let run = |seed| flight(Estimator::Recorded, AutopilotKind::Px4, seed).across;
+        let run = |seed| flight(EstimatorErrors::Recorded, AutopilotKind::Px4, seed).across;
         assert_eq!(run(3), run(3));
         assert_ne!(run(3), run(4));
-        assert_eq!(flight(Estimator::Perfect, AutopilotKind::Px4, 3).across, [0.0; 4]);
+        assert_eq!(flight(EstimatorErrors::Perfect, AutopilotKind::Px4, 3).across, [0.0; 4]);
     }
 }

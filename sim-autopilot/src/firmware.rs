@@ -37,7 +37,7 @@ impl Firmware {
     /// Default telemetry streams: message id and interval in µs; 0: off until requested.
     pub(super) fn streams(personality: AutopilotKind) -> &'static [(u32, u32)] {
         match personality {
-            AutopilotKind::Px4 => &telemetry::STREAMS,
+            AutopilotKind::Px4 => &telemetry::PX4_STREAMS,
             AutopilotKind::Ardupilot => &ardupilot::STREAMS,
         }
     }

@@ -127,7 +127,7 @@ impl Platform {
                 Some(leg) => {
                     let begun = self.missions.progress.since_us.is_some();
                     self.missions.progress.since_us.get_or_insert(sensors.now_us);
-                    if !(begun && self.is_done(&leg, sensors, landed)) {
+                    if !(begun && self.is_leg_done(&leg, sensors, landed)) {
                         return Some(leg);
                     }
                 }
@@ -213,7 +213,7 @@ impl Platform {
         }
     }
 
-    fn is_done(&mut self, leg: &MissionLeg, sensors: &SensorReadings, landed: bool) -> bool {
+    fn is_leg_done(&mut self, leg: &MissionLeg, sensors: &SensorReadings, landed: bool) -> bool {
         let progress = &mut self.missions.progress;
         let since = |us: Option<u64>| {
             sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6

@@ -12,7 +12,7 @@ pub enum AutopilotKind {
 
 /// Error model of an autopilot's position estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Estimator {
+pub enum EstimatorErrors {
     /// No error: the estimate is the true position.
     #[default]
     Perfect,

@@ -65,7 +65,7 @@ use planner_core::frames::{self, Geodetic};
 pub use self::camera::Photo;
 pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
-pub use self::kinds::{AutopilotKind, Estimator};
+pub use self::kinds::{AutopilotKind, EstimatorErrors};
 use self::platform::{IntegralAction, Platform};
 use self::port::Port;
 pub use self::px4::Mode;
@@ -213,7 +213,7 @@ impl Autopilot {
             velocity.z += order.demand.height_rate_share * (sensors.height_rate - velocity.z);
             platform.vehicle.control(&order.demand, gains, &sensors.position, &velocity, dt_s);
         }
-        platform.demand = armed.then_some(order.demand);
+        platform.last_demand = armed.then_some(order.demand);
         platform.vehicle.advance(order.lift, &platform.disturbance.wind, ground_up_m, dt_s);
         platform.frame.recentre(platform.vehicle.position());
         if was_armed && !armed {
@@ -248,7 +248,7 @@ impl Autopilot {
                 self.platform.ports[index].param_cursor = more.then_some(next + 1);
             }
             let port = &mut self.platform.ports[index];
-            if !port.is_due(now_us) {
+            if !port.has_due_stream(now_us) {
                 continue;
             }
             let mut due = core::mem::take(&mut self.due_messages);
@@ -274,7 +274,7 @@ impl Autopilot {
         let force = platform.vehicle.specific_force();
         let force = if truth.touching { Point::new(0.0, 0.0, vehicle::GRAVITY) } else { force };
         let nan = Vector3::repeat(f64::NAN);
-        let target = match &platform.demand {
+        let target = match &platform.last_demand {
             Some(demand) => [
                 platform.frame.ned_from_enu(&demand.position.cast::<f64>()),
                 platform.frame.ned_velocity_from_enu(&platform.vehicle.velocity_setpoint),
@@ -314,7 +314,7 @@ impl Autopilot {
             specific_force: frames::swap_enu_ned(&force),
             heading: (sensors.heading, heading_rate),
             target,
-            height: platform.height,
+            height: platform.height_above_ground,
             accuracy: platform.config.estimator.accuracy_m(),
             battery: sensors.battery,
             attitude: OnceCell::new(),

@@ -22,7 +22,7 @@ const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343
 /// Bit MAV_SYS_STATUS_PREARM_CHECK of SYS_STATUS.
 const PREARM: u32 = 0x1000_0000;
 /// Bit MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL of SYS_STATUS.
-const POSITION_SENSORS: u32 = 0x4000;
+const XY_POSITION_CONTROL: u32 = 0x4000;
 
 /// Messages that many dialects do not have: id, CRC seed and payload as recorded from PX4 1.17.
 /// Their contents do not matter; they test that receivers skip unknown messages.
@@ -79,7 +79,7 @@ impl Snapshot {
             health |= PREARM;
         }
         if !self.gps.2 {
-            health &= !(POSITION_SENSORS | 0x20);
+            health &= !(XY_POSITION_CONTROL | 0x20);
         }
         let bits = dialect::MavSysStatusSensor::from_bits_retain;
         port.send(&dialect::SYS_STATUS_DATA {

@@ -14,7 +14,7 @@ use rand_pcg::Pcg64Mcg;
 use planner_core::Point;
 
 /// Period at which the random processes are updated, seconds.
-pub const SLOT_S: f32 = 0.02;
+pub const UPDATE_PERIOD_S: f32 = 0.02;
 /// Time constant of gusts, seconds: a turbulence length of 20 m at 8 m/s.
 const GUST_TAU_S: f32 = 2.5;
 /// Ratio of a gust's peak to its standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO,
@@ -67,7 +67,7 @@ struct OrnsteinUhlenbeck {
 
 impl OrnsteinUhlenbeck {
     fn new(sigma: Point, tau_s: f32, random: &mut Gaussian) -> Self {
-        let keep = libm::expf(-SLOT_S / tau_s);
+        let keep = libm::expf(-UPDATE_PERIOD_S / tau_s);
         let kick = sigma * libm::sqrtf(1.0 - keep * keep);
         Self { value: random.sample_vector().component_mul(&sigma), decay: keep, noise_gain: kick }
     }
@@ -130,7 +130,7 @@ impl Disturbance {
         new
     }
 
-    /// Updates every process by one period of [`SLOT_S`].
+    /// Updates every process by one period of [`UPDATE_PERIOD_S`].
     pub fn advance(&mut self) {
         if let Some(gust) = &mut self.gust {
             gust.advance(&mut self.random);

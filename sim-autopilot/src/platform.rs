@@ -93,8 +93,8 @@ pub struct Platform {
     pub(super) home: Geodetic,
     pub(super) home_enu: Point,
     home_fixed: bool,
-    pub(super) height: f32,
-    pub(super) demand: Option<Demand>,
+    pub(super) height_above_ground: f32,
+    pub(super) last_demand: Option<Demand>,
     pub(super) ports: Vec<Port>,
     pub(super) missions: Missions,
     pub(super) camera: CameraTrigger,
@@ -133,8 +133,8 @@ impl Platform {
             home,
             home_enu: frames::geodetic_to_enu(&config.world_origin, &home),
             home_fixed: config.home.is_some(),
-            height: 0.0,
-            demand: None,
+            height_above_ground: 0.0,
+            last_demand: None,
             ports: ports.chain(ground).collect(),
             missions: Missions::default(),
             camera: CameraTrigger::default(),
@@ -150,11 +150,12 @@ impl Platform {
     pub(super) fn advance_time(&mut self, dt_s: f32, ground_up_m: f32) {
         self.time_us += libm::roundf(dt_s * 1e6) as u64;
         if self.time_us >= self.next_noise_us {
-            self.next_noise_us += (noise::SLOT_S * 1e6) as u64;
+            self.next_noise_us += (noise::UPDATE_PERIOD_S * 1e6) as u64;
             self.disturbance.advance();
             self.errors.advance();
         }
-        self.height = self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
+        self.height_above_ground =
+            self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
     }
 
     pub(super) fn sensors(&self) -> SensorReadings {
@@ -170,7 +171,11 @@ impl Platform {
             acceleration: state.acceleration,
             heading: state.heading_rad,
             touching: state.touching,
-            distance: if self.config.distance_sensor { self.height } else { f32::INFINITY },
+            distance: if self.config.distance_sensor {
+                self.height_above_ground
+            } else {
+                f32::INFINITY
+            },
             home: self.home_enu,
             battery: state.battery,
         }

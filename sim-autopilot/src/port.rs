@@ -89,7 +89,7 @@ pub struct Port {
     /// Number of PING messages sent.
     pub pings: u32,
     /// Components heard at this port: system and component id.
-    heard: Vec<(u8, u8)>,
+    reachable: Vec<(u8, u8)>,
 }
 
 impl Port {
@@ -119,7 +119,7 @@ impl Port {
             requested_once: Vec::new(),
             param_cursor: None,
             pings: 0,
-            heard: Vec::new(),
+            reachable: Vec::new(),
         }
     }
 
@@ -156,8 +156,8 @@ impl Port {
 
     /// Remembers that this component can be reached by this port.
     pub fn learn_route(&mut self, sender: (u8, u8)) {
-        if !self.heard.contains(&sender) && self.heard.len() < MAX_ROUTES {
-            self.heard.push(sender);
+        if !self.reachable.contains(&sender) && self.reachable.len() < MAX_ROUTES {
+            self.reachable.push(sender);
         }
     }
 
@@ -166,7 +166,7 @@ impl Port {
     pub fn is_route_to(&self, (system, component): (u8, u8)) -> bool {
         let meant =
             |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
-        self.heard.iter().any(meant)
+        self.reachable.iter().any(meant)
     }
 
     /// Queues another sender's frame with its ids and sequence number unchanged.
@@ -234,7 +234,7 @@ impl Port {
     }
 
     /// Whether any stream has a message due.
-    pub fn is_due(&self, now_us: u64) -> bool {
+    pub fn has_due_stream(&self, now_us: u64) -> bool {
         now_us >= self.next_due_us
     }
 

@@ -20,16 +20,16 @@ pub struct JerkLimitedRate {
     /// The rate, m/s.
     pub rate: f32,
     /// Derivative of the rate, m/s².
-    pub change: f32,
+    pub derivative: f32,
 }
 
 impl JerkLimitedRate {
-    /// Advances `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
+    /// Advances `dt` seconds towards `rate`, with at most `derivative` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
         let wanted =
             approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
-        self.change += (wanted - self.change).clamp(-jerk * dt, jerk * dt);
-        self.rate += self.change * dt;
+        self.derivative += (wanted - self.derivative).clamp(-jerk * dt, jerk * dt);
+        self.rate += self.derivative * dt;
     }
 }
 
@@ -39,14 +39,14 @@ mod tests {
 
     #[test]
     fn a_ramp_arrives_within_its_limits_and_hardly_overshoots() {
-        let mut ramp = JerkLimitedRate { rate: 0.0, change: 0.0 };
+        let mut ramp = JerkLimitedRate { rate: 0.0, derivative: 0.0 };
         let (mut most, mut fastest, mut arrived_s) = (0.0_f32, 0.0_f32, 0.0);
         for step in 0..2000_u16 {
-            let before = ramp.change;
+            let before = ramp.derivative;
             ramp.advance(1.5, 3.0, 4.0, 0.004);
-            most = most.max(ramp.change);
+            most = most.max(ramp.derivative);
             fastest = fastest.max(ramp.rate);
-            assert!((ramp.change - before).abs() <= 4.0 * 0.004 + 1e-6);
+            assert!((ramp.derivative - before).abs() <= 4.0 * 0.004 + 1e-6);
             if ramp.rate < 1.4 {
                 arrived_s = f32::from(step) * 0.004;
             }

@@ -65,7 +65,7 @@ pub struct Attitude {
 
 /// The attitude at this heading whose thrust axis points along `force` (specific force, NED,
 /// upward).
-pub fn attitude_from_force(force: &Vector3<f32>, heading: f32) -> Attitude {
+pub fn attitude_from_specific_force(force: &Vector3<f32>, heading: f32) -> Attitude {
     let norm = force.norm().max(0.1);
     let (sin, cos) = libm::sincosf(heading);
     // The body's downward axis in a level frame turned by the heading: (cos φ sin θ, −sin φ, cos φ
@@ -88,7 +88,8 @@ pub fn attitude_from_force(force: &Vector3<f32>, heading: f32) -> Attitude {
 
 impl Snapshot {
     pub(super) fn attitude(&self) -> &Attitude {
-        self.attitude.get_or_init(|| attitude_from_force(&self.specific_force, self.heading.0))
+        self.attitude
+            .get_or_init(|| attitude_from_specific_force(&self.specific_force, self.heading.0))
     }
 
     pub(super) fn is_px4(&self) -> bool {

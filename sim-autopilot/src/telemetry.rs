@@ -12,7 +12,7 @@ use super::port::Port;
 use super::snapshot::Snapshot;
 
 /// PX4's telemetry streams: message id and default interval in µs; 0: off until requested.
-pub const STREAMS: [(u32, u32); 32] = [
+pub const PX4_STREAMS: [(u32, u32); 32] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 200_000),     // SYS_STATUS
     (2, 1_000_000),   // SYSTEM_TIME

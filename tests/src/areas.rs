@@ -61,7 +61,7 @@ fn list(rings: &[Vec<Corner>]) -> String {
 
 /// A [`scenario`] that can be flown: pictures overlap enough for the deviations of vehicles, and
 /// autopilots, gusts, estimates and radio loss vary.
-pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+pub fn flyable_scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = scenario(random, shape, vehicles);
     let overlaps = text.lines().filter(|line| line.starts_with("overlap_"));
     let plain: String =
@@ -92,10 +92,10 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     )
 }
 
-/// As [`flown`], at heights and speeds of real surveys: up to 15 m/s and 120 m, and in some
-/// scenarios with a wide separation.
-pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
-    let text = flown(random, shape, vehicles);
+/// As [`flyable_scenario`], at heights and speeds of real surveys: up to 15 m/s and 120 m, and in
+/// some scenarios with a wide separation.
+pub fn survey_scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+    let text = flyable_scenario(random, shape, vehicles);
     let drawn = |line: &str| match line.split(" = ").next() {
         Some("cruise_mps") => format!("cruise_mps = {:.1}\n", between(random, 8.0, 15.0)),
         Some("height_m") => format!("height_m = {:.1}\n", between(random, 40.0, 120.0)),
@@ -109,10 +109,10 @@ pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     text.lines().map(drawn).collect()
 }
 
-/// As [`fast`], with more lanes than a vehicle's path has room for, so that it is flown in
-/// stretches.
-pub fn large(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
-    let text = fast(random, shape, vehicles);
+/// As [`survey_scenario`], with more lanes than a vehicle's path has room for, so that it is flown
+/// in stretches.
+pub fn many_lanes_scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+    let text = survey_scenario(random, shape, vehicles);
     let drawn = |line: &str| match line.split(" = ").next() {
         Some("height_m") => format!("height_m = {:.1}\n", between(random, 12.0, 20.0)),
         Some("overlap_side") => format!("overlap_side = {:.2}\n", between(random, 0.6, 0.85)),
@@ -124,8 +124,8 @@ pub fn large(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
 
 /// A random convex area with minutes of work for each of so many vehicles; their radio loses the
 /// share `loss` of messages.
-pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
-    let mut text = flown(random, Shape::Convex, vehicles);
+pub fn lossy_radio_scenario(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
+    let mut text = flyable_scenario(random, Shape::Convex, vehicles);
     let keep = |line: &&str| !line.starts_with("radio_loss") && !line.starts_with("cruise_mps");
     text = text.lines().filter(keep).map(|line| format!("{line}\n")).collect();
     text = text.replace(

@@ -96,7 +96,7 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
 ///
 /// # Panics
 /// QEMU does not start.
-pub fn by_the_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
+pub fn start_by_wall_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
     let ports = [free_port(), free_port()];
     let mut qemu = qemu(program);
     qemu.args([

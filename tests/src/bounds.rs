@@ -37,7 +37,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("prm::edge_clearance, to 2 m", "one `segment_clearance`"),
     ("prm::sample_nodes, 2300", "10 000 draws a node"),
     ("prm::sample_nodes, 2300, 0.8 m", "10 000 draws a node"),
-    ("prm::Workspace::build_index, 2300", "n + cubes"),
+    ("prm::NodeIndex::build_index, 2300", "n + cubes"),
     ("prm::connect_range, 2300", "pairs within Dmax × one segment check"),
     ("prm::connect_range, 2300, 0.8 m", "the same"),
     ("prm::connect, 300", "`index` and `connect_range`"),
@@ -72,7 +72,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("deconflict::advise, priority", "g, v a gate in reach, 16 places a neighbour without plan"),
     ("deconflict::advise, algorithm2", "v"),
     ("flight::Path::push", "constant"),
-    ("flight::Path::label_times", "w"),
+    ("flight::Path::set_times_at_speed", "w"),
     ("flight::Path::point_at", "log w"),
     ("flight::Path::points_from, 16", "w and the points"),
     ("flight::Path::project", "w"),
@@ -81,7 +81,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("footprint::Camera::height_for_gsd", "constant"),
     ("area::Area::new, 256", "edges²"),
     ("area::Area::is_in_no_fly_zone", "edges"),
-    ("sweep::least_width, 256", "n · log n of n vertices"),
+    ("sweep::direction_of_least_width, 256", "n · log n of n vertices"),
     ("transit::Transit::set_area, 32 corners", "corners² · edges, and corners³"),
     ("transit::Transit::is_line_clear", "edges of no-fly zones"),
     ("transit::Transit::distance_m", "corners² · edges"),
@@ -94,10 +94,10 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ),
     ("around::plan_vehicle_detour, 128 things", "the same"),
     (
-        "tracks::build, 256 vertices",
+        "tracks::build_lanes, 256 vertices",
         "lanes · vertices, and 2000 looks at the lanes' order, few of which take a way",
     ),
-    ("tracks::build, 512 lanes", "the same"),
+    ("tracks::build_lanes, 512 lanes", "the same"),
     ("lanes::Tracks::waypoint", "log of the lanes"),
     ("lanes::Tracks::distance_to_waypoint_m", "log of the lanes"),
     ("pack::binpat, 3", "v · log of the lanes, v² ways, one assignment"),
@@ -137,7 +137,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("roster::RosterReport::decode", "22 entries"),
     ("fleet::Fleet::step, 32", "v, and a CRC of divisions · v"),
     ("fleet::Fleet::needs_division", "v"),
-    ("fleet::Fleet::take_plan_crc", "a CRC of divisions · v"),
+    ("fleet::Fleet::set_hash_from_plan", "a CRC of divisions · v"),
     ("fleet::Fleet::division_hash", "a CRC of divisions · v"),
     ("fleet::Fleet::handle_roster, 32", "22 entries, and v"),
     ("fleet::Fleet::roster_message", "22 entries"),
@@ -176,7 +176,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
 
 /// What one call took at most.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct CallCost {
     /// Greatest number of instructions counted.
     pub instructions: u64,
     /// Bytes of state or workspace that the call was lent.
@@ -198,11 +198,12 @@ impl Meter for Uncounted {
 /// # Errors
 /// The demo cannot be prepared, the program prints something else, or its coverage plans differ in
 /// any bit from those computed on the desk.
-pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
+pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let map = building::building_map(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
-    let lines = board::measure(program, &mission.roadmap_file, &board::map_image(&map.grid()));
+    let lines =
+        board::measure(program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
     let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());
     let mut scratch = Box::new(WorkspaceOverlay::new());
     let flights = coverage_flights::measure_coverage_flights(
@@ -216,21 +217,21 @@ pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
         "the desk's coverage plans have {desk:?}, the board's\n{}",
         lines.join("\n")
     );
-    lines.iter().filter_map(|line| line.strip_prefix("call ")).map(seen).collect()
+    lines.iter().filter_map(|line| line.strip_prefix("call ")).map(parse_call_line).collect()
 }
 
-fn seen(line: &str) -> Result<(String, Seen)> {
+fn parse_call_line(line: &str) -> Result<(String, CallCost)> {
     let mut words = line.splitn(3, ' ');
     let mut word = || words.next().context("a line of `calls` is cut");
     let (instructions, bytes) = (word()?.parse()?, word()?.parse()?);
-    Ok((word()?.to_owned(), Seen { instructions, bytes }))
+    Ok((word()?.to_owned(), CallCost { instructions, bytes }))
 }
 
 /// The text of the page before its table, the table, and the text behind it.
 ///
 /// # Errors
 /// A marker line around the table is missing from the page.
-pub fn parts(page: &str) -> Result<[&str; 3]> {
+pub fn split_page(page: &str) -> Result<[&str; 3]> {
     const BEFORE: &str = "<!-- written by `cargo xtask bench --only worst-case` -->\n";
     const BEHIND: &str = "<!-- end -->";
     let from = page.find(BEFORE).context("no line where the table begins")? + BEFORE.len();
@@ -242,7 +243,7 @@ pub fn parts(page: &str) -> Result<[&str; 3]> {
 ///
 /// # Errors
 /// A call of [`BOUNDS`] was not counted.
-pub fn table(calls: &HashMap<String, Seen>) -> Result<String> {
+pub fn table(calls: &HashMap<String, CallCost>) -> Result<String> {
     let mut table =
         "| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|\n".to_owned();
     for (name, bound) in BOUNDS {

@@ -13,7 +13,7 @@ use host_sim::{scenario, swarm};
 
 /// Log texts that explain why a vehicle without a fault lands before its part is done: it was not
 /// heard by a majority, or a failed vehicle hovers on its path.
-pub const EXPLAINED: [&str; 10] = [
+pub const EARLY_LANDING_TEXTS: [&str; 10] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
     "Vehicle on the path: planning the way home",
@@ -29,8 +29,8 @@ pub const EXPLAINED: [&str; 10] = [
 /// Log text of a vehicle that lands beside its pad, since another one may lie or come down there.
 pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
 
-/// When the last of the other vehicles began to land or to fly home, seconds, by [`lines`]: nobody
-/// is left to take over what `vehicle` leaves after that.
+/// When the last of the other vehicles began to land or to fly home, seconds, by [`log_lines`]:
+/// nobody is left to take over what `vehicle` leaves after that.
 pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     let mut ended: Vec<(&str, f64)> = Vec::new();
     for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home"))
@@ -46,8 +46,8 @@ pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     ended.iter().fold(0.0, |last, (_, at_s)| last.max(*at_s))
 }
 
-/// Whether `vehicle` itself logged one of `reasons`, in a log by [`lines`].
-pub fn says(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
+/// Whether `vehicle` itself logged one of `reasons`, in a log by [`log_lines`].
+pub fn has_logged(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
     let own = format!(" Some({vehicle}) ");
     log.lines()
         .filter(|line| line.contains(&own))
@@ -89,7 +89,7 @@ pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Res
     Ok(flight)
 }
 
-/// As [`fly`], from a scenario's text; returns the result and the log by [`lines`].
+/// As [`fly`], from a scenario's text; returns the result and the log by [`log_lines`].
 ///
 /// # Errors
 /// Why the mission is not flown.
@@ -98,11 +98,11 @@ pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let (result, log) = fly(&mut mission).map_err(said)?;
-    Ok((result, lines(&log)))
+    Ok((result, log_lines(&log)))
 }
 
 /// The log as text, `time vehicle text` a line: events with a reason (`:`) and errors only.
-pub fn lines(log: &[Event]) -> String {
+pub fn log_lines(log: &[Event]) -> String {
     let mut lines = String::new();
     for event in log.iter().filter(|event| event.text.contains(':') || event.level == Level::Error)
     {

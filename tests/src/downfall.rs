@@ -78,7 +78,7 @@ impl Downfall {
     ///
     /// # Panics
     /// The board does not restart by itself, or the program has no function that only panics.
-    pub fn befall(self, board: &mut EmulatedBoard, program: &Path) {
+    pub fn inflict(self, board: &mut EmulatedBoard, program: &Path) {
         let (address, argument) = match self {
             Self::Reset => (put(board, RESET), 0),
             Self::Fault => (NOWHERE, 0),
@@ -97,7 +97,7 @@ impl Downfall {
 /// The board does not restart.
 pub fn reset(board: &mut EmulatedBoard) {
     // No function of the program is needed for a reset.
-    Downfall::Reset.befall(board, Path::new(""));
+    Downfall::Reset.inflict(board, Path::new(""));
 }
 
 /// Keeps the board busy for `time`, so that none of its tasks runs.

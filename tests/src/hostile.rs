@@ -144,7 +144,7 @@ impl Flight {
         let mut config: Config<4> = Config::new(ID, start, ORIGIN);
         config.mission_crc = 0xC0FFEE;
         config.geofence = Some(FENCE);
-        config.division = over_area.then_some(60.0);
+        config.lost_vehicle_down_s = over_area.then_some(60.0);
         let other = RosterEntry { system_id: NEIGHBOUR, start: Point::new(8.0, 30.0, 3.0) };
         config.roster.push(other).expect("room for two");
         let limits = Limits { speed_mps: SPEED_MPS, fence: Some(FENCE) };
@@ -417,7 +417,7 @@ fn intent() -> Intent {
 }
 
 /// Number of forged frames of one attack.
-const EACH: u64 = 10_000;
+const FRAMES_PER_ATTACK: u64 = 10_000;
 /// Most findings that are kept, of each kind.
 const KEPT: usize = 40;
 
@@ -437,7 +437,7 @@ fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> Report {
     let phases: Vec<Flight> = phases.map(Flight::at_phase).collect();
     let attack = |seed: u64| {
         let flight = phases[seed as usize % PHASES].clone();
-        let mut report = flight.attacked(&mut Dice::new(seed), EACH as usize);
+        let mut report = flight.attacked(&mut Dice::new(seed), FRAMES_PER_ATTACK as usize);
         for what in [&mut report.broken, &mut report.unfit] {
             what.truncate(1);
             what.iter_mut().for_each(|what| *what = format!("seed {seed}: {what}"));
@@ -450,7 +450,10 @@ fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> Report {
         a.unfit.truncate(KEPT);
         a
     };
-    (seed..seed + frames.div_ceil(EACH)).into_par_iter().map(attack).reduce(Report::default, both)
+    (seed..seed + frames.div_ceil(FRAMES_PER_ATTACK))
+        .into_par_iter()
+        .map(attack)
+        .reduce(Report::default, both)
 }
 
 /// The fuzzer's target: the first byte of `data` chooses the phase, the rest are forged frames.

@@ -25,7 +25,7 @@ pub fn parts<const V: usize>(
     };
     let mut parts = share(&left, &living);
     let mut hash = 17u32;
-    for lots in fleet.losses() {
+    for lots in fleet.inputs_of_divisions() {
         let mut done = Vec::new();
         for (rank, lot) in lots.iter().enumerate() {
             let taken = usize::from(lot.along_dm / WAYPOINT_DM).min(parts[rank].len());

@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::flight::{Flight, VehiclePlan};
 use planner_core::frames::Geodetic;
 use planner_core::plan::{
-    self, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
+    self, GoalMode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::roadmap::{self, Edge, RoadmapHeader, RoadmapView};
 use planner_core::schedule::{ScheduleConfig, ScheduleError, ScheduleWorkspace};
@@ -146,7 +146,7 @@ pub struct Swarm {
     /// Tasks of its vehicles.
     pub tasks: Vec<VehicleTask>,
     descents_m: Vec<f32>,
-    mode: Mode,
+    mode: GoalMode,
     /// Separation and speeds of the schedule.
     pub schedule: ScheduleConfig,
     /// Safety distance between centres, metres.
@@ -249,7 +249,7 @@ impl Swarm {
         };
         let tasks = climbs_m.iter().enumerate().map(task).collect();
         let objective = if rng.one_in(3) { Objective::Makespan } else { Objective::TotalDistance };
-        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(objective) };
+        let mode = if labelled { GoalMode::Labelled } else { GoalMode::Unlabelled(objective) };
         let schedule = ScheduleConfig {
             separation_m: safety_m + STRAY_M,
             parked_separation_m,
@@ -281,7 +281,7 @@ impl Swarm {
     ///
     /// # Errors
     /// A part does not fit into a vehicle's memory.
-    pub fn owns(&self, plan: &Plan) -> Result<Vec<Own>, ScheduleError> {
+    pub fn vehicle_plans(&self, plan: &Plan) -> Result<Vec<Own>, ScheduleError> {
         let mut ws = ScheduleWorkspace::default();
         let own = |index: usize| {
             let mut own = Own::default();

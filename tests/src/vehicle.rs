@@ -112,7 +112,7 @@ impl Vehicle {
     pub fn new(program: &path::Path, mission: &Mission, known: &Mission, seed: u64) -> Self {
         let folder = tempfile::tempdir().expect("a temporary directory");
         let mut board = EmulatedBoard::start(program, &folder.path().join("log")).expect("a board");
-        let bank = boards::flash_bank_image(&known.roadmap_file, &known.mission_file)
+        let bank = boards::flash_bank_image(&known.roadmap_or_field_file, &known.mission_file)
             .expect("it holds them");
         board.load_flash(&bank).expect("a board");
         let mut config = config(mission);
@@ -150,7 +150,7 @@ impl Vehicle {
 
     /// Makes the board fail now; it restarts by itself.
     pub fn bring_down(&mut self, how: Downfall) {
-        how.befall(&mut self.board, &self.program);
+        how.inflict(&mut self.board, &self.program);
         self.starts();
         // Until the board has restarted, nothing is received from it.
         for _ in 0..how.lasts().as_micros() / STEP.as_micros() {
@@ -181,7 +181,7 @@ impl Vehicle {
     }
 
     /// Sends the companion a command by its radio, as a ground station.
-    pub fn order(&mut self, command: MavCmd, param1: f32) {
+    pub fn send_command(&mut self, command: MavCmd, param1: f32) {
         let data = COMMAND_LONG_DATA {
             command,
             param1,
@@ -189,11 +189,11 @@ impl Vehicle {
             target_component: COMPANION_COMPONENT,
             ..COMMAND_LONG_DATA::DEFAULT
         };
-        self.tell(&data);
+        self.send_message(&data);
     }
 
     /// Sends the companion a message by its radio, as a ground station.
-    pub fn tell(&mut self, data: &impl MessageData) {
+    pub fn send_message(&mut self, data: &impl MessageData) {
         let mut out = [0; frame::MAX_FRAME_LEN];
         let header = Header { system: 255, component: 190, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
@@ -274,7 +274,7 @@ impl Vehicle {
             let due = last.is_none_or(|last| vehicle.time - last > AGAIN);
             if vehicle.heard.state == State::Ready && due {
                 last = Some(vehicle.time);
-                vehicle.order(MavCmd::MAV_CMD_MISSION_START, 0.0);
+                vehicle.send_command(MavCmd::MAV_CMD_MISSION_START, 0.0);
             }
             !ON_PAD.contains(&vehicle.heard.state)
         });

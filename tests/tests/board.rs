@@ -36,9 +36,10 @@ fn the_board_computes_what_the_desk_computes() {
     let map = building::building_map(building::DEFAULT_SEED, 0.5)
         .expect("the building")
         .voxel_map(Unknown::Blocked);
-    let lines = board::measure(&program, &mission.roadmap_file, &board::map_image(&map.grid()));
+    let lines =
+        board::measure(&program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
 
-    let view = mission.view();
+    let view = mission.roadmap_view();
     let mut ws = Box::new(Workspace::new());
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, &mut ws);
@@ -94,7 +95,7 @@ fn at_its_limits_the_board_answers_as_the_desk_does() {
 
 /// CRC of the plan for the whole swarm.
 fn swarm_crc(mission: &Mission) -> u32 {
-    let view = mission.view();
+    let view = mission.roadmap_view();
     let (vehicles, descents_m) = (cases::vehicle_tasks(&view), cases::goal_descents(&view));
     let request = cases::plan_request(&vehicles, &descents_m);
     let mut ws = host_sim::capacity::on_heap(PlanWorkspace::<4096, 32, 2048>::new);
@@ -107,7 +108,7 @@ fn swarm_crc(mission: &Mission) -> u32 {
 fn built(grid: &planner_core::voxel::VoxelGrid<'_>, config: &Config) -> String {
     let mut nodes = vec![planner_core::Point::zeros(); config.nodes];
     prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");
-    let mut index = Box::new(prm::Workspace::<4096, 8192>::new());
+    let mut index = Box::new(prm::NodeIndex::<4096, 8192>::new());
     let mut edges = vec![prm::Edge::default(); 1 << 15];
     let count = prm::connect(grid, &nodes, config, &mut index, &mut edges).expect("it connects");
     let edge = |e: &prm::Edge| planner_core::roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };

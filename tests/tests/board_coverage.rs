@@ -99,8 +99,9 @@ fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
         let told: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();
         assert_eq!(told.len(), 1, "vehicle {vehicle}: {:?}", flight.divisions);
         let lots = &told[0].lots;
-        let plan =
-            mission.plan_rest(&[], std::iter::once(&lots[..])).expect("the desk divides it too");
+        let plan = mission
+            .plan_remaining(&[], std::iter::once(&lots[..]))
+            .expect("the desk divides it too");
         println!("{:?}", told[0]);
         assert_eq!(lots.iter().map(|lot| lot.alive).collect::<Vec<_>>(), [true, true, false]);
         assert_eq!(told[0].plan_crc, plan.crc, "vehicle {vehicle}: {lots:?}");

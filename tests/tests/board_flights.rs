@@ -318,7 +318,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
     let (mut vehicle, place) = demo_on_its_way(&program);
     // An upload by the radio, another roadmap than the one that is flown on.
     let ((turn, turns), (sends, sent)) = (sync_channel(1), sync_channel(1));
-    let other = mission(LOBBY).roadmap_file;
+    let other = mission(LOBBY).roadmap_or_field_file;
     let began = Instant::now();
     let upload = thread::spawn(move || {
         let radio = Radio { turns, sends, now: began, heard: Vec::new(), sent: Vec::new() };
@@ -349,13 +349,13 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
         let around = vehicle.heard.texts.iter().any(|text| text == "Flying around");
         if around && left > 0 && vehicle.heard.state == State::Follow && steps % 250 == 0 {
             // It hovers, rather than to land before all has come.
-            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0);
+            vehicle.send_command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0);
         } else if left == 0 && vehicle.heard.state == State::Paused && steps % 250 == 0 {
-            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
+            vehicle.send_command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
         }
         !uploads && is_over(vehicle)
     });
-    let stack = vehicle.board.stack_used().expect("a board");
+    let stack = vehicle.board.max_stack_used().expect("a board");
     let (count, gap_ms) = reported(&mut vehicle);
     let heard = &vehicle.heard;
     println!("{:?}", heard.texts);
@@ -389,7 +389,7 @@ fn demo_on_its_way(program: &Path) -> (Vehicle, Geodetic) {
 
 /// Something lies on the path: it has to be planned around, in the air.
 fn block(vehicle: &mut Vehicle, place: &Geodetic) {
-    vehicle.tell(&COMMAND_INT_DATA {
+    vehicle.send_message(&COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
         target_system: 1,
         frame: MavFrame::MAV_FRAME_GLOBAL,

@@ -77,7 +77,7 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
 #[test]
 fn by_the_wall_clock_a_board_answers_through_its_port() {
     let Some(program) = board::program("flockmate") else { return };
-    let (_board, [autopilot, _]) = board::by_the_clock(&program);
+    let (_board, [autopilot, _]) = board::start_by_wall_clock(&program);
     let mut client = FtpClient::new(autopilot.open().expect("its port is open"), None);
     assert_eq!(client.wait_for_companion().expect("it speaks"), 250);
 }

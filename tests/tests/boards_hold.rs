@@ -167,10 +167,12 @@ fn a_fine_hall_of_a_million_edges_fits() {
 #[test]
 fn boards_are_what_their_firmware_is() {
     use firmware::capacity::{GATES, HALF_EDGES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES};
-    let BoardCapacity { nodes, half_edges, vehicles, gates, pieces, .. } = BOARDS[0];
+    let BoardCapacity { nodes, half_edges, vehicles, gates, timed_segments: pieces, .. } =
+        BOARDS[0];
     let held = [ROADMAP_NODES, HALF_EDGES, VEHICLES, GATES, TIMED_SEGMENTS];
     assert_eq!([nodes, half_edges, vehicles, gates, pieces], held);
     let halved = [nodes / 2, half_edges / 2, vehicles / 2, gates, pieces / 2];
-    let BoardCapacity { nodes, half_edges, vehicles, gates, pieces, .. } = BOARDS[2];
+    let BoardCapacity { nodes, half_edges, vehicles, gates, timed_segments: pieces, .. } =
+        BOARDS[2];
     assert_eq!([nodes, half_edges, vehicles, gates, pieces], halved);
 }

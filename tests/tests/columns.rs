@@ -12,7 +12,7 @@ use host_sim::{scenario, shortage, swarm};
 use planner_core::Point;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
-use sim_autopilot::Estimator;
+use sim_autopilot::EstimatorErrors;
 
 /// How far `estimator = "rtk"` errs across, metres.
 const RTK_ERROR_M: f32 = 0.1;
@@ -127,7 +127,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
         // columns alone that are tried.
         let fits = case.margin_m >= RTK_ERROR_M;
         let (estimator, cruise_mps) =
-            if fits { (Estimator::Rtk, 1.0) } else { (Estimator::Perfect, 0.3) };
+            if fits { (EstimatorErrors::Rtk, 1.0) } else { (EstimatorErrors::Perfect, 0.3) };
         let mut rng = Pcg32::seed_from_u64(1);
         let (mut flown, mut walled_off, mut missed) = (0, 0, 0);
         let (mut contacts, mut refused, mut hints) = (0, 0, 0);

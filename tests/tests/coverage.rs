@@ -5,7 +5,7 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::costs::Costs;
 use flockmate_tests::shared_data;
 use host_sim::coverage::CoveragePlan;
-use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::coverage::check::{CoverageFindings, check_plan};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario::coverage::Method;
@@ -20,7 +20,7 @@ fn areas() -> u64 {
     std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
 }
 
-fn findings(scenario: &Scenario, method: Method) -> Result<Findings, String> {
+fn findings(scenario: &Scenario, method: Method) -> Result<CoverageFindings, String> {
     let planned = CoveragePlan::new(scenario, method).map_err(|error| format!("{error:#}"))?;
     Ok(check_plan(&planned))
 }
@@ -45,7 +45,7 @@ fn random_areas_are_covered() {
         } else {
             Err(format!(
                 "seed {seed}: {:?}\n{text}",
-                Findings { over_time: Vec::new(), ..findings }
+                CoverageFindings { new_cells_over_time: Vec::new(), ..findings }
             ))
         }
     };
@@ -120,7 +120,7 @@ fn brute_force(planned: &CoveragePlan<'_>, from: u32, vehicles: &[usize], layers
     }
     let distance = |a: &Flat, b: &Flat| f64::from(a.x - b.x).hypot(f64::from(a.y - b.y));
     let place = |number: u32| planned.tracks.waypoint(number).expect("a waypoint");
-    let heights = planned.wanted.heights;
+    let heights = planned.area_settings.heights;
     let mut best = f64::INFINITY;
     for (i, &v) in vehicles.iter().enumerate() {
         for (j, &layer) in layers.iter().enumerate() {
@@ -223,7 +223,11 @@ fn real_areas_are_covered() {
                 planned.plan.max_cost_s(),
                 planned.lower_bound_s
             );
-            assert!(found.is_clean(), "{name}: {:?}", Findings { over_time: Vec::new(), ..found });
+            assert!(
+                found.is_clean(),
+                "{name}: {:?}",
+                CoverageFindings { new_cells_over_time: Vec::new(), ..found }
+            );
         }
     }
 }
@@ -335,7 +339,11 @@ fn bad_areas_are_refused_by_name_or_covered() {
         match found {
             Ok(found) if why.is_empty() => {
                 let judged = found.cells > 0 && found.is_clean();
-                assert!(judged, "{shown}: {:?}", Findings { over_time: Vec::new(), ..found });
+                assert!(
+                    judged,
+                    "{shown}: {:?}",
+                    CoverageFindings { new_cells_over_time: Vec::new(), ..found }
+                );
             }
             Err(error) if !why.is_empty() => {
                 assert!(error.contains(why), "{shown} {more}: {error}");

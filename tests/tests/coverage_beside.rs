@@ -56,8 +56,11 @@ fn flies_around(log: &str) -> Option<(f32, u8)> {
 fn struck(seed: u64) -> (bool, Option<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
-    let mut text =
-        areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.4 } else { 0.1 });
+    let mut text = areas::lossy_radio_scenario(
+        &mut random,
+        count,
+        if (seed / 2).is_multiple_of(2) { 0.4 } else { 0.1 },
+    );
     let hovers = 1 + (random.next_u32() % count as u32) as u8;
     let at_s = 60.0 + (random.next_u32() % 150) as f32;
     text += &fault(HOVERS[(seed / 4 % 2) as usize], at_s, hovers);

@@ -26,17 +26,17 @@ const NO_FLIGHT: [&str; 6] = [
 /// `FLOCKMATE_FLOWN=N` flies more, `FLOCKMATE_FLOWN_FROM` others.
 #[test]
 fn random_areas_are_photographed_whole() {
-    are_photographed_whole(areas::flown, 0);
+    are_photographed_whole(areas::flyable_scenario, 0);
 }
 
 #[test]
 fn random_areas_are_photographed_whole_fast_and_from_high() {
-    are_photographed_whole(areas::fast, 0);
+    are_photographed_whole(areas::survey_scenario, 0);
 }
 
 #[test]
 fn large_random_areas_are_photographed_whole_in_stretches() {
-    are_photographed_whole(areas::large, 1);
+    are_photographed_whole(areas::many_lanes_scenario, 1);
 }
 
 /// At least `stretched` of them are flown in stretches.

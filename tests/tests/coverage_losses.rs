@@ -76,7 +76,7 @@ enum Radio {
 
 /// One with so many lanes that it is flown in stretches.
 fn large(random: &mut Pcg32, vehicles: usize, loss: f32) -> String {
-    let text = areas::large(random, Shape::Convex, vehicles);
+    let text = areas::many_lanes_scenario(random, Shape::Convex, vehicles);
     let kept = text.lines().filter(|line| !line.starts_with("radio_loss"));
     kept.map(|line| format!("{line}\n")).collect::<String>() + &format!("radio_loss = {loss}\n")
 }
@@ -157,7 +157,8 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY);
     // With nothing left to photograph it may land where there is room.
     let aside = whole.then_some(covered::LANDS_ASIDE);
-    let reasons: Vec<&str> = covered::EXPLAINED.into_iter().chain(rough).chain(aside).collect();
+    let reasons: Vec<&str> =
+        covered::EARLY_LANDING_TEXTS.into_iter().chain(rough).chain(aside).collect();
     // On its pad it waits on where nobody flies any more who could take its part.
     let waits = |v: &VehicleResult| {
         v.end.starts_with("Scheduled")
@@ -177,7 +178,7 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         explained: vehicles
             .iter()
             .filter(fell_short)
-            .all(|v| covered::says(&log, v.id, &reasons) || waits(v))
+            .all(|v| covered::has_logged(&log, v.id, &reasons) || waits(v))
             && (whole
                 || landed_short > 0
                 || missing <= reported as f64
@@ -213,7 +214,7 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
     let one = |seed: u64| -> Option<(u64, f32, bool)> {
         let mut random = Pcg32::seed_from_u64(seed);
         let count = 3 + (seed % 3) as usize;
-        let text = areas::lost(&mut random, count, [0.1, 0.5][(seed % 2) as usize]);
+        let text = areas::lossy_radio_scenario(&mut random, count, [0.1, 0.5][(seed % 2) as usize]);
         let (_, log) = covered::fly_text(&text).ok()?;
         // The first that lands, near the beginning of its descent at a metre a second.
         let line = log.lines().find(|line| line.contains("At the goal: landing"))?;
@@ -242,7 +243,7 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
         let all_down = flight.result.vehicles.iter().all(down);
         let near = nearest_m < flight.result.safety.safety_distance_m as f32;
         if near || !all_down || flight.result.safety.wall_contacts > 0 {
-            let said = covered::lines(&flight.log);
+            let said = covered::log_lines(&flight.log);
             println!("seed {seed}: {nearest_m} m {:?}\n{struck}\n{said}", flight.result.vehicles);
         }
         Some((seed, nearest_m, near || !all_down))
@@ -267,7 +268,8 @@ fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
     let one = |seed: u64| -> Option<(u64, bool)> {
         let mut random = Pcg32::seed_from_u64(seed);
         let count = 3 + (seed % 3) as usize;
-        let mut text = areas::lost(&mut random, count, [0.1, 0.5][(seed % 2) as usize]);
+        let mut text =
+            areas::lossy_radio_scenario(&mut random, count, [0.1, 0.5][(seed % 2) as usize]);
         let silent = random.next_u32() % count as u32;
         let at_s = 15 + random.next_u32() % 220;
         let direction = ["both", "tx"][(random.next_u32() % 2) as usize];
@@ -321,7 +323,7 @@ fn what_waits_below_a_vehicle_that_a_pilot_keeps_is_photographed_by_the_others()
 
 /// One vehicle is lost among others with radios that lose messages one by one.
 const EVEN: Draw = Draw {
-    area: areas::lost,
+    area: areas::lossy_radio_scenario,
     kinds: KINDS,
     until_s: 220,
     struck: 1,
@@ -384,7 +386,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
     let one = |seed: u64| -> usize {
         let mut random = Pcg32::seed_from_u64(seed);
         let vehicles = 2 + (random.next_u32() % 5) as usize;
-        let text = areas::lost(&mut random, vehicles, 0.0);
+        let text = areas::lossy_radio_scenario(&mut random, vehicles, 0.0);
         let scenario = scenario::parse(&text, "area").expect("a scenario");
         let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
         let Ok(mut plan) = mission.plan() else { return 0 };
@@ -411,7 +413,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
             losses.push(lots.clone());
             // Where vehicles hold nearer to each other than any order of departures allows there is
             // none, nor where a path would need more corners than it may have.
-            match mission.plan_rest(&[], losses.iter().map(|lots| &lots[..])) {
+            match mission.plan_remaining(&[], losses.iter().map(|lots| &lots[..])) {
                 Ok(divided) => plan = divided,
                 Err(error) => {
                     let text = format!("{error:#}");
@@ -462,7 +464,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
 fn stretches_leave_nothing_out_and_give_nothing_twice() {
     let one = |seed: u64| -> usize {
         let mut random = Pcg32::seed_from_u64(seed);
-        let text = areas::large(&mut random, Shape::Convex, 1 + (seed % 3) as usize);
+        let text = areas::many_lanes_scenario(&mut random, Shape::Convex, 1 + (seed % 3) as usize);
         let Ok(scenario) = scenario::parse(&text, "area") else { return 0 };
         let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
         let mut plan = mission.plan().expect("it was planned");
@@ -476,7 +478,7 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
             }
             losses.push(lots);
             plan = mission
-                .plan_rest(&[], losses.iter().map(|lots| &lots[..]))
+                .plan_remaining(&[], losses.iter().map(|lots| &lots[..]))
                 .expect("it was divided before");
         }
         kept.extend(plan.flights.iter().flat_map(|flight| pictures(flight, f32::INFINITY)));

@@ -7,7 +7,7 @@ use companion::link::frame::{self, Framer, Header};
 use companion::time::Instant;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::{self, Picture};
-use host_sim::coverage::export::{self, Item};
+use host_sim::coverage::export::{self, MissionItem};
 use host_sim::coverage::flight::{Stop, StopAction};
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
@@ -78,7 +78,7 @@ impl Client {
         }
     }
 
-    fn upload(&mut self, items: &[Item]) {
+    fn upload(&mut self, items: &[MissionItem]) {
         let count = items.len() as u16;
         let [low, high] = count.to_le_bytes();
         self.send(44, &[low, high, 1, 1, 0]);
@@ -119,10 +119,10 @@ impl Client {
 fn fly(
     planned: &CoveragePlan<'_>,
     stops: &[Stop],
-    items: &[Item],
+    items: &[MissionItem],
     personality: AutopilotKind,
 ) -> Vec<Photo> {
-    let origin = planned.wanted.origin;
+    let origin = planned.area_settings.origin;
     let start = stops[0].position;
     let config = Config {
         autopilot: personality,
@@ -142,9 +142,13 @@ fn fly(
     };
     client.run(3.0);
     // The delay before it leaves is the swarm's; ArduPilot's item 0 is home.
-    let mut items: Vec<Item> = items.iter().filter(|item| item.command != 93).cloned().collect();
+    let mut items: Vec<MissionItem> =
+        items.iter().filter(|item| item.command != 93).cloned().collect();
     if personality == AutopilotKind::Ardupilot {
-        items.insert(0, Item { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] });
+        items.insert(
+            0,
+            MissionItem { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] },
+        );
     }
     client.upload(&items);
     if personality == AutopilotKind::Ardupilot {
@@ -216,7 +220,7 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
         let items = export::flight_items(&planned, sortie, stops);
         let photos = fly(&planned, stops, &items, personality);
         let wanted: Vec<&Stop> =
-            stops.iter().filter(|s| matches!(s.act, StopAction::Photo(_))).collect();
+            stops.iter().filter(|s| matches!(s.action, StopAction::Photo(_))).collect();
         assert!(wanted.len() > 10);
         let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
         let label = format!("{personality:?}, {trigger}: {} of {}", photos.len(), wanted.len());
@@ -332,7 +336,7 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
             }
             let found = check::check_pictures(&planned, pictures);
             assert_eq!(
-                (found.covered_share, found.missing),
+                (found.covered_share, found.first_missing_cell),
                 (1.0, None),
                 "{personality:?}, {trigger}"
             );

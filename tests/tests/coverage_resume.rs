@@ -29,7 +29,7 @@ fn drawn(seed: u64) -> (String, Vec<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [1, 3, 5][(seed % 3) as usize];
     let loss = if seed.is_multiple_of(2) { 0.5 } else { 0.1 };
-    let text = areas::lost(&mut random, count, if count == 1 { 0.0 } else { loss });
+    let text = areas::lossy_radio_scenario(&mut random, count, if count == 1 { 0.0 } else { loss });
     let flights = 1 + random.next_u32() % 2;
     let mut faults = Vec::new();
     for _ in 0..flights {
@@ -65,7 +65,7 @@ fn fly(
     }
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let (result, log) = covered::fly_on(&mut mission, pictures).map_err(said)?;
-    Ok((result, covered::lines(&log)))
+    Ok((result, covered::log_lines(&log)))
 }
 
 /// What came of a mission.
@@ -148,7 +148,8 @@ fn around(seed: u64) -> (bool, Option<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
     // By a good estimate: what is left out is judged by true places.
-    let text = areas::lost(&mut random, count, 0.1).replace("\"recorded\"", "\"rtk\"");
+    let text =
+        areas::lossy_radio_scenario(&mut random, count, 0.1).replace("\"recorded\"", "\"rtk\"");
     let (vehicle, at_s) = (1 + random.next_u32() % count as u32, 60 + random.next_u32() % 150);
     let struck = format!(
         "{text}[[faults]]\nat_s = {at_s}.0\nkind = \"pilot-takeover\"\nvehicle = {vehicle}\n"

@@ -2,9 +2,9 @@
 //! photograph everything once.
 
 use flockmate_tests::areas::{self, Shape};
-use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::coverage::check::{CoverageFindings, check_plan};
 use host_sim::coverage::sorties::{BATTERY_SWAP_S, Sortie, USABLE_CHARGE};
-use host_sim::coverage::{CoveragePlan, Flight, export, flight};
+use host_sim::coverage::{CoveragePlan, SortieFlight, export, flight};
 use host_sim::scenario::coverage::Method;
 use host_sim::scenario::{self, Scenario};
 use planner_core::coverage::pack::Route;
@@ -35,7 +35,7 @@ fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
         false => speed / accel,
     };
     let count = lanes(planned, route).len();
-    let steps_s = (1..count).map(|_| lost_s(planned.wanted.spacing.lane_m)).sum::<f32>();
+    let steps_s = (1..count).map(|_| lost_s(planned.area_settings.spacing.lane_m)).sum::<f32>();
     steady_s + (count + 2) as f32 * lost_s(f32::INFINITY) + steps_s
 }
 
@@ -132,8 +132,8 @@ fn judge_rounds(planned: &CoveragePlan<'_>) {
     }
 }
 
-fn written(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Vec<String> {
-    let plan = |(sortie, stops, _): &Flight| {
+fn written(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Vec<String> {
+    let plan = |(sortie, stops, _): &SortieFlight| {
         let items = export::flight_items(planned, sortie, stops);
         export::qgc_plan(planned, &sortie.route, &items).to_string()
     };
@@ -181,7 +181,7 @@ fn judge(seed: u64) -> Option<Seen> {
     assert!(
         findings.is_clean(),
         "seed {seed}: {:?}",
-        Findings { over_time: Vec::new(), ..findings }
+        CoverageFindings { new_cells_over_time: Vec::new(), ..findings }
     );
     for route in &planned.plan.routes {
         judge_route(&planned, route, most_s, &mut seen);

@@ -5,7 +5,7 @@
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
 use flockmate_tests::shared_data;
-use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::coverage::check::{CoverageFindings, check_plan};
 use host_sim::coverage::flight::{Stop, StopAction};
 use host_sim::coverage::{CoveragePlan, heights};
 use host_sim::margins;
@@ -53,7 +53,7 @@ struct Ceiling<'a> {
 
 impl<'a> Ceiling<'a> {
     fn of(planned: &CoveragePlan<'a>) -> Self {
-        let terrain = planned.wanted.terrain.as_ref().unwrap();
+        let terrain = planned.area_settings.terrain.as_ref().unwrap();
         let field = FieldView::parse(&terrain.field).unwrap();
         let margin_m = margins::required_distances(
             &planned.scenario.simulation,
@@ -88,10 +88,10 @@ impl<'a> Ceiling<'a> {
 /// Random places around pictures that no picture shows where the ground is as high as there, not as
 /// below the camera: the plan need not see them, but overlaps should.
 fn hidden(planned: &CoveragePlan<'_>, stops: &[&Stop], places: usize) -> usize {
-    let (area, along) = (planned.wanted, planned.tracks.lane_direction());
+    let (area, along) = (planned.area_settings, planned.tracks.lane_direction());
     let pictures: Vec<Point> = stops
         .iter()
-        .filter(|stop| matches!(stop.act, StopAction::Photo(_)))
+        .filter(|stop| matches!(stop.action, StopAction::Photo(_)))
         .map(|stop| stop.position)
         .collect();
     let mut random = Pcg32::seed_from_u64(pictures.len() as u64);
@@ -116,20 +116,23 @@ fn hidden(planned: &CoveragePlan<'_>, stops: &[&Stop], places: usize) -> usize {
 }
 
 /// What is wrong with a plan.
-fn judge(scenario: &Scenario, looks: usize) -> Result<Findings, String> {
+fn judge(scenario: &Scenario, looks: usize) -> Result<CoverageFindings, String> {
     let method = scenario.area.as_ref().unwrap().method;
     let planned = CoveragePlan::new(scenario, method).map_err(|error| format!("{error:#}"))?;
     let findings = check_plan(&planned);
     if !findings.is_clean() {
-        return Err(format!("{:?}", Findings { over_time: Vec::new(), ..findings }));
+        return Err(format!(
+            "{:?}",
+            CoverageFindings { new_cells_over_time: Vec::new(), ..findings }
+        ));
     }
-    let (ceiling, area) = (Ceiling::of(&planned), planned.wanted);
+    let (ceiling, area) = (Ceiling::of(&planned), planned.area_settings);
     let tolerance_m = area.terrain.as_ref().unwrap().tolerance_m;
     let flights = planned.flights();
     let low: Vec<_> = flights
         .iter()
         .flat_map(|(_, stops, _)| stops)
-        .filter(|s| heights::is_on_lane_or_transit(s))
+        .filter(|s| heights::is_at_lane_height(s))
         .collect();
     let hidden = hidden(&planned, &low, 500);
     if hidden > 0 {

@@ -55,7 +55,7 @@ fn areas_above_random_hills_are_photographed_whole() {
     let folder = tempfile::tempdir().expect("a folder");
     let one = |seed: u64| {
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
-        let kinds = [areas::flown, areas::fast, areas::large];
+        let kinds = [areas::flyable_scenario, areas::survey_scenario, areas::many_lanes_scenario];
         let draw = |random: &mut Pcg32| {
             kinds[(seed / 3 % 3) as usize](random, shape, [1, 3, 5][(seed % 3) as usize])
         };
@@ -81,7 +81,8 @@ fn losses_above_random_hills_touch_nothing() {
         ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
     let one = |seed: u64| {
         let count = [3, 5][(seed % 2) as usize];
-        let mut text = drawn(seed, folder.path(), |random| areas::lost(random, count, 0.2));
+        let mut text =
+            drawn(seed, folder.path(), |random| areas::lossy_radio_scenario(random, count, 0.2));
         let mut random = Pcg32::seed_from_u64(seed ^ 0x1055);
         let (vehicle, at_s) = (1 + random.next_u32() % count as u32, 20 + random.next_u32() % 220);
         let kind = kinds[(seed / 2 % 6) as usize];
@@ -100,7 +101,8 @@ fn losses_above_random_hills_touch_nothing() {
                     |v: &VehicleResult| v.id == vehicle as u8 || v.end.starts_with("no goal");
                 let others = || result.vehicles.iter().filter(|v| v.id != vehicle as u8);
                 let explained = result.vehicles.iter().all(had_none)
-                    || others().any(|v| covered::says(&log, v.id, &covered::EXPLAINED));
+                    || others()
+                        .any(|v| covered::has_logged(&log, v.id, &covered::EARLY_LANDING_TEXTS));
                 if share < 1.0 {
                     println!("seed {seed} {kind}: {:.2} %: {explained}", 100.0 * share);
                 }

@@ -3,7 +3,7 @@
 use host_sim::margins;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::scenario::{self, Estimator, Scenario, ScenarioError};
+use host_sim::scenario::{self, EstimatorErrors, Scenario, ScenarioError};
 use host_sim::swarm;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
@@ -35,7 +35,7 @@ fn the_default_margin_and_separation_are_refused_with_the_metres_that_are_missin
     // Either alone is not enough.
     assert!(demo(1, 0.9, 3.2).is_err() && demo(1, 0.85, 3.3).is_err());
     let scenario = demo(1, 0.9, 3.3).unwrap();
-    assert_eq!(scenario.simulation.estimator, Estimator::Recorded);
+    assert_eq!(scenario.simulation.estimator, EstimatorErrors::Recorded);
     let needed = margins::required_distances(&scenario.simulation, 1.5, &scenario.vehicles);
     assert!((needed.margin_m - 0.9).abs() < 1e-4 && (needed.separation_m - 3.3).abs() < 1e-4);
 }

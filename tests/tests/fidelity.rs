@@ -76,7 +76,7 @@ fn errors_of_another_flight_with_the_same_noise_do_as_well() {
         else {
             return;
         };
-        let alike = recording.err_alike(&other);
+        let alike = recording.error_correlation(&other);
         let c = recording.compare(Estimator::Of(&other), Correction::Recorded);
         println!("{run} under the errors of {}: {alike:.2} {c:.2?}", other.run);
         let allowed_m = allowed_m(&recording).expect("a plain flight");

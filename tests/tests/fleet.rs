@@ -233,7 +233,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
             if vehicle.fleet.needs_division() {
                 let hash = parts(&whole, &vehicle.fleet, count).1;
-                vehicle.fleet.take_plan_crc(hash);
+                vehicle.fleet.set_hash_from_plan(hash);
             }
             if vehicle.fleet.division_count() > vehicle.division {
                 vehicle.division = vehicle.fleet.division_count();

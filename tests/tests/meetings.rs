@@ -3,7 +3,7 @@
 //! `FLOCKMATE_CATCHES_FROM=SEED` begins at another seed; the first that fails is traced.
 
 use flockmate_tests::meeting::autopilot::Catch;
-use flockmate_tests::meeting::scene::What;
+use flockmate_tests::meeting::scene::MeetingEvent;
 use flockmate_tests::meeting::{self, Outcome, scene};
 use flockmate_tests::setpoints::SetpointStats;
 use flockmate_tests::swarms::number;
@@ -61,7 +61,7 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
             let windy = scene
                 .happenings
                 .iter()
-                .any(|happening| happening.what == What::Caught(Catch::Wind));
+                .any(|happening| happening.what == MeetingEvent::Caught(Catch::Wind));
             (windy, meeting::fly(&scene, false))
         })
         .collect();

@@ -34,12 +34,12 @@ fn building() -> MapSurface {
         let door = (12..18).contains(&j) && (1..9).contains(&(k % 12));
         (slab && !shaft) || (hull && !window) || (i == 24 && !door)
     };
-    let mut words = vec![0; shape.brick_count()];
+    let mut words = vec![0; shape.word_count()];
     for (i, j, k) in
         (0..48).flat_map(|i| (0..32).flat_map(move |j| (0..24).map(move |k| (i, j, k))))
     {
         if filled(i, j, k) {
-            let (word, mask) = shape.address([i, j, k]);
+            let (word, mask) = shape.word_and_mask([i, j, k]);
             words[word] |= mask;
         }
     }

@@ -4,7 +4,7 @@
 use flockmate_tests::shared_data;
 use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
 use host_sim::roadmap::{self, MAX_STORED_CLEARANCE_M};
-use planner_core::prm::{self, Config, Sampling, Workspace};
+use planner_core::prm::{self, Config, NodeIndex, Sampling};
 
 const SEEDS: u64 = 20;
 
@@ -14,7 +14,7 @@ fn load(file: &str, resolution_m: f32) -> VoxelMap {
 
 fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
     let mut fewest = usize::MAX;
-    let mut workspace = Box::new(Workspace::<4096, 4096>::new());
+    let mut workspace = Box::new(NodeIndex::<4096, 4096>::new());
     let grid = map.grid();
     let tree = BoxTree::new(&grid);
     for seed in 1..=SEEDS {
@@ -28,7 +28,8 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
         };
         let nodes = roadmap::sample(map, &[], &config).expect("there is free space");
         let joined =
-            roadmap::join(&grid, &tree, &nodes, &config, &mut workspace).expect("it joins");
+            roadmap::connect_with_clearances(&grid, &tree, &nodes, &config, &mut workspace)
+                .expect("it joins");
         let mut indexed: Vec<_> = joined.iter().map(|e| prm::Edge { a: e.a, b: e.b }).collect();
         let mut all_pairs = Vec::new();
         prm::connect_all_pairs(&map.grid(), &nodes, &config, |edge| all_pairs.push(edge))

@@ -272,7 +272,7 @@ impl Short {
         if plan.flights.iter().any(|f| !f.task.leaves_pad() || end_m(f) + f.climb_m > LONGEST_M) {
             return None;
         }
-        let owns = swarm.owns(&plan).expect("an Ok plan has all parts");
+        let owns = swarm.vehicle_plans(&plan).expect("an Ok plan has all parts");
         let gates = owns.iter().map(|own| own.gates.to_vec()).collect();
         Some(Self { plan, gates, safety_m: swarm.safety_m })
     }

@@ -164,7 +164,7 @@ fn one(seed: u64) -> Sum {
             return sum;
         }
     };
-    let owns: Result<Vec<Own>, ScheduleError> = swarm.owns(&plan);
+    let owns: Result<Vec<Own>, ScheduleError> = swarm.vehicle_plans(&plan);
     let owns = match owns {
         Ok(owns) => owns,
         Err(error) => {

@@ -133,7 +133,7 @@ fn the_board_needs_no_more_than_the_table_says() {
     let Some(program) = board::program("calls") else { return };
     let calls = bounds::counted(&program).expect("`calls` runs");
     let page = page();
-    let table = bounds::parts(&page).expect("the page has a table")[1];
+    let table = bounds::split_page(&page).expect("the page has a table")[1];
     assert_eq!(table.lines().count(), BOUNDS.len() + 2, "a row for each call");
     for (name, bound) in BOUNDS {
         let start = format!("| `{name}` | {bound} | ");

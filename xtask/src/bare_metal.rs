@@ -31,7 +31,7 @@ pub struct Region {
     /// Its size, bytes.
     pub len: usize,
     /// Budget of statics in it, bytes.
-    pub most: usize,
+    pub statics_budget: usize,
     /// Whether it holds the stack too.
     pub has_stack: bool,
 }
@@ -66,7 +66,7 @@ impl Board {
             most: usize,
             has_stack: bool,
         ) -> Region {
-            Region { name, at, len: len << 10, most: most << 10, has_stack }
+            Region { name, at, len: len << 10, statics_budget: most << 10, has_stack }
         }
         // In DTCM companion, crash record and stack guard have 40 kB; the stack has the rest.
         const H743: &[Region] = &[
@@ -141,7 +141,7 @@ pub fn build(board: Board) -> Result<Built> {
         cargo()
     } else {
         println!("{}: Debian's toolchain builds core for {target}", board.name());
-        install::debian(install::BARE_METAL)
+        install::install_missing(install::BARE_METAL)
             .with_context(|| format!("neither that nor rustup's: rustup target add {target}"))?;
         flags += "-Clinker-flavor=ld.lld ";
         let mut cargo = command("/usr/bin/cargo");

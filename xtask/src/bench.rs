@@ -61,14 +61,14 @@ pub fn run_bench(args: &Args) -> Result<()> {
         }
         return run(&mut bench);
     }
-    install::debian(install::COUNTER)?;
+    install::install_missing(install::COUNTER)?;
     bench.args(["bench", "--"]);
     let runs = |group: &str| args.only.as_deref().is_none_or(|only| group.contains(only));
     if runs("worst-case") || runs("boards") {
-        install::debian(install::EMULATOR)?;
+        install::install_missing(install::EMULATOR)?;
         bench.env("FLOCKMATE_FIRMWARE", bare_metal::build(Board::Qemu)?.folder);
     }
-    match peer() {
+    match build_baseline() {
         Ok(peer) => {
             bench.arg("--peer").arg(peer);
         }
@@ -91,7 +91,7 @@ pub fn run_bench(args: &Args) -> Result<()> {
 
 /// Builds the C++ baseline with the options that its file's header gives, if its source is newer
 /// than the program. Returns the program's path.
-fn peer() -> Result<PathBuf> {
+fn build_baseline() -> Result<PathBuf> {
     let source = root().join(PEER);
     let modified = |file: &Path| file.metadata().and_then(|m| m.modified());
     let source_time = modified(&source).with_context(|| format!("{PEER} is not there"))?;
@@ -99,7 +99,7 @@ fn peer() -> Result<PathBuf> {
     if modified(&program).is_ok_and(|built| built >= source_time) {
         return Ok(program);
     }
-    install::debian(install::PEER)?;
+    install::install_missing(install::PEER)?;
     std::fs::create_dir_all(target_dir())?;
     run(command("g++")
         .args(["-O3", "-march=native", "-o"])

@@ -44,7 +44,7 @@ impl Default for Args {
 /// Builds firmware and host-sim and flies. An error if the mission is not completed cleanly or
 /// setpoints come too late. Returns the deepest stack use of all boards, bytes.
 pub fn run_emulate(args: &Args) -> Result<usize> {
-    install::debian(install::EMULATOR)?;
+    install::install_missing(install::EMULATOR)?;
     let firmware = bare_metal::build(Board::Qemu)?.folder.join("flockmate");
     run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
     let out = std::path::absolute(&args.out)?;

@@ -40,7 +40,7 @@ const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink", "MAVProxy"];
 
 /// Installs those of `packages` that are missing, if root on Debian; otherwise the error names
 /// them.
-pub fn debian(packages: &[Package]) -> Result<()> {
+pub fn install_missing(packages: &[Package]) -> Result<()> {
     let missing: Vec<_> =
         packages.iter().filter(|p| !Path::new(p.file).exists()).map(|p| p.name).collect();
     if missing.is_empty() {
@@ -76,7 +76,10 @@ pub fn python_clients() -> Result<PathBuf> {
     if std::fs::read_to_string(&ready).ok().as_ref() != Some(&clients) {
         println!("making a venv for {clients}");
         if run(command("python3").args(["-m", "venv"]).arg(&venv)).is_err() {
-            debian(&[Package { name: "python3-venv", file: "/usr/share/doc/python3-venv" }])?;
+            install_missing(&[Package {
+                name: "python3-venv",
+                file: "/usr/share/doc/python3-venv",
+            }])?;
             run(command("python3").args(["-m", "venv", "--clear"]).arg(&venv))?;
         }
         run(command(&python).args(["-m", "pip", "install", "--quiet"]).args(PYTHON_CLIENTS))?;

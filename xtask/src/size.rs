@@ -61,9 +61,9 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
             .regions()
             .iter()
             .zip(regions)
-            .map(|(region, bytes)| (region.name, bytes, region.most)),
+            .map(|(region, bytes)| (region.name, bytes, region.statics_budget)),
     );
-    rows.push(("stack_bytes", stack, STACK));
+    rows.push(("stack_bytes", stack, STACK_BUDGET));
     println!("{}", board.name());
     for (name, ours, most) in &rows {
         println!("  {name:16} {ours:>8} of {most}");
@@ -87,7 +87,7 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
 }
 
 /// Budget of the stack, bytes.
-const STACK: usize = 64 << 10;
+const STACK_BUDGET: usize = 64 << 10;
 
 /// Bytes that a program takes, by kind of section.
 #[derive(Default)]

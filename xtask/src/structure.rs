@@ -41,7 +41,7 @@ pub fn run() -> Result<()> {
         println!("{what}: {}", reason.unwrap_or("no reason given"));
         wrong += usize::from(reason.is_none());
     }
-    for place in distances::wrong()? {
+    for place in distances::check_margins_page()? {
         println!("{place}");
         wrong += 1;
     }

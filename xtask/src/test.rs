@@ -83,9 +83,9 @@ fn steps(args: &Args) -> Result<()> {
             ensure!(warnings == 0, "the firmware for {} has warnings", board.name());
             firmware = firmware.take().or((board == Board::Qemu).then_some(programs));
         }
-        install::debian(install::EMULATOR)
+        install::install_missing(install::EMULATOR)
     })?;
-    step("browser", || install::debian(install::BROWSER))?;
+    step("browser", || install::install_missing(install::BROWSER))?;
     let mut python = None;
     step("Python clients", || {
         python = Some(install::python_clients()?);

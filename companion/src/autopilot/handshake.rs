@@ -50,7 +50,7 @@ pub(crate) struct Handshake {
 
 impl Handshake {
     /// Clears what belongs to the state `from`; entering `Arming` clears everything.
-    pub(crate) fn state_changed(&mut self, from: State, to: State) {
+    pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.reported = [None; MAX_REFUSALS];
         self.disarm_refused = false;
         if to == State::Arming {

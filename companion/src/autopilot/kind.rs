@@ -90,7 +90,7 @@ impl AutopilotKind {
 
     /// The autopilot's parameters that limit its speed, acceleration and jerk, with unit and
     /// default.
-    pub fn limits(self) -> &'static [LimitParameter] {
+    pub fn limit_parameters(self) -> &'static [LimitParameter] {
         match self {
             Self::Px4 => &px4::LIMITS,
             Self::ArduPilot => &ardupilot::LIMITS,
@@ -99,7 +99,7 @@ impl AutopilotKind {
 
     /// The limits of an autopilot whose parameters all have their defaults.
     pub(crate) fn default_limits(self) -> AutopilotLimits {
-        AutopilotLimits::from_defaults(self.limits())
+        AutopilotLimits::from_defaults(self.limit_parameters())
     }
 
     /// Streams to request on connecting: message id and interval in microseconds; −1 switches one

@@ -77,10 +77,10 @@ pub(crate) struct Requests {
     handshake: Handshake,
     /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
     limits: AutopilotLimits,
-    /// Which of the limit parameters were read, a bit each (`limits_read`); `tries` counts the
-    /// requests for them that may still be sent.
+    /// Which of the limit parameters were read, a bit each (`limits_read`); `limit_requests_left`
+    /// counts the requests for them that may still be sent.
     limits_read: u16,
-    tries: u8,
+    limit_requests_left: u8,
     /// Index of the next of the kind's streams to be requested.
     next_stream: usize,
 }
@@ -92,7 +92,7 @@ impl Default for Requests {
             handshake: Handshake::default(),
             limits,
             limits_read: 0,
-            tries: 0,
+            limit_requests_left: 0,
             next_stream: usize::MAX,
         }
     }
@@ -110,8 +110,8 @@ impl Requests {
     }
 
     /// Clears what belongs to the mission state `from`.
-    pub(crate) fn state_changed(&mut self, from: State, to: State) {
-        self.handshake.state_changed(from, to);
+    pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
+        self.handshake.reset_for_state(from, to);
     }
 
     /// Updates the handshake from the autopilot's mode, armed bit and landing detector.
@@ -122,7 +122,7 @@ impl Requests {
     /// Requests all streams from the first on, in the following steps. With motors off it also sets
     /// the limits to their defaults, to be read from the autopilot again, and returns true.
     /// ArduPilot's `GUID_TIMEOUT` is set too.
-    pub(crate) fn start_on_connect(
+    pub(crate) fn begin_requesting_streams(
         &mut self,
         telemetry: &Telemetry,
         s: &RequestContext,
@@ -134,7 +134,7 @@ impl Requests {
         let reads = !s.state.streams_setpoints() && !telemetry.armed;
         if reads {
             self.limits = telemetry.kind().default_limits();
-            (self.limits_read, self.tries) = (0, MAX_LIMIT_REQUESTS);
+            (self.limits_read, self.limit_requests_left) = (0, MAX_LIMIT_REQUESTS);
             timers.set(Timer::Limit, s.now);
         }
         timers.set(Timer::Streams, s.now + STREAMS_RETRY_EVERY);
@@ -152,20 +152,20 @@ impl Requests {
         timers: &mut Timers,
         links: &mut Links,
     ) {
-        if self.tries == 0 || !timers.is_due(Timer::Limit, now) {
+        if self.limit_requests_left == 0 || !timers.is_due(Timer::Limit, now) {
             return;
         }
-        let all = kind.limits();
-        let from = usize::from(self.tries);
+        let all = kind.limit_parameters();
+        let from = usize::from(self.limit_requests_left);
         // Parameters are requested in turn, so that one that the autopilot lacks delays no other.
         let missing = (from..from + all.len())
             .map(|i| i % all.len())
             .find(|i| self.limits_read & 1 << i == 0);
         let Some(limit) = missing.and_then(|i| all.get(i)) else {
-            self.tries = 0;
+            self.limit_requests_left = 0;
             return;
         };
-        self.tries -= 1;
+        self.limit_requests_left -= 1;
         timers.set(Timer::Limit, now + LIMIT_REQUEST_EVERY);
         links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
     }
@@ -173,13 +173,13 @@ impl Requests {
     /// Handles the autopilot's PARAM_VALUE; while armed it is ignored. Returns whether a limit
     /// changed. It is decoded field by field: a `MAV_PARAM_TYPE` newer than the crate's must not
     /// hide the value.
-    pub(crate) fn handle_limit(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
+    pub(crate) fn handle_param_value(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
         const ID: core::ops::Range<usize> = 8..24;
         let p = frame.padded();
         let value = f32::from_le_bytes([p[0], p[1], p[2], p[3]]);
         let name = p[ID].split(|b| *b == 0).next().unwrap_or_default();
         let mut changed = false;
-        for (i, limit) in telemetry.kind().limits().iter().enumerate() {
+        for (i, limit) in telemetry.kind().limit_parameters().iter().enumerate() {
             if limit.name.as_bytes() == name && p[24] == PARAM_TYPE_REAL32 && !telemetry.armed {
                 self.limits_read |= 1 << i;
                 changed |= self.limits.set(limit, value);
@@ -190,7 +190,7 @@ impl Requests {
 
     /// Sends the requests that are due by time and mission state. Returns whether the limits were
     /// set to their defaults, so that the caller must use the new ones.
-    pub(crate) fn request_due(
+    pub(crate) fn send_due_requests(
         &mut self,
         telemetry: &Telemetry,
         s: &RequestContext,
@@ -206,7 +206,7 @@ impl Requests {
         let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
         let tunes = lost
             && timers.is_due(Timer::Streams, now)
-            && self.start_on_connect(telemetry, s, timers, links);
+            && self.begin_requesting_streams(telemetry, s, timers, links);
         let doubts = telemetry.is_origin_doubtful();
         if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now)
         {

@@ -44,7 +44,7 @@ const POSITION_JUMP_MPS: f32 = 5.0;
 const MAX_ORIGIN_DISTANCE_M: f32 = 30_000.0;
 /// Longest time between two positions over which the jump test extrapolates, seconds: after a
 /// longer silence of the autopilot the mission has ended.
-const MAX_GAP_S: f32 = 60.0;
+const MAX_EXTRAPOLATION_S: f32 = 60.0;
 /// Time for which positions are not used after a jump, or after a gap longer than this time;
 /// another jump starts it again. The first messages after a silence may have been delayed.
 pub const POSITION_SETTLE_TIME: Duration = Duration::from_millis(1000);
@@ -66,7 +66,7 @@ pub struct SequenceFilter {
 
 impl SequenceFilter {
     /// Whether the frame is new; if so, stores its sequence number as the last.
-    pub fn accept(&mut self, sequence: u8, now: Instant) -> bool {
+    pub fn accept_if_new(&mut self, sequence: u8, now: Instant) -> bool {
         if let Some((last, at)) = self.last {
             let behind = last.wrapping_sub(sequence);
             if behind < 64 && now - at < SEQUENCE_LIFETIME {
@@ -183,7 +183,7 @@ impl Telemetry {
     }
 
     /// Whether the battery's charge is known and less than `percent`.
-    pub(crate) fn charge_below(&self, percent: i8) -> bool {
+    pub(crate) fn is_battery_below(&self, percent: i8) -> bool {
         (0..percent).contains(&self.battery_percent)
     }
 
@@ -232,7 +232,7 @@ impl Telemetry {
         // While armed GPS_GLOBAL_ORIGIN only confirms the origin: a forwarded one, with another
         // sender's sequence number, must not make the filter drop the autopilot's own frames.
         let confirmed = self.armed && frame.message_id == GPS_GLOBAL_ORIGIN_DATA::ID;
-        if !confirmed && !self.sequence.accept(frame.sequence, now) {
+        if !confirmed && !self.sequence.accept_if_new(frame.sequence, now) {
             return TelemetryChange::None;
         }
         self.note_stream(frame.message_id, now);
@@ -330,19 +330,19 @@ impl Telemetry {
 
     /// Time since a stream's message was last received; the greatest duration if it never was.
     pub(crate) fn stream_age(&self, message_id: u32, now: Instant) -> Duration {
-        let heard = self.stream(message_id).and_then(|at| self.streams.get(at)).copied();
+        let heard = self.stream_index(message_id).and_then(|at| self.streams.get(at)).copied();
         time_since(heard.filter(|at| *at > Instant::ZERO), now)
     }
 
     /// Index of the message among the streams that are on; `None` if it is none of them.
-    fn stream(&self, message_id: u32) -> Option<usize> {
+    fn stream_index(&self, message_id: u32) -> Option<usize> {
         let kept = self.kind.unwrap_or_default().streams();
         let mut on = kept.iter().filter(|(_, interval_us)| *interval_us > 0.0);
         on.position(|(id, _)| u32::from(*id) == message_id)
     }
 
     fn note_stream(&mut self, message_id: u32, now: Instant) {
-        let slot = self.stream(message_id).and_then(|at| self.streams.get_mut(at));
+        let slot = self.stream_index(message_id).and_then(|at| self.streams.get_mut(at));
         if let Some(slot) = slot {
             *slot = now;
         }
@@ -435,7 +435,7 @@ impl Telemetry {
         if let Some(at) = self.position_read_at {
             // Time by the autopilot's clock: delayed positions arrive all at once.
             let passed_s = d.time_boot_ms.wrapping_sub(self.position_boot_ms) as f32 * 1e-3;
-            let dt_s = passed_s.min(MAX_GAP_S);
+            let dt_s = passed_s.min(MAX_EXTRAPOLATION_S);
             if now - at > POSITION_SETTLE_TIME {
                 self.positions_valid_from = now + POSITION_SETTLE_TIME;
             }

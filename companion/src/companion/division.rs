@@ -36,8 +36,8 @@ fn to_decimetres(along_m: f32) -> Option<u16> {
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The input of the plan requested by [`PlanKind::Division`]: for each division so far, in
     /// order, the input of every vehicle by rank.
-    pub fn losses(&self) -> impl Iterator<Item = &[DivisionInput]> {
-        self.neighbours.fleet().into_iter().flat_map(Fleet::losses)
+    pub fn division_inputs(&self) -> impl Iterator<Item = &[DivisionInput]> {
+        self.neighbours.fleet().into_iter().flat_map(Fleet::inputs_of_divisions)
     }
 
     /// Updates the fleet's state and where this vehicle holds, and requests a division's plan if
@@ -123,7 +123,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(plan) = self.mission.plan() else { return false };
         let Task::Photograph(photographs) = &plan.task else { return false };
         let soon_m = self.guidance.along_m() + COMMITMENT_S * self.config.cruise_mps;
-        photographs.goes_on
+        photographs.is_first_part
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
@@ -217,7 +217,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn is_undivided(&self) -> bool {
         self.neighbours.fleet().is_none_or(|fleet| {
             let flown = fleet.division_count() == self.mission.division_count()
-                && !self.mission.has_division();
+                && !self.mission.is_division_plan_ready();
             flown && !fleet.is_dividing()
         })
     }
@@ -257,7 +257,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.neighbours.forget_avoided();
             self.guidance.begin_path_at(back_m, self.now);
         }
-        self.detours.end_field_detour(meets);
+        self.detours.end_area_detour(meets);
     }
 
     /// Handles the shell's answer to the request for a division's plan.
@@ -277,17 +277,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // All vehicles fail alike: each keeps its part, and the waypoints of the lost vehicle
             // are left.
             Err(_) if fleet.needs_division() => {
-                fleet.take_plan_crc(UNDIVIDED);
+                fleet.set_hash_from_plan(UNDIVIDED);
                 self.links.send_text(true, "What is left cannot be divided");
             }
             Err(_) if may_take && self.detours.is_beside_plan() => {
-                self.detours.end_field_detour(false);
+                self.detours.end_area_detour(false);
             }
             Err(_) if may_take && division > self.mission.division_count() => {
                 self.mission.keep_plan_after_division(division);
             }
             Err(_) => {}
-            Ok(plan) if fleet.needs_division() => fleet.take_plan_crc(plan.plan_crc),
+            Ok(plan) if fleet.needs_division() => fleet.set_hash_from_plan(plan.plan_crc),
             Ok(plan)
                 if may_take
                     && division == self.mission.division_count()
@@ -309,7 +309,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                         false => self.guidance.reset(),
                     }
                 } else if self.detours.is_beside_plan() {
-                    self.detours.end_field_detour(false);
+                    self.detours.end_area_detour(false);
                 } else {
                     self.links.send_text(true, "The division begins elsewhere");
                 }

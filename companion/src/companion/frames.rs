@@ -12,7 +12,7 @@ use crate::autopilot::telemetry::TelemetryChange;
 use crate::events::Link;
 use crate::link::answer_limits::{AnswerKind, SenderKind};
 use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
-use crate::link::done::DoneReport;
+use crate::link::done::PhotographedReport;
 use crate::link::frame::Frame;
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
@@ -60,7 +60,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     return false;
                 }
                 if frame.message_id == PARAM_VALUE_DATA::ID {
-                    let changed = self.requests.handle_limit(&self.telemetry, frame);
+                    let changed = self.requests.handle_param_value(&self.telemetry, frame);
                     if changed && !self.mission.state().streams_setpoints() {
                         self.guidance.set_limits(&self.config, self.requests.limits());
                     }
@@ -105,13 +105,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     && frame.message_id != LOCAL_POSITION_NED_DATA::ID
             }
             Link::Swarm => {
-                self.handle_neighbour(frame);
+                self.handle_neighbour_frame(frame);
                 false
             }
         }
     }
 
-    pub(super) fn handle_neighbour(&mut self, frame: &Frame) {
+    pub(super) fn handle_neighbour_frame(&mut self, frame: &Frame) {
         let relevant = matches!(frame.message_id, TUNNEL_DATA::ID | GLOBAL_POSITION_INT_DATA::ID);
         let id = frame.system;
         if !relevant
@@ -137,40 +137,45 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 return;
             }
-            if let Some(report) = DoneReport::decode(frame.padded(), id) {
+            if let Some(report) = PhotographedReport::decode(frame.padded(), id) {
                 self.handle_done_report(&report);
                 return;
             }
-            let Some(intent) = Intent::decode(frame.padded(), id) else { return };
-            if intent.mission_crc != self.config.mission_crc {
-                if self.config.roster.iter().any(|entry| entry.system_id == id) {
-                    let text = "Vehicle # has another mission file";
-                    let numbers = [u32::from(id), 0, 0];
-                    self.links.send_sender_text(self.now, SenderKind::Other, true, text, numbers);
-                }
-                return;
-            }
-            let echo =
-                intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
-            let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
-            if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().arrived(&echo)) {
-                self.guidance.note_reported_way(sent.at, sent.ends_m);
-            }
-            if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
-                late.update(delay_s);
-            }
-            if self.neighbours.accept_intent(id, frame.sequence, self.now) {
-                let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
-                self.neighbours.handle_intent(
-                    self.now,
-                    self.neighbours.own_rank(),
-                    &intent,
-                    self.config.mission_crc,
-                    plan_crc,
-                );
+            if let Some(intent) = Intent::decode(frame.padded(), id) {
+                self.handle_intent(id, frame.sequence, &intent);
             }
         } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
             self.neighbours.handle_position(self.now, &self.config.origin, id, &data);
+        }
+    }
+
+    /// Handles the intent of vehicle `id`; one of another mission changes nothing but is reported.
+    fn handle_intent(&mut self, id: u8, sequence: u8, intent: &Intent) {
+        if intent.mission_crc != self.config.mission_crc {
+            if self.config.roster.iter().any(|entry| entry.system_id == id) {
+                let text = "Vehicle # has another mission file";
+                let numbers = [u32::from(id), 0, 0];
+                self.links.send_sender_text(self.now, SenderKind::Other, true, text, numbers);
+            }
+            return;
+        }
+        let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
+        let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
+        if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().note_arrival(&echo)) {
+            self.guidance.note_reported_way(sent.at, sent.ends_m);
+        }
+        if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
+            late.update(delay_s);
+        }
+        if self.neighbours.accept_intent(id, sequence, self.now) {
+            let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
+            self.neighbours.handle_intent(
+                self.now,
+                self.neighbours.own_rank(),
+                intent,
+                self.config.mission_crc,
+                plan_crc,
+            );
         }
     }
 
@@ -203,15 +208,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let inputs = self.guard_inputs();
         let result = match self.mission.handle_command(&inputs, command) {
             Some(result) => result,
-            None if command.command == commands::REQUEST => {
+            None if command.command == commands::REQUEST_MESSAGE => {
                 self.handle_message_request(link, sender, command.param1)
             }
-            None if command.command == commands::EXCLUDE => self.detours.handle_obstacle_command(
-                command,
-                &self.config.origin,
-                self.config.required_clearance_m,
-            ),
-            None if command.command == commands::RESTART
+            None if command.command == commands::FENCE_EXCLUSION => {
+                self.detours.handle_obstacle_command(
+                    command,
+                    &self.config.origin,
+                    self.config.required_clearance_m,
+                )
+            }
+            None if command.command == commands::REBOOT
                 && (command.to_component || command.param2 == 1.0) =>
             {
                 self.handle_restart_command(command)
@@ -220,7 +227,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             None if !command.to_component => return None,
             None => UNSUPPORTED,
         };
-        let restarts = command.command == commands::RESTART && result == ACCEPTED;
+        let restarts = command.command == commands::REBOOT && result == ACCEPTED;
         if restarts || *self.mission.pending() != before || self.detours.obstacle_count() != known {
             self.links.log_command(self.now, sender, command);
         }
@@ -253,7 +260,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return DENIED;
         }
         if link == Link::Swarm {
-            self.links.count_radio_bytes(rate_limit::POSITION_BYTES);
+            self.links.take_radio_tokens(rate_limit::POSITION_BYTES);
         }
         ACCEPTED
     }

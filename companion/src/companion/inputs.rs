@@ -32,7 +32,7 @@ const MAX_SWAY_M: f32 = 2.0;
 const MIN_GATE_AHEAD_M: f32 = 0.2;
 /// Longest time of a climb beyond 1 s for each metre of height, seconds: idling motors, and the
 /// stop at the top.
-const MAX_CLIMB_BEGINS_S: f32 = 8.0;
+const MAX_CLIMB_OVERHEAD_S: f32 = 8.0;
 /// Vertical speed above which a vehicle does not rest on the ground, m/s.
 const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
@@ -41,11 +41,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn guard_inputs(&self) -> GuardInputs {
         let (t, now, view) = (&self.telemetry, self.now, self.detour_view());
         let scene = &view.scene;
-        let (kind, handshake) = (self.kind(), self.requests.handshake());
+        let (kind, handshake) = (self.autopilot_kind(), self.requests.handshake());
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.mission.state() {
             State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
-                !offboard && t.custom_mode != self.mission.mode_before()
+                !offboard && t.custom_mode != self.mission.mode_at_start()
             }
             // Disarming after a landing, the autopilot may change to another mode by itself.
             State::Land | State::LandingHeld | State::Disarm => {
@@ -69,7 +69,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
-        let sways = self.config.division.is_some() && self.guidance.lead_m(t) < MAX_SWAY_M;
+        let sways =
+            self.config.lost_vehicle_down_s.is_some() && self.guidance.lead_m(t) < MAX_SWAY_M;
         let sways_for = if sways { MAX_SWAY_OVER_AREA } else { Duration::default() };
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
         // A vehicle that something holds cannot fly home or aside: it can only land.
@@ -114,7 +115,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             more_is_done: self.mission.photographed().is_outdated(),
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.is_holding_for_division(),
-            division_ready: self.mission.has_division(),
+            division_ready: self.mission.is_division_plan_ready(),
             undivided: self.is_undivided() && !self.detours.is_own_plan_outstanding(),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.plan_failure().is_some(),
@@ -123,7 +124,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plans_as_others: self.plans_as_others(),
             at_start: away.xy().length() <= self.config.start_tolerance_m
                 && away.z.abs() <= height_tolerance_m,
-            imprecise: self.mission.state() == State::Ready && self.guidance.pace < 1.0,
+            imprecise: self.mission.state() == State::Ready
+                && self.guidance.estimate_speed_share < 1.0,
             imprecise_for: self.mission.estimate_imprecise_for(now),
             origin_moved: t.origin_moved,
             start: self.mission.pending().start,
@@ -133,12 +135,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             turn_back: self.mission.pending().turn_back
                 && !self.guidance.returning
                 && !self.detours.is_homeward(),
-            area: self.config.division.is_some(),
-            over_field,
+            area: self.config.lost_vehicle_down_s.is_some(),
+            can_fly_home: over_field,
             descends: self.guidance.is_descending(),
             may_fly_beside: standing
                 && (self.is_undivided() || self.detours.is_beside_plan())
-                && self.detours.may_detour_over_field(&view),
+                && self.detours.may_detour_over_area(&view),
             around_flown: follow
                 && self.detours.leads_back()
                 && self.guidance.is_at_end(scene)
@@ -187,8 +189,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 (_, State::PositionLost) => self.guidance.is_near_path(scene, LOST_WINDOW_M),
                 _ => false,
             },
-            battery_low: t.charge_below(self.config.battery_low_percent),
-            battery_critical: t.charge_below(self.config.battery_low_percent / 2),
+            battery_low: t.is_battery_below(self.config.battery_low_percent),
+            battery_critical: t.is_battery_below(self.config.battery_low_percent / 2),
             column_blocked_for: self.guidance.filter.column_blocked_for(now),
             column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
             start_barred_for: self.mission.start_barred_for(now),
@@ -198,7 +200,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             can_turn_back: can_leave
                 && self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
-                && (self.config.division.is_none() || self.detours.home.is_seeking())
+                && (self.config.lost_vehicle_down_s.is_none() || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
@@ -215,7 +217,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
             blocked: self.detours.is_blocked(),
             our_turn: self.detours.is_our_turn(&view),
-            detour_ready: self.detours.is_ready(),
+            detour_ready: self.detours.is_detour_ready(),
             no_way_around: self.detours.has_given_up(),
             time_below_landing: self.detours.time_below_landing(&view),
             standing,
@@ -227,7 +229,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let follow = self.mission.state() == State::Follow;
         let homeward = self.guidance.returning || self.detours.is_homeward();
         let descends = self.guidance.is_descending();
-        match follow && (homeward || (descends && self.config.division.is_some())) {
+        match follow && (homeward || (descends && self.config.lost_vehicle_down_s.is_some())) {
             true if homeward && descends => self.guidance.filter.hindered_for(self.now),
             // The end of its path over an area is above its pad: there is no other way down to
             // that.
@@ -279,20 +281,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Place along its path up to which this vehicle flies while it is unheard, metres, and the
     /// seconds by which its gates and its climb delay it, compared with a flight from `progress_m`
     /// at 0.4 of the nominal speed; (−1e6, 0) where it does not fly on.
-    pub(super) fn unheard_reach_m(&self, progress_m: f32) -> (f32, u8) {
+    pub(super) fn unheard_reach(&self, progress_m: f32) -> (f32, u8) {
         match self.may_fly_unheard() {
             true => {
                 let scene = self.detour_view().scene;
-                let (clear_m, in_s) = self.guidance.gates_open_up_to_soon_m(
-                    &scene,
-                    &self.neighbours,
-                    progress_m,
-                    self.now,
-                );
+                let (clear_m, in_s) =
+                    self.guidance.unheard_reach(&scene, &self.neighbours, progress_m, self.now);
                 // Idling motors before, and the stop at the top after it, on top of a climb at 1
                 // m/s, which is slow.
                 let climb_s = if progress_m < 0.0 {
-                    MAX_CLIMB_BEGINS_S + libm::ceilf(-progress_m)
+                    MAX_CLIMB_OVERHEAD_S + libm::ceilf(-progress_m)
                 } else {
                     0.0
                 };
@@ -306,7 +304,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// is unknown or in another frame, so that it cannot hold.
     pub(crate) fn must_land(&self) -> bool {
         let t = &self.telemetry;
-        t.charge_below(self.config.battery_low_percent / 2)
+        t.is_battery_below(self.config.battery_low_percent / 2)
             || t.origin_moved
             || t.position_age(self.now) >= MAX_POSITION_AGE
     }

@@ -7,7 +7,7 @@ use planner_core::flight::WaypointRange;
 use super::Companion;
 use crate::events::Link;
 use crate::link::OnDemandMessage;
-use crate::link::done::{self, DoneReport};
+use crate::link::done::{self, PhotographedReport};
 use crate::mission::State;
 use crate::time::Duration;
 use crate::timers::Timer;
@@ -68,10 +68,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// This vehicle's report of the photographed waypoints to the others.
-    pub(super) fn done_report(&mut self) -> DoneReport {
+    pub(super) fn done_report(&mut self) -> PhotographedReport {
         let (waits, flies) = (self.plans_with_others(), self.has_left_pad());
-        let report = self.mission.photographed_mut().report(waits, flies);
-        DoneReport {
+        let report = self.mission.photographed_mut().next_report(waits, flies);
+        PhotographedReport {
             system_id: self.config.system_id,
             mission_crc: self.config.mission_crc,
             ..report
@@ -79,10 +79,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Handles another vehicle's report of photographed waypoints.
-    pub(super) fn handle_done_report(&mut self, report: &DoneReport) {
+    pub(super) fn handle_done_report(&mut self, report: &PhotographedReport) {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
-        if ours && self.is_area_mission() && self.config.resumes {
+        if ours && self.is_area_mission() && self.config.skips_photographed {
             let waits = self.plans_with_others();
             self.mission.photographed_mut().handle_report(report, waits, self.now);
         }

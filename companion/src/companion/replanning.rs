@@ -79,7 +79,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// before, the first free place beyond what blocks the path. `None` for a vehicle that does not
     /// come back.
     fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlaces> {
-        if !self.detours.keeps_to_plan_over_field(&self.detour_view()) {
+        if !self.detours.keeps_to_plan_over_area(&self.detour_view()) {
             return None;
         }
         if let Some(places) = self.detours.rejoin_places() {
@@ -114,7 +114,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             false => self.place_beyond_block(),
         };
         match rejoin {
-            Some(back) => self.request_detour(DetourPurpose::Back(back)),
+            Some(back) => self.request_detour(DetourPurpose::Rejoin(back)),
             None => {
                 self.detours.note_no_rejoin_place(self.now);
                 self.mission.set_failure(PlanFailure::Unreachable);
@@ -167,7 +167,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // Where the vehicle promised since then to hold for a division, along its own path.
         let promised_m = self.division_hold_m();
         match purpose {
-            DetourPurpose::Back(back) => {
+            DetourPurpose::Rejoin(back) => {
                 // A late answer may belong to another request, and end elsewhere.
                 let leads_back = (ends? - back.position).length() < MAX_REJOIN_ERROR_M;
                 (leads_back && promised_m.is_none()).then_some(purpose)

@@ -47,8 +47,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.run_mission_table();
         self.step_task();
         let situation = self.request_context();
-        if self.requests.request_due(&self.telemetry, &situation, &mut self.timers, &mut self.links)
-        {
+        if self.requests.send_due_requests(
+            &self.telemetry,
+            &situation,
+            &mut self.timers,
+            &mut self.links,
+        ) {
             self.guidance.set_limits(&self.config, self.requests.limits());
         }
         let flows = self.mission.state().streams_setpoints();
@@ -66,7 +70,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let along = PathProgress {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
             // A vehicle that brakes along its path still takes the pictures that it passes.
-            place: match state.holds_place() {
+            place: match state.is_on_path() {
                 true if self.detours.is_beside_plan() && !self.guidance.returning => {
                     PathRelation::Beside
                 }
@@ -118,8 +122,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 config.radius_m,
             ),
         };
-        let before = core::mem::replace(&mut self.guidance.pace, pace);
-        self.mission.note_estimate(pace > 0.0, now);
+        let before = core::mem::replace(&mut self.guidance.estimate_speed_share, pace);
+        self.mission.note_estimate_usable(pace > 0.0, now);
         let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
         if kind(before) == kind(pace) || !self.mission.state().streams_setpoints() {
             return;
@@ -157,7 +161,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let lands =
             self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
         let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, lands, now);
-        self.requests.state_changed(from, to);
+        self.requests.reset_for_state(from, to);
         self.run_action(from, to, row);
         // Leaving a replanning state ends the search for a detour.
         if matches!(from, State::Replanning | State::PadReplanning) {
@@ -193,7 +197,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.detours.forget_plan();
                 self.neighbours.forget_plan();
                 self.guidance.reset();
-                self.mission.photographed_mut().begin_plan(self.config.resumes);
+                self.mission
+                    .photographed_mut()
+                    .prepare_plan_request(self.config.skips_photographed);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
                     fleet.begin_flight(now);
                     self.detours.begin_flight();
@@ -223,23 +229,23 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestPathHome => self.request_detour(DetourPurpose::Home),
             Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
             Action::TurnHome => {
-                self.guidance.begin_braking();
+                self.guidance.cancel_evasion();
                 self.detours.give_up_plan();
                 self.detours.home.begin(now);
             }
             Action::RequestDetourAside => {
-                self.guidance.begin_braking();
+                self.guidance.cancel_evasion();
                 self.request_detour_aside(from);
             }
             Action::RequestLanding => self.request_detour(DetourPurpose::Landing),
             Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),
             Action::FlyDetour => self.guidance.start_following(now),
             Action::FlyDivision => {
-                self.mission.fly_division();
+                self.mission.note_division_flown();
                 self.detours.give_up_plan();
                 self.guidance.start_following(now);
             }
-            Action::BrakeOnPath => self.guidance.begin_braking(),
+            Action::BrakeOnPath => self.guidance.cancel_evasion(),
             Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
                 self.detours.home.cancel();
@@ -264,7 +270,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match from {
             Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land
             | Disarm => {
-                self.guidance.begin_braking();
+                self.guidance.cancel_evasion();
             }
             // Off the path the reference may be behind a wall, so it holds where the vehicle is.
             _ => self.guidance.hold_at(position),
@@ -288,7 +294,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     self.detours.assume_blocked();
                 }
                 if !matches!(to, State::Climb | State::Follow) {
-                    self.guidance.begin_braking();
+                    self.guidance.cancel_evasion();
                 }
             }
         }

@@ -57,12 +57,12 @@ fn states(bench: &Bench) -> Vec<State> {
 #[test]
 fn flies_the_mission_and_lands_at_the_goal() {
     let mut bench = Bench::new(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.run(15.0);
     assert!(!bench.armed && bench.setpoints.is_empty(), "nothing before MISSION_START");
     bench.start();
     assert_eq!(bench.acks.pop(), Some((300, 0, 255, 190)));
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
     use State::*;
     let flown =
         [Scheduled, Streaming, Engaging, Arming, TakeOff, Climb, Follow, Land, Disarm, Done];
@@ -91,9 +91,9 @@ fn looks_where_its_task_says() {
             bench.answer_plan =
                 Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
         }
-        bench.until(State::Ready, 6.0);
+        bench.run_until(State::Ready, 6.0);
         bench.start();
-        bench.until(State::Done, 90.0);
+        bench.run_until(State::Done, 90.0);
         assert!(bench.headings.len() > 200 && bench.headings.len() == bench.setpoints.len());
         for ((at, _, mask), heading) in bench.setpoints.iter().zip(&bench.headings) {
             let wanted = look.filter(|_| *mask != px4::MASK_VELOCITY);
@@ -113,9 +113,9 @@ fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
     let mut slow = config();
     slow.method = Method::Algorithm2;
     let mut bench = Bench::new(slow);
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.start();
-    bench.until(State::Land, 60.0);
+    bench.run_until(State::Land, 60.0);
     let left = (bench.enu - GOAL).norm();
     assert!(left < 0.4, "{:?} {left}", bench.enu);
     for (_, at, _) in &bench.setpoints {
@@ -127,7 +127,7 @@ fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
     assert!(heights.windows(2).all(|pair| pair[1] > pair[0] - 1e-3), "{heights:?}");
     let (_, last, _) = bench.setpoints.last().unwrap();
     assert!((last - GOAL).norm() < 0.4, "{last:?}");
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.5, "{:?}", bench.enu);
     assert_no_gap(&bench);
 }
@@ -136,7 +136,7 @@ fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
 fn a_pilot_is_never_fought() {
     let mut bench = Bench::following(config());
     bench.mode = 0x0003_0000;
-    bench.until(State::PilotControl, 3.0);
+    bench.run_until(State::PilotControl, 3.0);
     let asked = bench.commands.len();
     bench.enu += Point::new(0.0, 0.3, 0.0);
     bench.run(3.0);
@@ -149,7 +149,7 @@ fn a_pilot_is_never_fought() {
     assert_eq!(bench.state(), State::PilotReturned);
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.state(), State::Follow);
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
     assert_no_gap(&bench);
 }
 
@@ -157,7 +157,7 @@ fn a_pilot_is_never_fought() {
 fn far_from_the_path_it_lands_instead_of_cutting_through_walls() {
     let mut bench = Bench::following(config());
     bench.mode = 0x0003_0000;
-    bench.until(State::PilotControl, 3.0);
+    bench.run_until(State::PilotControl, 3.0);
     for _ in 0..20 {
         bench.enu += Point::new(0.0, 0.1, 0.0);
         bench.run(0.1);
@@ -166,7 +166,7 @@ fn far_from_the_path_it_lands_instead_of_cutting_through_walls() {
     bench.run(2.0);
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.state(), State::Land);
-    bench.until(State::Aborted, 30.0);
+    bench.run_until(State::Aborted, 30.0);
 }
 
 #[test]
@@ -175,8 +175,8 @@ fn a_jump_of_five_metres_is_not_flown_after() {
         let mut bench = Bench::following(config());
         bench.enu += jump;
         let jumped_at = bench.now;
-        bench.until(State::PositionLost, 0.2);
-        bench.until(State::Land, 2.0);
+        bench.run_until(State::PositionLost, 0.2);
+        bench.run_until(State::Land, 2.0);
         let lasted = bench.now - jumped_at;
         assert!(
             lasted >= crate::autopilot::telemetry::POSITION_SETTLE_TIME
@@ -198,7 +198,7 @@ fn a_jump_of_five_metres_is_not_flown_after() {
             }
         }
         assert!(stops >= 18, "{stops}");
-        bench.until(State::Aborted, 30.0);
+        bench.run_until(State::Aborted, 30.0);
         assert_no_gap(&bench);
     }
 }
@@ -207,12 +207,12 @@ fn a_jump_of_five_metres_is_not_flown_after() {
 fn a_failsafe_gets_no_setpoints() {
     let mut bench = Bench::following(config());
     (bench.mode, bench.status) = (px4::RTL, 5);
-    bench.until(State::Failsafe, 3.0);
+    bench.run_until(State::Failsafe, 3.0);
     let sent = bench.setpoints.len();
     bench.run(5.0);
     assert_eq!(bench.setpoints.len(), sent);
     (bench.armed, bench.enu.z) = (false, 0.0);
-    bench.until(State::Aborted, 3.0);
+    bench.run_until(State::Aborted, 3.0);
     bench.run(5.0);
     assert_eq!(bench.setpoints.len(), sent);
 }
@@ -228,7 +228,7 @@ fn pause_brakes_on_the_path_and_resume_goes_on() {
     bench.run(4.0);
     assert!((bench.enu - stood).norm() < 0.01 && stood.x < 15.0);
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, 0);
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
     assert_no_gap(&bench);
 }
 
@@ -236,13 +236,13 @@ fn pause_brakes_on_the_path_and_resume_goes_on() {
 fn land_and_return_are_obeyed() {
     let mut bench = Bench::following(config());
     bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
-    bench.until(State::Aborted, 30.0);
+    bench.run_until(State::Aborted, 30.0);
     assert!(bench.enu.x > 8.5 && bench.enu.x < 15.0);
     assert_no_gap(&bench);
     let mut bench = Bench::following(config());
     bench.run(2.0);
     bench.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
-    bench.until(State::Aborted, 60.0);
+    bench.run_until(State::Aborted, 60.0);
     assert!((bench.enu - Point::new(START.x, START.y, 0.0)).norm() < 0.3, "{:?}", bench.enu);
     assert_no_gap(&bench);
 }
@@ -250,7 +250,7 @@ fn land_and_return_are_obeyed() {
 #[test]
 fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
     let mut bench = Bench::new(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.acks.pop(), Some((179, 3, 255, 190)));
     for (system, component) in
@@ -274,10 +274,10 @@ fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
 fn the_heartbeat_is_believed_and_no_ack() {
     use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavResult};
     let mut bench = Bench::new(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.refused.push(176);
     bench.start();
-    bench.until(State::Engaging, 6.0);
+    bench.run_until(State::Engaging, 6.0);
     // PX4's first ack of DO_SET_MODE says accepted, whatever comes of it.
     let ack = |result| COMMAND_ACK_DATA { command: MavCmd::MAV_CMD_DO_SET_MODE, result };
     bench.send(&ack(MavResult::MAV_RESULT_ACCEPTED));
@@ -286,7 +286,7 @@ fn the_heartbeat_is_believed_and_no_ack() {
     assert!(bench.commands.iter().filter(|c| c.0 == 176).count() >= 2, "asked again");
     bench.refused.clear();
     bench.send(&ack(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
-    bench.until(State::Follow, 20.0);
+    bench.run_until(State::Follow, 20.0);
 }
 
 #[test]
@@ -297,10 +297,10 @@ fn an_unsound_plan_is_refused() {
     for answer in [Ok(elsewhere), Err(PlanFailure::Unreachable)] {
         let mut bench = Bench::new(config());
         bench.answer_plan = Some(answer);
-        bench.until(State::Aborted, 6.0);
+        bench.run_until(State::Aborted, 6.0);
         bench.answer_plan = Some(Ok(plan()));
         bench.start();
-        bench.until(State::Ready, 6.0);
+        bench.run_until(State::Ready, 6.0);
         bench.run(10.0);
         assert_eq!(bench.state(), State::Ready, "start must be commanded again");
     }
@@ -312,7 +312,7 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     gated.gates.push(planner_core::flight::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
     let mut bench = Bench::new(two_vehicles());
     bench.answer_plan = Some(Ok(gated));
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.start();
     bench.run(20.0);
     let flags = crate::link::intent::ON_PLAN | crate::link::intent::FLYING;
@@ -330,7 +330,7 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     }
     assert_eq!(bench.companion.waiting_for(), 77);
     hear(&mut bench, 6.5, 5);
-    bench.until(State::Follow, 20.0);
+    bench.run_until(State::Follow, 20.0);
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
         gated.gates.push(planner_core::flight::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
         let mut bench = Bench::new(two_vehicles());
         bench.answer_plan = Some(Ok(gated));
-        bench.until(State::Ready, 6.0);
+        bench.run_until(State::Ready, 6.0);
         bench.start();
         for _ in 0..65 {
             bench.neighbour = flags.map(|flags| (Point::new(8.0, 60.0, 10.0), flags, 0.0, 5));

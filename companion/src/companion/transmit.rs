@@ -22,7 +22,7 @@ use crate::swarm::neighbours::relay;
 /// Longest time for which a vehicle over an area flies on along its part after it was last heard,
 /// seconds: its lease of 20 s, 1.8 s for the age of the report that renewed it, 2 s of message
 /// delay, and half of the longest stop.
-const UNHEARD_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
+const LEASE_FLIGHT_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
 /// Bit of `type_mask` in SET_POSITION_TARGET_LOCAL_NED: the yaw is ignored.
 const MASK_YAW_IGNORED: u16 = 0x400;
 
@@ -54,8 +54,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Intent) {
             let mut payload = [0; 133];
             let len = self.own_intent().encode(&mut payload);
-            let header = self.links.intent_header(system, self.reported_ends_m(), self.now);
-            if self.guidance.hold.is_on() {
+            let header = self.links.intent_header(system, self.reported_points_end_m(), self.now);
+            if self.guidance.hold.is_reported() {
                 self.guidance.hold.note_reported(self.now);
             }
             return encode_tunnel(header, &payload[..len], out);
@@ -86,7 +86,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let relayed = if link == Link::Swarm { self.relay_neighbours(out) } else { 0 };
         let length = if relayed > 0 { relayed } else { self.transmit_answer(link, out) };
         if link == Link::Swarm {
-            self.links.count_radio_bytes(length);
+            self.links.take_radio_tokens(length);
         }
         length
     }
@@ -145,7 +145,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn setpoint_message(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
-        let kind = self.kind();
+        let kind = self.autopilot_kind();
         let stop = |velocity: &Point| {
             (still, frames::swap_enu_ned(velocity), still, None, kind.stop_type_mask())
         };
@@ -284,7 +284,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let near = points.len();
         self.add_unheard_points(&mut points);
         let beyond = (points.len() - near) as u8;
-        let (clear_m, clear_in_s) = self.unheard_reach_m(along_m);
+        let (clear_m, clear_in_s) = self.unheard_reach(along_m);
         Intent {
             system_id: self.config.system_id,
             flags: self.intent_flags(),
@@ -302,7 +302,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             may_come_down: column,
             echo: self.neighbours.next_echo(self.links.intents_sent(), self.now),
             points,
-            first_unheard_point: beyond,
+            unheard_point_count: beyond,
         }
     }
 
@@ -323,7 +323,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return back.for_each(|w| add(w.position));
         }
         let stops_m = if on_path { self.guidance.stops_at_m.max(from_m) } else { 0.0 };
-        let stops_m = if self.guidance.hold.is_on() { from_m } else { stops_m };
+        let stops_m = if self.guidance.hold.is_reported() { from_m } else { stops_m };
         let ahead = path.waypoints().iter().filter(|w| w.along_m > stops_m && w.along_m < most_m);
         ahead.for_each(|w| add(w.position));
         path.point_at(most_m).filter(|_| most_m > stops_m).into_iter().for_each(add);
@@ -333,16 +333,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// vehicle hears it; `None` in a mission without an area.
     fn unheard_limit_m(&self) -> Option<f32> {
         let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
-        let lease_m = UNHEARD_S * self.config.cruise_mps;
+        let lease_m = LEASE_FLIGHT_S * self.config.cruise_mps;
         let from_m = self.guidance.setpoint_m.max(0.0);
         let most_m = if fleet.takes_part() { from_m + lease_m } else { f32::INFINITY };
         Some(most_m.min(plan.path.length_m()))
     }
 
     /// Place along this vehicle's path where the points of its intent end, metres.
-    fn reported_ends_m(&self) -> f32 {
+    fn reported_points_end_m(&self) -> f32 {
         let from_m = self.guidance.setpoint_m;
-        let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_on();
+        let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_reported();
         let Some(plan) = self.mission.plan().filter(|_| flies) else { return from_m };
         // The setpoint and these waypoints are as many points as an intent holds.
         let last =
@@ -380,7 +380,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 add(here);
                 add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
             }
-            _ if self.guidance.hold.is_on() => {
+            _ if self.guidance.hold.is_reported() => {
                 column = false;
                 add(setpoint);
             }

@@ -34,7 +34,7 @@ impl Guidance {
     }
 
     /// Ends an evasion, so that the setpoint stops where it is: the next state does not fly on.
-    pub fn begin_braking(&mut self) {
+    pub fn cancel_evasion(&mut self) {
         self.evade_search.reset();
     }
 
@@ -58,7 +58,7 @@ impl Guidance {
         }
         let (alone, follows) = (state == State::Alone, state == State::Follow);
         // A vehicle in its descent, or on its way aside, flies on.
-        let waits = state.holds_place()
+        let waits = state.is_on_path()
             && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_aside && follows);
         let lands_m = along_m.min(self.expected_up_to_m(alone, neighbours));

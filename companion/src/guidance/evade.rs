@@ -15,7 +15,7 @@
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOutZone;
 use planner_core::flight::Path;
-use planner_core::track::Tracker;
+use planner_core::track::ReferenceState;
 use planner_core::{Length, Point};
 
 use crate::swarm::sweep::IncrementalScan;
@@ -63,7 +63,7 @@ pub struct EvadeSearch {
     /// Place along the path where the search began, metres, and the number of places from there
     /// back that were found inside a column.
     from_m: Option<f32>,
-    columns_found: u16,
+    covered_places: u16,
     /// Result of the last search that has finished.
     pub found: EvadeTarget,
 }
@@ -82,19 +82,19 @@ impl EvadeSearch {
         // grows, the search begins there.
         let from_m =
             self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
-                self.columns_found = 0;
+                self.covered_places = 0;
                 self.sweep.restart();
                 wait_m
             });
         self.from_m = Some(from_m);
         let mut budget = MAX_SEARCH_COST;
         let found = loop {
-            let along_m = from_m - f32::from(self.columns_found) * PLACE_STEP_M;
+            let along_m = from_m - f32::from(self.covered_places) * PLACE_STEP_M;
             // The last place compared is the start of the path.
-            let on_path = self.columns_found == 0 || along_m > -PLACE_STEP_M;
+            let on_path = self.covered_places == 0 || along_m > -PLACE_STEP_M;
             let along_m = along_m.max(0.0);
             let place = path.point_at(along_m).filter(|_| on_path);
-            let Some(place) = place.filter(|_| self.columns_found <= MAX_PLACES) else {
+            let Some(place) = place.filter(|_| self.covered_places <= MAX_PLACES) else {
                 break EvadeTarget::Nowhere;
             };
             budget = budget.saturating_sub(PLACE_COST);
@@ -103,8 +103,8 @@ impl EvadeSearch {
                 .continue_scan(neighbours, &mut budget, 1, &tell, |column| column.contains(&place))
             {
                 None => return,
-                Some(true) => self.columns_found += 1,
-                Some(false) if self.columns_found == 0 => break EvadeTarget::Here,
+                Some(true) => self.covered_places += 1,
+                Some(false) if self.covered_places == 0 => break EvadeTarget::Here,
                 Some(false) => break EvadeTarget::Back(along_m),
             }
         };
@@ -122,7 +122,7 @@ impl EvadeSearch {
 /// behind.
 pub fn step_back<const W: usize>(
     path: &Path<W>,
-    tracker: &mut Tracker,
+    tracker: &mut ReferenceState,
     to_m: f32,
     neighbours: &[Neighbour],
     safety_m: f32,
@@ -157,7 +157,7 @@ pub fn step_back<const W: usize>(
     point_at(path, tracker)
 }
 
-fn point_at<const W: usize>(path: &Path<W>, tracker: &Tracker) -> Option<Point> {
+fn point_at<const W: usize>(path: &Path<W>, tracker: &ReferenceState) -> Option<Point> {
     path.point_at(tracker.along_m)
 }
 
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn it_goes_back_slowly_round_the_corner_and_not_into_who_follows() {
         let path = path();
-        let mut tracker = Tracker { along_m: 9.0, ..Tracker::default() };
+        let mut tracker = ReferenceState { along_m: 9.0, ..ReferenceState::default() };
         let mut follower = above(0.0, 0.0, 1.0);
         follower.progress_m = Some(0.0);
         let mut steps = 0;
@@ -261,7 +261,7 @@ mod tests {
             steps += 1;
         }
         assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");
-        let mut near = Tracker { along_m: 2.0, ..Tracker::default() };
+        let mut near = ReferenceState { along_m: 2.0, ..ReferenceState::default() };
         while step_back(&path, &mut near, 0.0, &[follower], 1.5, 0.05).is_some() {}
         assert!(near.along_m > 1.5, "{near:?}");
     }

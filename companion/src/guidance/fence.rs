@@ -142,21 +142,21 @@ impl Fence {
 
     /// Bounds of an axis for a motion at `place`: the fence less 2 cm. A motion that is beyond them
     /// comes no nearer to the fence.
-    fn axis_walls(&self, axis: usize, place: f32, brake: BrakingLimits) -> Walls {
+    fn axis_walls(&self, axis: usize, place: f32, brake: BrakingLimits) -> AxisBounds {
         let (low, high) = (self.low[axis], self.high[axis]);
         let before_m = fminf(TURN_BEFORE_FENCE_M, 0.25 * (high - low));
-        Walls { low: fminf(low + before_m, place), high: fmaxf(high - before_m, place), brake }
+        AxisBounds { low: fminf(low + before_m, place), high: fmaxf(high - before_m, place), brake }
     }
 }
 
 /// Interval of an axis in which a motion has to stop, and its braking.
-struct Walls {
+struct AxisBounds {
     low: f32,
     high: f32,
     brake: BrakingLimits,
 }
 
-impl Walls {
+impl AxisBounds {
     fn can_stop_between(&self, place: f32, speed: f32, accel: f32) -> bool {
         self.can_stop_below_high(place, speed, accel)
             && place - stopping_distance_m(-speed, -accel, self.brake) >= self.low

@@ -43,7 +43,7 @@ impl Hold {
     }
 
     /// Whether the vehicle's intents report the hold.
-    pub(crate) fn is_on(&self) -> bool {
+    pub(crate) fn is_reported(&self) -> bool {
         self.on
     }
 

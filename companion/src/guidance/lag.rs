@@ -18,7 +18,7 @@ impl Guidance {
         }
         let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
         match moves {
-            true => share.min(self.pace),
+            true => share.min(self.estimate_speed_share),
             // At rest the setpoint holds; before the take-off it follows the position estimate.
             false if self.raw_point_at_rest => 1.0,
             false => 0.0,

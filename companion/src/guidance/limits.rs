@@ -145,13 +145,13 @@ impl Settings {
         self.track.check()?;
         self.leg_track.check()?;
         self.deconflict.check()?;
-        bounds(&self.track, self.fastest_mps).check()
+        filter_bounds(&self.track, self.fastest_mps).check()
     }
 }
 
 /// Limits within which neighbours are expected to fly and stop: the speed of the mission's fastest
 /// vehicle, which may be another, and the braking of this one.
-pub(crate) fn bounds(track: &TrackConfig, fastest_mps: f32) -> MotionBounds {
+pub(crate) fn filter_bounds(track: &TrackConfig, fastest_mps: f32) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
     let speed_max_mps = fmaxf(track.cruise_mps, fastest_mps);
     MotionBounds { braking, speed_max_mps, silent_s: UNHEARD_STOPPED_S }
@@ -197,7 +197,7 @@ mod tests {
             let kind = if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
             let mut autopilot = kind.default_limits();
             for (index, bits, near) in read {
-                let Some(parameter) = kind.limits().get(index) else { continue };
+                let Some(parameter) = kind.limit_parameters().get(index) else { continue };
                 // Bits of an integer, NaN and infinities among them.
                 autopilot.set(parameter, f32::from_bits(bits));
                 autopilot.set(parameter, near);
@@ -224,6 +224,6 @@ mod tests {
         let config = Config { cruise_mps: 0.5, slowest_mps: 0.5, fastest_mps: 6.0, ..config() };
         let settings = Settings::new(&config, &AutopilotKind::Px4.default_limits());
         assert_eq!(settings.track.cruise_mps, 0.5);
-        assert_eq!(bounds(&settings.track, settings.fastest_mps).speed_max_mps, 6.0);
+        assert_eq!(filter_bounds(&settings.track, settings.fastest_mps).speed_max_mps, 6.0);
     }
 }

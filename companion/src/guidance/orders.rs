@@ -10,7 +10,7 @@ use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, STANDING_SETPOINT_MPS};
 use crate::time::Instant;
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::track::Tracker;
+use planner_core::track::ReferenceState;
 
 impl Guidance {
     /// Holds from now on: where the setpoint comes to a stop; at `point` where there is no
@@ -52,7 +52,7 @@ impl Guidance {
 
     /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
-        self.tracker = Tracker::default();
+        self.tracker = ReferenceState::default();
         self.phase = Phase::Path;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
@@ -108,7 +108,7 @@ impl Guidance {
     /// Begins a landing that setpoints lead straight down from where the setpoint stands, to the
     /// height at which the autopilot's landing takes over.
     pub(crate) fn begin_guided_landing(&mut self, now: Instant) {
-        self.begin_braking();
+        self.cancel_evasion();
         (self.guides_landing, self.progress_at) = (true, now);
     }
 
@@ -171,8 +171,10 @@ impl Guidance {
             let _ = back.push(waypoint.position, clearance_m);
             clearance_m = waypoint.clearance_m;
         }
-        let tracker =
-            Tracker { along_m: from_m - self.tracker.along_m, speed_mps: -self.tracker.speed_mps };
+        let tracker = ReferenceState {
+            along_m: from_m - self.tracker.along_m,
+            speed_mps: -self.tracker.speed_mps,
+        };
         let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
         self.begin_path(now);
@@ -203,7 +205,7 @@ impl Guidance {
     pub(super) fn forget_leg(&mut self) {
         self.raw_point_at_rest = true;
         self.leg = None;
-        self.leg_tracker = Tracker::default();
+        self.leg_tracker = ReferenceState::default();
         self.tracker.speed_mps = 0.0;
     }
 }

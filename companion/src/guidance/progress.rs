@@ -16,7 +16,7 @@ impl Guidance {
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
     /// ([`Neighbours::unheard_reach`]).
-    pub(crate) fn gates_open_up_to_soon_m<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn unheard_reach<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
@@ -40,7 +40,7 @@ impl Guidance {
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
-        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.detours) else {
+        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.is_on_detour) else {
             return f32::NEG_INFINITY;
         };
         let gate_m = plan.gates.get(self.gates_open).map_or(f32::INFINITY, |gate| gate.at_m);

@@ -2,7 +2,7 @@
 
 use planner_core::deconflict::Advice;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::track::{self, Reference, Tracker};
+use planner_core::track::{self, Reference, ReferenceState};
 use planner_core::{Length, Point};
 
 use super::limits::JOIN_MPS;
@@ -74,7 +74,7 @@ impl Guidance {
             // Two points fit.
             let _ = leg.push(raw, f32::INFINITY.min(self.track.lead_max_m));
             let _ = leg.push(target, f32::INFINITY.min(self.track.lead_max_m));
-            (self.leg, self.leg_tracker) = (Some(leg), Tracker::default());
+            (self.leg, self.leg_tracker) = (Some(leg), ReferenceState::default());
         }
         let Some(leg) = &self.leg else { return raw };
         let advice = Advice { speed_scale: self.descent_scale(plan, leg), ..Advice::FREE };
@@ -178,7 +178,8 @@ impl Guidance {
                 let kept =
                     self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
                 let speed_mps = self.leg_tracker.speed_mps * kept;
-                (self.leg, self.leg_tracker) = (Some(leg), Tracker { along_m: 0.0, speed_mps });
+                (self.leg, self.leg_tracker) =
+                    (Some(leg), ReferenceState { along_m: 0.0, speed_mps });
             }
             Some(_) => {}
         }

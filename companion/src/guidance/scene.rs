@@ -15,7 +15,7 @@ pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
     /// MAVLink system id of the vehicle.
     pub id: u8,
     /// Whether the path is a detour, not that of the shared plan.
-    pub detours: bool,
+    pub is_on_detour: bool,
 }
 
 impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
@@ -27,6 +27,6 @@ impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
         detours: bool,
     ) -> Self {
         let plan = plan.filter(|plan| !plan.path.waypoints().is_empty());
-        Self { plan, telemetry, rank, id, detours }
+        Self { plan, telemetry, rank, id, is_on_detour: detours }
     }
 }

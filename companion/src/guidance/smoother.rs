@@ -50,7 +50,7 @@ const CLOCK_JERK_SHARE: f32 = 0.7;
 /// rest.
 const END_JERK_SHARE: f32 = 0.4;
 /// A setpoint slower than this stands, m/s.
-const STANDSTILL_MPS: f32 = 0.01;
+const SETPOINT_STANDSTILL_MPS: f32 = 0.01;
 /// Rate of decay at the end of a stop, 1/s: speed falls by this share of itself each second.
 const STOP_DECAY_PER_S: f32 = 4.0;
 /// Greatest speed of a setpoint that follows a vehicle under other control, m/s: a position that
@@ -177,7 +177,7 @@ impl SetpointSmoother {
     }
 
     /// Ends the setpoint stream: the next setpoint begins at a place of its own.
-    pub(crate) fn stop(&mut self) {
+    pub(crate) fn end_stream(&mut self) {
         self.has_setpoint = false;
     }
 
@@ -224,7 +224,7 @@ impl SetpointSmoother {
 
     /// Whether the setpoint stands.
     pub(crate) fn is_standing(&self) -> bool {
-        self.velocity().norm_squared() < STANDSTILL_MPS * STANDSTILL_MPS
+        self.velocity().norm_squared() < SETPOINT_STANDSTILL_MPS * SETPOINT_STANDSTILL_MPS
     }
 
     /// Distance of a stop of the setpoint from now on, metres: until the braking has built up, and
@@ -232,7 +232,7 @@ impl SetpointSmoother {
     pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
-        if speed < STANDSTILL_MPS {
+        if speed < SETPOINT_STANDSTILL_MPS {
             return 0.0;
         }
         let accel = self.limits.accel_along(&(velocity / speed));

@@ -64,7 +64,7 @@ struct TokenBucketConfig {
     burst: u64,
 }
 
-const fn rate(every_ms: u64, burst: u64) -> TokenBucketConfig {
+const fn token_bucket(every_ms: u64, burst: u64) -> TokenBucketConfig {
     TokenBucketConfig { every_ms, burst }
 }
 
@@ -73,10 +73,28 @@ const fn rate(every_ms: u64, burst: u64) -> TokenBucketConfig {
 /// bytes a second by radio, of the 250 that the radio's rate limit allows in flight. A burst of
 /// `Parameter` holds a list of all parameters. PX4 sends TIMESYNC at 10 Hz, and flies without an
 /// answer.
-const RATES: [[TokenBucketConfig; KIND_COUNT]; SENDER_COUNT] = [
-    [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
-    [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],
-    [rate(1000, 2), rate(1000, 3), rate(2000, 10), rate(2000, 2), rate(10_000, 1)],
+const TOKEN_BUCKETS: [[TokenBucketConfig; KIND_COUNT]; SENDER_COUNT] = [
+    [
+        token_bucket(100, 10),
+        token_bucket(1000, 5),
+        token_bucket(50, 32),
+        token_bucket(100, 10),
+        token_bucket(1000, 6),
+    ],
+    [
+        token_bucket(200, 5),
+        token_bucket(500, 5),
+        token_bucket(200, 16),
+        token_bucket(500, 4),
+        token_bucket(10_000, 1),
+    ],
+    [
+        token_bucket(1000, 2),
+        token_bucket(1000, 3),
+        token_bucket(2000, 10),
+        token_bucket(2000, 2),
+        token_bucket(10_000, 1),
+    ],
 ];
 
 /// The time at which each token bucket (link, kind of sender, kind of answer) is full again.
@@ -94,7 +112,7 @@ impl AnswerTokenBuckets {
         sender: SenderKind,
         kind: AnswerKind,
     ) -> bool {
-        let TokenBucketConfig { every_ms, burst } = RATES[sender as usize][kind as usize];
+        let TokenBucketConfig { every_ms, burst } = TOKEN_BUCKETS[sender as usize][kind as usize];
         let full_at = &mut self.full_at[link as usize][sender as usize][kind as usize];
         let next = (*full_at).max(now) + Duration::from_millis(every_ms);
         let allowed = next - now <= Duration::from_millis(every_ms * burst);

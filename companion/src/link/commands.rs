@@ -25,25 +25,25 @@ pub const DENIED: u8 = 2;
 pub const UNSUPPORTED: u8 = 3;
 
 /// NAV_RETURN_TO_LAUNCH: fly back to the start and land there.
-pub const RETURN: u16 = 20;
+pub const RETURN_TO_LAUNCH: u16 = 20;
 /// NAV_LAND: land where the vehicle is.
 pub const LAND: u16 = 21;
 /// DO_PAUSE_CONTINUE: `param1` 0 pauses on the path, 1 resumes.
 pub const PAUSE_CONTINUE: u16 = 193;
 /// MISSION_START: arm, take off and fly the mission.
-pub const START: u16 = 300;
+pub const MISSION_START: u16 = 300;
 /// NAV_FENCE_CIRCLE_EXCLUSION as COMMAND_INT: adds an obstacle, a sphere of radius `param1` metres
 /// about the command's place; radius 0 revokes it.
-pub const EXCLUDE: u16 = 5004;
+pub const FENCE_EXCLUSION: u16 = 5004;
 /// REQUEST_MESSAGE: send the message whose id is `param1`.
-pub const REQUEST: u16 = 512;
+pub const REQUEST_MESSAGE: u16 = 512;
 /// PREFLIGHT_REBOOT_SHUTDOWN: restart the companion.
-pub const RESTART: u16 = 246;
+pub const REBOOT: u16 = 246;
 
 /// `MAV_FRAME_GLOBAL`: altitude above mean sea level.
-const GLOBAL: u8 = 0;
+const FRAME_GLOBAL: u8 = 0;
 /// `MAV_FRAME_GLOBAL_INT`: altitude above mean sea level.
-const GLOBAL_INT: u8 = 5;
+const FRAME_GLOBAL_INT: u8 = 5;
 
 /// Time after a command frame within which an identical frame counts as its repetition, not as a
 /// new command.
@@ -74,22 +74,26 @@ impl Command {
     /// Whether the command changes something (mission, obstacles, a restart), and so counts only
     /// from a ground station that the mission names.
     pub(crate) fn needs_authority(&self) -> bool {
-        let restarts = self.command == RESTART && (self.to_component || self.param2 == 1.0);
-        restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
+        let restarts = self.command == REBOOT && (self.to_component || self.param2 == 1.0);
+        restarts
+            || matches!(
+                self.command,
+                RETURN_TO_LAUNCH | LAND | PAUSE_CONTINUE | MISSION_START | FENCE_EXCLUSION
+            )
     }
 
     /// The STATUSTEXT sent once the command took effect; its two `#` stand for the sender's system
     /// and component id.
     pub(crate) fn log_text(&self) -> &'static str {
         match self.command {
-            START => "Start from #/#",
+            MISSION_START => "Start from #/#",
             PAUSE_CONTINUE if self.param1 == 0.0 => "Pause from #/#",
             PAUSE_CONTINUE => "Resume from #/#",
             LAND => "Landing from #/#",
-            RETURN => "Return from #/#",
-            EXCLUDE if self.param1 > 0.0 => "Obstacle from #/#",
-            EXCLUDE => "Obstacle revoked from #/#",
-            RESTART => "Restart from #/#",
+            RETURN_TO_LAUNCH => "Return from #/#",
+            FENCE_EXCLUSION if self.param1 > 0.0 => "Obstacle from #/#",
+            FENCE_EXCLUSION => "Obstacle revoked from #/#",
+            REBOOT => "Restart from #/#",
             _ => "Command from #/#",
         }
     }
@@ -117,8 +121,9 @@ pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
         command: u16::from_le_bytes([p[28], p[29]]),
         param1: float(0),
         param2: float(4),
-        place: (frame.message_id == COMMAND_INT && matches!(p[32], GLOBAL | GLOBAL_INT))
-            .then(|| (whole(16), whole(20), float(24))),
+        place: (frame.message_id == COMMAND_INT
+            && matches!(p[32], FRAME_GLOBAL | FRAME_GLOBAL_INT))
+        .then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
         to_us: target_system == system,
         to_component: target_component == crate::COMPANION_COMPONENT,
@@ -193,7 +198,7 @@ pub struct PendingCommands {
 impl PendingCommands {
     /// Clears the commands that the row with this guard has carried out by entering `to`; all of
     /// them if the mission `ends`.
-    pub(crate) fn state_changed(&mut self, guard: Guard, to: State, ends: bool) {
+    pub(crate) fn clear_carried_out(&mut self, guard: Guard, to: State, ends: bool) {
         use State::*;
         self.resume = false;
         if ends {
@@ -226,17 +231,17 @@ pub fn apply_command(
     use State::*;
     let (flag, guard, already): (_, _, &[State]) = match command.command {
         // MISSION_START before the plan has come is stored; a repeated one changes nothing.
-        START if state == Planning => {
+        MISSION_START if state == Planning => {
             pending.start = true;
             return Some(ACCEPTED);
         }
         // After its flight over an area, a vehicle starts again from its pad: it photographs
         // waypoints that other vehicles left.
-        START if state == Done && inputs.area => {
+        MISSION_START if state == Done && inputs.area => {
             pending.start = true;
             return Some(ACCEPTED);
         }
-        START => (
+        MISSION_START => (
             &mut pending.start,
             if state == Aborted { Guard::StartAgain } else { Guard::StartCommanded },
             &[
@@ -299,7 +304,7 @@ pub fn apply_command(
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });
         }
         LAND => (&mut pending.land, Guard::LandCommanded, &[Stopping, Land, Disarm, Done]),
-        RETURN => (&mut pending.turn_back, Guard::ReturnCommanded, &[Done]),
+        RETURN_TO_LAUNCH => (&mut pending.turn_back, Guard::ReturnCommanded, &[Done]),
         _ => return None,
     };
     if has_row_for(state, guard) {

@@ -33,14 +33,14 @@ pub(crate) const RANGE_LEN: usize = 6;
 pub(crate) const PERIOD_ON_GROUND: Duration = Duration::from_millis(1000);
 /// Period of the report while the vehicle flies.
 pub(crate) const PERIOD_IN_FLIGHT: Duration = Duration::from_millis(5000);
-const TUNNEL_HEAD: usize = 5;
-const HEAD: usize = 10;
+const TUNNEL_HEADER_LEN: usize = 5;
+const HEADER_LEN: usize = 10;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
-pub const MAX_LEN: usize = TUNNEL_HEAD + HEAD + MAX_RANGES * RANGE_LEN;
+pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_RANGES * RANGE_LEN;
 
 /// The report of photographed waypoints.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct DoneReport {
+pub struct PhotographedReport {
     /// MAVLink system id of the sender.
     pub system_id: u8,
     /// CRC-32 of the mission file.
@@ -71,13 +71,13 @@ pub(crate) fn decode_range(bytes: &[u8; RANGE_LEN]) -> WaypointRange {
     WaypointRange { first, end: first + u32::from_le_bytes([d, e, f, 0]) }
 }
 
-impl DoneReport {
+impl PhotographedReport {
     /// Writes TUNNEL's whole payload, addressed to all. Returns its length.
     pub fn encode(&self, out: &mut [u8; MAX_LEN]) -> usize {
-        let len = HEAD + RANGE_LEN * self.ranges.len();
+        let len = HEADER_LEN + RANGE_LEN * self.ranges.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
-        let body = &mut out[TUNNEL_HEAD..];
+        let body = &mut out[TUNNEL_HEADER_LEN..];
         let count = self.ranges.len() as u8;
         body[..6].copy_from_slice(&[
             VERSION,
@@ -87,11 +87,11 @@ impl DoneReport {
             count,
             0,
         ]);
-        body[6..HEAD].copy_from_slice(&self.mission_crc.to_le_bytes());
-        for (to, range) in body[HEAD..].chunks_exact_mut(RANGE_LEN).zip(&self.ranges) {
+        body[6..HEADER_LEN].copy_from_slice(&self.mission_crc.to_le_bytes());
+        for (to, range) in body[HEADER_LEN..].chunks_exact_mut(RANGE_LEN).zip(&self.ranges) {
             to.copy_from_slice(&encode_range(range));
         }
-        TUNNEL_HEAD + len
+        TUNNEL_HEADER_LEN + len
     }
 
     /// Decodes TUNNEL's payload, zero-padded, from the system id `sender`. `None` if it is no
@@ -99,15 +99,19 @@ impl DoneReport {
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
-        let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
-        if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
+        let body = padded[TUNNEL_HEADER_LEN..].get(..len.min(128))?;
+        if payload_type != PAYLOAD_TYPE
+            || len < HEADER_LEN
+            || body[0] != VERSION
+            || body[1] != sender
+        {
             return None;
         }
         let count = usize::from(body[4]);
-        if count > MAX_RANGES || len != HEAD + RANGE_LEN * count {
+        if count > MAX_RANGES || len != HEADER_LEN + RANGE_LEN * count {
             return None;
         }
-        let (ranges, _) = body[HEAD..].as_chunks();
+        let (ranges, _) = body[HEADER_LEN..].as_chunks();
         Some(Self {
             system_id: sender,
             mission_crc: u32::from_le_bytes([body[6], body[7], body[8], body[9]]),
@@ -124,7 +128,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn padded(report: &DoneReport) -> [u8; 255] {
+    fn padded(report: &PhotographedReport) -> [u8; 255] {
         let (mut out, mut padded) = ([0; MAX_LEN], [0; 255]);
         let len = report.encode(&mut out);
         padded[..len].copy_from_slice(&out[..len]);
@@ -141,7 +145,7 @@ mod tests {
                 .iter()
                 .map(|&(first, count)| WaypointRange { first, end: first + count })
                 .collect();
-            let report = DoneReport {
+            let report = PhotographedReport {
                 system_id: 9,
                 mission_crc,
                 round,
@@ -149,12 +153,12 @@ mod tests {
                 is_left_out_by_plan: plan,
                 ranges,
             };
-            prop_assert_eq!(DoneReport::decode(&padded(&report), 9), Some(report.clone()));
-            prop_assert_eq!(DoneReport::decode(&padded(&report), 8), None);
+            prop_assert_eq!(PhotographedReport::decode(&padded(&report), 9), Some(report.clone()));
+            prop_assert_eq!(PhotographedReport::decode(&padded(&report), 8), None);
             for (at, value) in [(0, 0), (4, 9), (5, 2), (9, 20)] {
                 let mut bad = padded(&report);
                 bad[at] = value;
-                prop_assert_eq!(DoneReport::decode(&bad, 9), None);
+                prop_assert_eq!(PhotographedReport::decode(&bad, 9), None);
             }
         }
 
@@ -163,7 +167,7 @@ mod tests {
             let mut padded: [u8; 255] = bytes.try_into().unwrap();
             padded[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
             padded[5] = VERSION;
-            let _ = DoneReport::decode(&padded, padded[6]);
+            let _ = PhotographedReport::decode(&padded, padded[6]);
         }
     }
 

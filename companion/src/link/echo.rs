@@ -78,7 +78,7 @@ impl SentIntents {
 
     /// The sent intent whose arrival this echo shows, now stored as the newest that arrived. `None`
     /// if a newer one has arrived before, or if the intent is no longer stored.
-    pub(crate) fn arrived(&mut self, echo: &IntentEcho) -> Option<SentIntent> {
+    pub(crate) fn note_arrival(&mut self, echo: &IntentEcho) -> Option<SentIntent> {
         let sent = self.find(echo).filter(|sent| sent.at > self.arrived)?;
         self.arrived = sent.at;
         Some(sent)
@@ -166,7 +166,7 @@ mod tests {
         (0..8).for_each(|i| sent.note_sent(i, f32::from(i), at(i)));
         let echo = |sequence| IntentEcho { rank: 0, sequence, held: 0 };
         let mut arrived =
-            |sequence| sent.arrived(&echo(sequence)).map(|sent| (sent.at, sent.ends_m));
+            |sequence| sent.note_arrival(&echo(sequence)).map(|sent| (sent.at, sent.ends_m));
         assert_eq!(arrived(3), Some((at(3), 3.0)));
         assert_eq!(arrived(2), None, "overtaken");
         assert_eq!(arrived(99), None, "never sent");

@@ -33,7 +33,7 @@ pub const MAX_POINTS: usize = 8;
 /// Version of the payload's layout.
 pub const VERSION: u8 = 6;
 const HEADER_LEN: usize = 32;
-const TUNNEL_HEAD: usize = 5;
+const TUNNEL_HEADER_LEN: usize = 5;
 
 /// Flag: the sender stands on the ground.
 pub const GROUNDED: u8 = 1;
@@ -90,7 +90,7 @@ pub struct Intent {
     /// failsafe flies it.
     pub points: Vec<Point, MAX_POINTS>,
     /// How many of the last of these points lie beyond where it will stop for now.
-    pub first_unheard_point: u8,
+    pub unheard_point_count: u8,
 }
 
 impl Intent {
@@ -99,12 +99,12 @@ impl Intent {
         let len = HEADER_LEN + 12 * self.points.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
-        let body = &mut out[TUNNEL_HEAD..];
+        let body = &mut out[TUNNEL_HEADER_LEN..];
         body[..4].copy_from_slice(&[
             VERSION,
             self.system_id,
             self.flags,
-            self.points.len() as u8 | self.first_unheard_point << 4,
+            self.points.len() as u8 | self.unheard_point_count << 4,
         ]);
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
@@ -125,7 +125,7 @@ impl Intent {
         {
             to.copy_from_slice(&value.to_le_bytes());
         }
-        TUNNEL_HEAD + len
+        TUNNEL_HEADER_LEN + len
     }
 
     /// Decodes TUNNEL's payload, zero-padded, from the system id `sender`. `None` if it is no
@@ -133,7 +133,7 @@ impl Intent {
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
-        let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
+        let body = padded[TUNNEL_HEADER_LEN..].get(..len.min(128))?;
         if payload_type != PAYLOAD_TYPE
             || len < HEADER_LEN
             || body[0] != VERSION
@@ -169,7 +169,7 @@ impl Intent {
                 held: body[31],
             }),
             points,
-            first_unheard_point: beyond,
+            unheard_point_count: beyond,
         })
     }
 }
@@ -194,7 +194,7 @@ mod tests {
             unheard_delay_s: 15 * count as u8,
             echo: (count > 2).then_some(IntentEcho { rank: 254, sequence: 9, held: count as u8 }),
             points,
-            first_unheard_point: count as u8 / 2,
+            unheard_point_count: count as u8 / 2,
         }
     }
 

@@ -35,20 +35,20 @@ pub const fn state_bytes_per_s(swarm_hz: u8) -> u32 {
 /// The token bucket of the radio. Its tokens are millionths of a byte, so that a microsecond adds
 /// some.
 #[derive(Clone, Debug)]
-pub(crate) struct RateLimit {
+pub(crate) struct RadioTokenBucket {
     tokens: i64,
     at: Instant,
 }
 
 const MICROBYTES_PER_BYTE: i64 = 1_000_000;
 
-impl Default for RateLimit {
+impl Default for RadioTokenBucket {
     fn default() -> Self {
         Self { tokens: i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE, at: Instant::ZERO }
     }
 }
 
-impl RateLimit {
+impl RadioTokenBucket {
     /// Fills the bucket up to `now` and returns whether another frame may be sent: whether any
     /// token is left. The frame may take more tokens than there are; the bucket is then negative.
     pub fn may_send(&mut self, now: Instant, armed: bool) -> bool {
@@ -67,7 +67,7 @@ impl RateLimit {
     }
 
     /// Takes the tokens of a sent frame.
-    pub fn count_bytes(&mut self, bytes: usize) {
+    pub fn take_tokens(&mut self, bytes: usize) {
         self.tokens -= bytes.min(MAX_FRAME_LEN) as i64 * MICROBYTES_PER_BYTE;
     }
 }

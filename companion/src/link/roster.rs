@@ -26,11 +26,11 @@ pub const PAYLOAD_TYPE: u16 = 0xF10E;
 pub const VERSION: u8 = 1;
 /// Most vehicles in one message.
 pub const MAX_ENTRIES: usize = 22;
-const TUNNEL_HEAD: usize = 5;
+const TUNNEL_HEADER_LEN: usize = 5;
 const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
-pub const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
+pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
 
 /// Whether a vehicle takes part in the coverage mission. Of two reports about a vehicle, the status
 /// that is later in this list counts.
@@ -97,7 +97,7 @@ impl RosterReport {
         let len = HEADER_LEN + ENTRY_LEN * self.entries.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
-        let body = &mut out[TUNNEL_HEAD..];
+        let body = &mut out[TUNNEL_HEADER_LEN..];
         let count = self.entries.len() as u8;
         body[..6].copy_from_slice(&[VERSION, self.system_id, self.divisions, self.first, count, 0]);
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
@@ -113,7 +113,7 @@ impl RosterReport {
             to[1..3].copy_from_slice(&entry.progress_dm.to_le_bytes());
             to[3..5].copy_from_slice(&entry.commitment_dm.unwrap_or(0).to_le_bytes());
         }
-        TUNNEL_HEAD + len
+        TUNNEL_HEADER_LEN + len
     }
 
     /// Decodes TUNNEL's payload, zero-padded, from the system id `sender`. `None` if it is no
@@ -121,7 +121,7 @@ impl RosterReport {
     pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
-        let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
+        let body = padded[TUNNEL_HEADER_LEN..].get(..len.min(128))?;
         if payload_type != PAYLOAD_TYPE
             || len < HEADER_LEN
             || body[0] != VERSION

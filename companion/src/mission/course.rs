@@ -19,10 +19,10 @@ use crate::time::{Duration, Instant};
 
 /// Greatest distance between the first point of a path and the place where it must begin, metres; a
 /// plan beyond it is refused.
-const PATH_BEGIN_M: f32 = 0.1;
+const MAX_PATH_START_ERROR_M: f32 = 0.1;
 /// A picture at most this far along the path before the place where the vehicle comes back to its
 /// path is taken at that place, metres.
-const TAKEN_M: f32 = 0.05;
+const REJOIN_PICTURE_WINDOW_M: f32 = 0.05;
 
 /// The mission of one vehicle, whose plan has at most `W` waypoints and `G` gates.
 #[derive(Clone, Debug)]
@@ -130,7 +130,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// The autopilot's `custom_mode` when the mission was started.
-    pub(crate) fn mode_before(&self) -> u32 {
+    pub(crate) fn mode_at_start(&self) -> u32 {
         self.mode_before
     }
 
@@ -174,7 +174,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Notes whether the estimate's error bound fits into the margin, at crawl speed at least.
-    pub(crate) fn note_estimate(&mut self, usable: bool, now: Instant) {
+    pub(crate) fn note_estimate_usable(&mut self, usable: bool, now: Instant) {
         self.imprecise_since = if usable { None } else { self.imprecise_since.or(Some(now)) };
     }
 
@@ -224,7 +224,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
         let ends = matches!(to, State::Aborted | State::Done)
             || matches!(row.action, Action::ForgetStart | Action::CancelStart);
-        self.pending.state_changed(row.guard, to, ends);
+        self.pending.clear_carried_out(row.guard, to, ends);
         (from, to)
     }
 
@@ -275,12 +275,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Whether the plan after the last division has come and is not flown yet.
-    pub(crate) fn has_division(&self) -> bool {
+    pub(crate) fn is_division_plan_ready(&self) -> bool {
         self.division_plan_ready
     }
 
     /// Notes that the vehicle flies the plan after the last division from now on.
-    pub(crate) fn fly_division(&mut self) {
+    pub(crate) fn note_division_flown(&mut self) {
         self.division_plan_ready = false;
     }
 
@@ -356,7 +356,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     pub(crate) fn note_photographed(&mut self, along_m: f32) {
         let Some(plan) = &self.plan else { return };
         if let Task::Photograph(photographs) = &plan.task {
-            let end = photographs.passed_count(&plan.path, along_m);
+            let end = photographs.certainly_taken_count(&plan.path, along_m);
             let pictures = WaypointRange { first: self.pictures_before_rejoin, end };
             self.photographed.note_pictures(photographs, &plan.path, pictures);
         }
@@ -386,7 +386,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.left_with_all_pictures.unwrap_or_else(|| {
             match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
                 Some((Task::Photograph(photographs), path)) => {
-                    !photographs.goes_on
+                    !photographs.is_first_part
                         && photographs.taken_count(path, along_m) == photographs.count(path)
                 }
                 Some(_) => true,
@@ -438,7 +438,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         let Task::Photograph(photographs) = &plan.task else { return 0 };
         let taken = |along_m: f32| photographs.taken_count(&plan.path, along_m);
         // The picture at the place of the return is still taken.
-        self.pictures_before_rejoin = taken(back_m - TAKEN_M);
+        self.pictures_before_rejoin = taken(back_m - REJOIN_PICTURE_WINDOW_M);
         self.pictures_before_rejoin.saturating_sub(taken(left_m))
     }
 
@@ -461,7 +461,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
-        let begins = first.is_some_and(|w| (w.position - place).length() < PATH_BEGIN_M);
+        let begins = first.is_some_and(|w| (w.position - place).length() < MAX_PATH_START_ERROR_M);
         finite && (begins || !plan.task.leaves_pad())
     }
 }

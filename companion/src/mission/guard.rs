@@ -330,7 +330,7 @@ impl Guard {
             Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
-            Self::ReturnOverField => i.turn_back && i.over_field,
+            Self::ReturnOverField => i.turn_back && i.can_fly_home,
             Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.may_turn_home(),
             Self::YieldedOverField => i.yielded_for >= limit && i.may_turn_home() && !i.descends,
             Self::HinderedOverField => i.hindered_for >= limit && i.may_turn_home() && !i.descends,

@@ -82,7 +82,7 @@ pub struct GuardInputs {
     pub area: bool,
     /// Whether, in a coverage mission, a path home over the field of heights can be requested from
     /// here.
-    pub over_field: bool,
+    pub can_fly_home: bool,
     /// Whether this vehicle is on the last descent of its path, above its pad.
     pub descends: bool,
     /// Whether this vehicle stands and may fly around the obstacle on its path and back to its
@@ -213,7 +213,7 @@ const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 impl GuardInputs {
     /// Whether the vehicle can request a path home over the field, and does not seek one yet.
     pub(super) fn may_turn_home(&self) -> bool {
-        self.over_field && self.seeking_home_for.is_none()
+        self.can_fly_home && self.seeking_home_for.is_none()
     }
 
     /// Whether the column below has not been free for `limit`, or a vehicle that rests for good has

@@ -10,13 +10,13 @@
 
 use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
-use crate::link::done::{DoneReport, MAX_RANGES, RANGE_LEN, decode_range, encode_range};
+use crate::link::done::{MAX_RANGES, PhotographedReport, RANGE_LEN, decode_range, encode_range};
 use crate::storage::store::{self, MAX_PROGRAM};
 use crate::time::{Duration, Instant};
 
 /// Most ranges of waypoints known to be photographed; a waypoint that fits into none is
 /// photographed again.
-pub const MAX_DONE_RANGES: usize = 40;
+pub const MAX_PHOTOGRAPHED_RANGES: usize = 40;
 /// Number of newly photographed waypoints after which the ranges are written to flash again.
 const STORE_EVERY_WAYPOINTS: u32 = 10;
 /// Time for which a set reported by vehicles in flight, as what their plans leave out, has priority
@@ -24,7 +24,7 @@ const STORE_EVERY_WAYPOINTS: u32 = 10;
 const FLIGHT_REPORT_LIFETIME: Duration = Duration::from_secs(25);
 /// Bytes of a flash record before its ranges: mission CRC and round.
 const HEADER_LEN: usize = 5;
-const _: () = assert!(HEADER_LEN + MAX_DONE_RANGES * RANGE_LEN <= MAX_PROGRAM);
+const _: () = assert!(HEADER_LEN + MAX_PHOTOGRAPHED_RANGES * RANGE_LEN <= MAX_PROGRAM);
 
 /// The photographed waypoints of an area.
 #[derive(Clone, Debug, Default)]
@@ -32,9 +32,9 @@ pub(crate) struct PhotographedWaypoints {
     /// Number of times that the area was begun again from its first waypoint.
     round: u8,
     /// Waypoints that this vehicle's plan leaves out, or its next plan will.
-    left_out_by_plan: WaypointSet<MAX_DONE_RANGES>,
+    left_out_by_plan: WaypointSet<MAX_PHOTOGRAPHED_RANGES>,
     /// Waypoints of this round that are known to be photographed.
-    known: WaypointSet<MAX_DONE_RANGES>,
+    known: WaypointSet<MAX_PHOTOGRAPHED_RANGES>,
     /// Number of known waypoints in the last flash record.
     stored_count: u32,
     /// Whether `left_out_by_plan` has changed since the plan was requested.
@@ -71,7 +71,7 @@ impl PhotographedWaypoints {
         &mut self,
         mission_crc: u32,
         at_once: bool,
-    ) -> Option<store::Photographed> {
+    ) -> Option<store::PhotographedRecord> {
         let count = self.known.count();
         let least =
             if at_once { self.stored_count + 1 } else { self.stored_count + STORE_EVERY_WAYPOINTS };
@@ -80,7 +80,7 @@ impl PhotographedWaypoints {
             return None;
         }
         self.stored_count = count;
-        let mut kept = store::Photographed::new();
+        let mut kept = store::PhotographedRecord::new();
         // Both fit: mission CRC, round and the most ranges are no longer than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
@@ -94,7 +94,7 @@ impl PhotographedWaypoints {
     /// Prepares the request for a plan. With `resumes` the plan leaves out the known waypoints, or,
     /// if the vehicle has not flown since its last request, those agreed on the ground. Without it
     /// a new round begins, and the plan leaves out none.
-    pub(crate) fn begin_plan(&mut self, resumes: bool) {
+    pub(crate) fn prepare_plan_request(&mut self, resumes: bool) {
         if !resumes {
             self.begin_round();
             self.left_out_by_plan.clear();
@@ -125,7 +125,8 @@ impl PhotographedWaypoints {
     /// round.
     pub(crate) fn leave_pad(&mut self, photographs: &PicturePlan) {
         self.has_flown = true;
-        let whole = photographs.area() > 0 && self.left_out_by_plan.count() >= photographs.area();
+        let whole = photographs.area_waypoint_count() > 0
+            && self.left_out_by_plan.count() >= photographs.area_waypoint_count();
         if whole && self.round == self.planned_round {
             self.begin_round();
         }
@@ -145,12 +146,14 @@ impl PhotographedWaypoints {
         pictures: WaypointRange,
     ) {
         // A waypoint for which no range is left is photographed again.
-        photographs.shown_waypoints(path, pictures).for_each(|range| _ = self.known.insert(range));
+        photographs
+            .waypoints_of_pictures(path, pictures)
+            .for_each(|range| _ = self.known.insert(range));
     }
 
     /// Handles another vehicle's report of photographed waypoints. `waits`: this vehicle stands on
     /// the ground and must plan as others do.
-    pub(crate) fn handle_report(&mut self, report: &DoneReport, waits: bool, now: Instant) {
+    pub(crate) fn handle_report(&mut self, report: &PhotographedReport, waits: bool, now: Instant) {
         if report.is_left_out_by_plan {
             if waits {
                 self.adopt_plan_of(report, now);
@@ -180,7 +183,7 @@ impl PhotographedWaypoints {
     }
 
     /// Leaves out of the next plan what the plan of a vehicle leaves out that has already started.
-    fn adopt_plan_of(&mut self, report: &DoneReport, now: Instant) {
+    fn adopt_plan_of(&mut self, report: &PhotographedReport, now: Instant) {
         self.followed_at = Some(now);
         if self.left_out_by_plan.ranges() != &report.ranges[..] {
             self.left_out_by_plan.clear();
@@ -192,24 +195,24 @@ impl PhotographedWaypoints {
     /// This vehicle's next report: 19 ranges (`MAX_RANGES`) of the known waypoints in turn. In
     /// flight every other report has the waypoints that the plan leaves out, if one report holds
     /// them.
-    pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
+    pub(crate) fn next_report(&mut self, waits: bool, flies: bool) -> PhotographedReport {
         let plan =
             flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
         self.reports_plan = plan;
         if plan {
             let ranges = self.left_out_by_plan.ranges().iter().copied().collect();
-            return DoneReport {
+            return PhotographedReport {
                 round: self.round,
                 flies,
                 is_left_out_by_plan: plan,
                 ranges,
-                ..DoneReport::default()
+                ..PhotographedReport::default()
             };
         }
         let done = if waits { &self.left_out_by_plan } else { &self.known };
         let first = if self.next_range < done.ranges().len() { self.next_range } else { 0 };
         self.next_range = first + MAX_RANGES;
         let ranges = done.ranges().iter().skip(first).take(MAX_RANGES).copied().collect();
-        DoneReport { round: self.round, flies, ranges, ..DoneReport::default() }
+        PhotographedReport { round: self.round, flies, ranges, ..PhotographedReport::default() }
     }
 }

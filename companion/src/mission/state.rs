@@ -138,11 +138,11 @@ impl State {
     /// lasts, unheard too, or is about to take off.
     pub(crate) fn flies_on_lease(self) -> bool {
         use State::*;
-        self.holds_place() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
+        self.is_on_path() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
     }
 
     /// Whether a vehicle that stands in this state stays there until its own mission moves it on.
-    pub(crate) fn holds_place(self) -> bool {
+    pub(crate) fn is_on_path(self) -> bool {
         use State::*;
         matches!(self, Follow | Paused | Alone | Blocked | Replanning | Dividing)
     }

@@ -51,7 +51,7 @@ pub(crate) const fn warning_row(
 }
 
 /// Row that resumes the interrupted state.
-pub(crate) const fn return_row(
+pub(crate) const fn resume_row(
     from: &'static [State],
     guard: Guard,
     limit: Duration,
@@ -111,18 +111,19 @@ pub(crate) const FLYING: &[State] = &[
     PositionLost,
 ];
 /// States of [`FLYING`] in which the autopilot is heard and its position is known.
-pub(crate) const FLYING_SOUND: &[State] =
+pub(crate) const FLYING_WITH_POSITION: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping, LandingHeld];
-/// States of [`FLYING_SOUND`] on the path, moving or standing: the vehicle can brake along its
-/// path.
-pub(crate) const SOUND_ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning, Dividing];
+/// States of [`FLYING_WITH_POSITION`] on the path, moving or standing: the vehicle can brake along
+/// its path.
+pub(crate) const ON_PATH_WITH_POSITION: &[State] =
+    &[Follow, Paused, Alone, Blocked, Replanning, Dividing];
 
-/// States of [`FLYING_SOUND`] in which no landing has begun.
-pub(crate) const SOUND_BEFORE_LANDING: &[State] =
+/// States of [`FLYING_WITH_POSITION`] in which no landing has begun.
+pub(crate) const FLYING_BEFORE_LANDING: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping];
 
 /// States of [`FLYING`] in which the autopilot was heard last.
-pub(crate) const IN_AIR_LINKED: &[State] = &[
+pub(crate) const FLYING_LINKED: &[State] = &[
     TakeOff,
     Climb,
     Follow,
@@ -155,7 +156,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Streaming, Engaging], G::NoHeartbeat,  secs(3),    Aborted,     A::ForgetStart,       "Autopilot silent: start cancelled"),
     warning_row(&[Arming],           G::NoHeartbeat,     secs(3),    CancelStart, A::CancelStart,       "Autopilot silent: start cancelled"),
     warning_row(&[CancelStart],      G::NoHeartbeat,     secs(60),   Aborted,     A::ForgetStart,       "Autopilot lost"),
-    warning_row(IN_AIR_LINKED,       G::NoHeartbeat,     secs(3),    AutopilotSilent, A::BrakeOnPath,   "Autopilot silent: stopping"),
+    warning_row(FLYING_LINKED,       G::NoHeartbeat,     secs(3),    AutopilotSilent, A::BrakeOnPath,   "Autopilot silent: stopping"),
     warning_row(&[Disarm, PilotControl, Failsafe], G::NoHeartbeat, secs(60), Aborted, A::ForgetStart,   "Autopilot lost"),
     warning_row(&[Land],             G::NoHeartbeat,     secs(120),  Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[PilotReturned],    G::NoHeartbeat,     secs(60),   Land,        A::RequestLandMode,   "Autopilot still silent: landing"),
@@ -171,28 +172,28 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Arming],           G::AwayFromStart,   AT_ONCE,    CancelStart, A::CancelStart,       "Not at its start: start cancelled"),
     warning_row(&[Arming],           G::ChargeLow,       AT_ONCE,    CancelStart, A::CancelStart,       "Battery low: start cancelled"),
     warning_row(&[Arming],           G::Outside,         AT_ONCE,    CancelStart, A::CancelStart,       "Outside the geofence: start cancelled"),
-    warning_row(IN_AIR_LINKED,       G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
+    warning_row(FLYING_LINKED,       G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
     warning_row(&[PilotReturned],    G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
-    warning_row(FLYING_SOUND,        G::PositionJumped,  AT_ONCE,    PositionLost, A::BrakeOnPath,      "Position jumped: stopping"),
-    warning_row(FLYING_SOUND,        G::NoPosition,      secs(1),    PositionLost, A::BrakeOnPath,      "Position lost: stopping"),
+    warning_row(FLYING_WITH_POSITION,        G::PositionJumped,  AT_ONCE,    PositionLost, A::BrakeOnPath,      "Position jumped: stopping"),
+    warning_row(FLYING_WITH_POSITION,        G::NoPosition,      secs(1),    PositionLost, A::BrakeOnPath,      "Position lost: stopping"),
     // Operator's commands and limits in flight.
-    info_row(SOUND_ON_PATH,          G::LandCommanded,   AT_ONCE,    Stopping,    A::BrakeOnPath,       "Landing as commanded"),
+    info_row(ON_PATH_WITH_POSITION,          G::LandCommanded,   AT_ONCE,    Stopping,    A::BrakeOnPath,       "Landing as commanded"),
     info_row(&[TakeOff, Climb, PositionLost, AutopilotSilent, PilotReturned], G::LandCommanded, AT_ONCE, Land, A::RequestLandMode, "Landing as commanded"),
     info_row(&[Failsafe, Aborted],   G::LandUnattended,  AT_ONCE,    Land,        A::RequestLandMode,   "Landing as commanded"),
-    warning_row(SOUND_ON_PATH,       G::BatteryCritical, AT_ONCE,    Stopping,    A::BrakeOnPath,       "Battery critical: landing"),
-    warning_row(SOUND_ON_PATH,       G::BatteryLow,      AT_ONCE,    Stopping,    A::BrakeOnPath,       "Battery low: landing"),
+    warning_row(ON_PATH_WITH_POSITION,       G::BatteryCritical, AT_ONCE,    Stopping,    A::BrakeOnPath,       "Battery critical: landing"),
+    warning_row(ON_PATH_WITH_POSITION,       G::BatteryLow,      AT_ONCE,    Stopping,    A::BrakeOnPath,       "Battery low: landing"),
     warning_row(&[TakeOff, Climb, PilotReturned], G::BatteryCritical, AT_ONCE, Land, A::RequestLandMode, "Battery critical: landing"),
     warning_row(&[TakeOff, Climb, PilotReturned], G::BatteryLow, AT_ONCE, Land,   A::RequestLandMode,   "Battery low: landing"),
-    warning_row(SOUND_BEFORE_LANDING, G::EstimateVague,  secs(30),   Land,        A::RequestLandMode,   "Estimate worse than margin for 30 s: landing"),
-    warning_row(SOUND_BEFORE_LANDING, G::OutsideGeofence, AT_ONCE,   Land,        A::RequestLandMode,   "Geofence reached: landing"),
+    warning_row(FLYING_BEFORE_LANDING, G::EstimateVague,  secs(30),   Land,        A::RequestLandMode,   "Estimate worse than margin for 30 s: landing"),
+    warning_row(FLYING_BEFORE_LANDING, G::OutsideGeofence, AT_ONCE,   Land,        A::RequestLandMode,   "Geofence reached: landing"),
     // This vehicle's share was divided among the others while they did not hear it.
     warning_row(&[TakeOff, Climb, PilotReturned], G::Excluded, AT_ONCE, Land,     A::RequestLandMode,   "Its part was given away: landing"),
-    warning_row(SOUND_ON_PATH,       G::Excluded,        AT_ONCE,    Stopping,    A::BrakeOnPath,       "Its part was given away: landing"),
+    warning_row(ON_PATH_WITH_POSITION,       G::Excluded,        AT_ONCE,    Stopping,    A::BrakeOnPath,       "Its part was given away: landing"),
     info_row(&[Stopping],            G::Standing,        AT_ONCE,    Land,        A::RequestLandMode,   ""),
     info_row(&[Stopping],            G::Elapsed,         secs(5),    Land,        A::RequestLandMode,   ""),
     info_row(&[Paused],              G::ReturnInClimb,   AT_ONCE,    Land,        A::RequestLandMode,   "Landing on the pad"),
-    info_row(SOUND_ON_PATH,          G::ReturnOverField, AT_ONCE,    Blocked,     A::TurnHome,          "Planning the way home"),
-    info_row(SOUND_ON_PATH,          G::ReturnCommanded, AT_ONCE,    Follow,      A::TurnBack,          "Flying back to the start"),
+    info_row(ON_PATH_WITH_POSITION,          G::ReturnOverField, AT_ONCE,    Blocked,     A::TurnHome,          "Planning the way home"),
+    info_row(ON_PATH_WITH_POSITION,          G::ReturnCommanded, AT_ONCE,    Follow,      A::TurnBack,          "Flying back to the start"),
     info_row(&[TakeOff, Climb],      G::ReturnCommanded, AT_ONCE,    Land,        A::RequestLandMode,   "Landing on the pad"),
     // The flight in its order.
     info_row(&[WaitAutopilot],       G::AutopilotHeard,  AT_ONCE,    WaitPosition, A::Connect,          "Autopilot found"),
@@ -278,7 +279,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Replanning],       G::NoPlaceAside,    secs(5),    LandingHeld, A::HoldOver,          "No place aside either: landing waits"),
     warning_row(&[Replanning],       G::DetourFailed,    AT_ONCE,    Blocked,     A::None,              "No way around yet"),
     warning_row(&[Replanning],       G::Elapsed,         secs(5),    Blocked,     A::NoteDetourFailure, "The way around is late"),
-    return_row(&[Paused],            G::ResumeCommanded, AT_ONCE,    A::Rejoin,                         "Resumed"),
+    resume_row(&[Paused],            G::ResumeCommanded, AT_ONCE,    A::Rejoin,                         "Resumed"),
     warning_row(&[Paused],           G::Elapsed,         secs(600),  Land,        A::RequestLandMode,   "Paused for 10 min: landing"),
     info_row(&[Alone],               G::NeighbourHeard,  AT_ONCE,    Follow,      A::FollowPath,        "Neighbours heard again"),
     info_row(&[Alone],               G::WayFree,         AT_ONCE,    Follow,      A::FollowPath,        "Gates open: flying on unheard"),
@@ -286,7 +287,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Alone],            G::Elapsed,         secs(20),   Land,        A::RequestLandMode,   "Neighbours still silent: landing"),
     info_row(&[AutopilotSilent],     G::AutopilotHeard,  AT_ONCE,    PositionLost, A::BrakeOnPath,      "Autopilot heard again"),
     warning_row(&[AutopilotSilent],  G::Elapsed,         secs(60),   Land,        A::RequestLandMode,   "Autopilot still silent: landing"),
-    return_row(&[PositionLost],      G::BackOnPath,      AT_ONCE,    A::Rejoin,                         "Position known again"),
+    resume_row(&[PositionLost],      G::BackOnPath,      AT_ONCE,    A::Rejoin,                         "Position known again"),
     warning_row(&[PositionLost],     G::BackOffPath,     AT_ONCE,    Land,        A::RequestLandMode,   "Position is elsewhere: landing"),
     warning_row(&[PositionLost],     G::Elapsed,         secs(3),    Land,        A::RequestLandMode,   "Position still lost: landing"),
     info_row(&[Land, Disarm],        G::DisarmedAtGoal,  AT_ONCE,    Done,        A::ForgetStart,       "Landed"),
@@ -307,7 +308,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[PilotControl, PilotReturned], G::FailsafeActs, AT_ONCE, Failsafe, A::None,            "Autopilot failsafe: setpoints stopped"),
     info_row(&[PilotControl],        G::Offboard,        AT_ONCE,    PilotReturned, A::HoldHere,        "Pilot gives back: holds, waits for resume"),
     warning_row(&[PilotReturned],    G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: mission stopped"),
-    return_row(&[PilotReturned],     G::ResumedOnPath,   AT_ONCE,    A::Rejoin,                         "Resumed after the pilot"),
+    resume_row(&[PilotReturned],     G::ResumedOnPath,   AT_ONCE,    A::Rejoin,                         "Resumed after the pilot"),
     warning_row(&[PilotReturned],    G::ResumedOffPath,  AT_ONCE,    Land,        A::RequestLandMode,   "Too far from the path: landing"),
     warning_row(&[PilotControl],     G::Elapsed,         secs(900),  PilotControl, A::None,             "Pilot still has control"),
     warning_row(&[PilotReturned],    G::Elapsed,         secs(900),  PilotReturned, A::None,            "Still waits for resume"),

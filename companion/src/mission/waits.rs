@@ -10,7 +10,7 @@ use crate::time::{Duration, Instant};
 const REPORT_WAIT_AFTER: Duration = Duration::from_secs(30);
 
 /// Time without an obstacle after which the start counts as no longer barred.
-const FREE_AFTER: Duration = Duration::from_secs(5);
+const UNBARRED_AFTER: Duration = Duration::from_secs(5);
 
 /// The waits of a mission.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,7 +45,7 @@ impl WaitReport {
 }
 
 /// Since when the start of this vehicle has been barred, and when it last was. Gaps of up to 5 s
-/// (`FREE_AFTER`) do not interrupt it.
+/// (`UNBARRED_AFTER`) do not interrupt it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BarredStart {
     since: Option<Instant>,
@@ -58,7 +58,7 @@ impl BarredStart {
         if barred {
             self.since.get_or_insert(now);
             self.barred_at = now;
-        } else if now - self.barred_at > FREE_AFTER {
+        } else if now - self.barred_at > UNBARRED_AFTER {
             self.since = None;
         }
     }

@@ -36,7 +36,7 @@ const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     vertices: Vec<Flat, X>,
     rings: Vec<Ring, MAX_RINGS>,
-    strips: tracks::Workspace<X>,
+    strips: tracks::LaneWorkspace<X>,
     tracks: Tracks<L>,
     pack: PackWorkspace<K>,
     routes: Plan<K>,
@@ -49,7 +49,7 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
         Self {
             vertices: Vec::new(),
             rings: Vec::new(),
-            strips: tracks::Workspace::new(),
+            strips: tracks::LaneWorkspace::new(),
             tracks: Tracks::new(),
             pack: PackWorkspace::new(),
             routes: Plan::new(),
@@ -261,7 +261,7 @@ pub fn plan_flights<
         margin_m: header.margin_m,
         search_steps: header.search_steps,
     };
-    tracks::build(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
+    tracks::build_lanes(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
     if ws.tracks.waypoint_count() > PicturePlan::MAX_AREA_WAYPOINTS {
         return Err(CoverageError::LanesFull.into());
     }

@@ -35,7 +35,7 @@ use crate::storage::store::{ErasePermission, File, ReadOutcome, Store, UploadErr
 use crate::time::{Duration, Instant};
 
 /// Message id of FILE_TRANSFER_PROTOCOL.
-pub const MESSAGE: u32 = 110;
+pub const MESSAGE_ID: u32 = 110;
 /// Bytes of its payload: target network, system, component, then the FTP packet.
 pub const PAYLOAD_LEN: usize = 254;
 
@@ -391,7 +391,7 @@ impl Ftp {
             return self.nak(request, why.into());
         }
         match store.take_piece(request.offset, request.bytes()) {
-            PieceOutcome::Yes => {
+            PieceOutcome::Stored => {
                 self.session = self.session.map(|session| Session { fresh: false, ..session });
                 self.ack(request, &[]);
             }

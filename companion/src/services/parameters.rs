@@ -126,7 +126,7 @@ impl Parameters {
         config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
         config.estimate_m = self.values[EST_M];
         config.radio_range_m = self.values[RADIO_M];
-        config.resumes = self.values[RESUME] != 0.0;
+        config.skips_photographed = self.values[RESUME] != 0.0;
         config.start_tolerance_m = self.values[START_TOL];
         config.swarm_hz = self.values[SWARM_HZ] as u8;
     }

@@ -12,7 +12,7 @@ use crate::mission::State;
 use crate::services::parameters::TABLE;
 use crate::storage::store::MAX_READ;
 use crate::testing::fake_autopilot::*;
-use crate::testing::fake_flash::{Flash, obey, started};
+use crate::testing::fake_flash::{Flash, execute, started};
 
 struct Ground {
     bench: Bench,
@@ -44,8 +44,9 @@ impl Ground {
         loop {
             let mut idle = true;
             while let Some(request) = self.bench.companion.poll_flash() {
-                let outcome = obey(&mut self.flash, request, ErasePermission::Allowed, &mut read)
-                    .expect("no power cut");
+                let outcome =
+                    execute(&mut self.flash, request, ErasePermission::Allowed, &mut read)
+                        .expect("no power cut");
                 self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
             }
             loop {
@@ -226,7 +227,7 @@ fn a_flood_of_each_question_is_answered_at_its_rate() {
         [(Link::Swarm, 9, 60), (Link::Autopilot, SYSTEM, 60), (Link::Autopilot, 9, 60)]
     {
         let mut bench = Bench::new(config());
-        bench.until(State::Ready, 6.0);
+        bench.run_until(State::Ready, 6.0);
         let (mut counts, mut framer) = ([0u32; 3], Framer::new());
         let mut out = [0; frame::MAX_FRAME_LEN];
         for i in 0..seconds * 20u32 {
@@ -292,14 +293,14 @@ fn a_parameter_counts_at_once_on_the_ground_and_after_the_flight_in_the_air() {
         (config.cruise_mps, config.climb_mps, config.accel_mps2)
     };
     let mut ground = Ground::new();
-    ground.bench.until(State::Ready, 6.0);
+    ground.bench.run_until(State::Ready, 6.0);
     let mission = speeds(&ground);
     ground.ask(Link::Autopilot, &set(0.5, "FLK_SPEED_MAX"));
     ground.ask(Link::Autopilot, &set(0.8, "FLK_ACCEL"));
     ground.bench.run(0.5);
     assert_eq!(speeds(&ground), (0.5, mission.1, 0.8));
     ground.bench.start();
-    ground.bench.until(State::Follow, 20.0);
+    ground.bench.run_until(State::Follow, 20.0);
     ground.ask(Link::Autopilot, &set(1.0, "FLK_SPEED_MAX"));
     let begun = ground.bench.setpoints.len();
     ground.bench.run(4.0);
@@ -309,7 +310,7 @@ fn a_parameter_counts_at_once_on_the_ground_and_after_the_flight_in_the_air() {
         .fold(0.0, f32::max);
     assert!((0.4..0.55).contains(&fastest), "not while it flies: {fastest}");
     assert_eq!(speeds(&ground).0, 0.5);
-    ground.bench.until(State::Done, 90.0);
+    ground.bench.run_until(State::Done, 90.0);
     ground.bench.run(0.5);
     assert_eq!(speeds(&ground).0, 1.0);
     ground.ask(Link::Autopilot, &set(20.0, "FLK_SPEED_MAX"));

@@ -15,7 +15,7 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::file::{CRC32, FileError};
 use planner_core::frames::Geodetic;
-use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
+use planner_core::plan::{GoalMode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::ScheduleConfig;
 
@@ -144,9 +144,9 @@ fn write_header(
     out[12..16].copy_from_slice(&(needed as u32).to_le_bytes());
     out[16..20].copy_from_slice(&header.roadmap_crc.to_le_bytes());
     out[20] = match header.mode {
-        Mode::Labelled => 0,
-        Mode::Unlabelled(Objective::TotalDistance) => 1,
-        Mode::Unlabelled(Objective::Makespan) => 2,
+        GoalMode::Labelled => 0,
+        GoalMode::Unlabelled(Objective::TotalDistance) => 1,
+        GoalMode::Unlabelled(Objective::Makespan) => 2,
     };
     out[21] = match header.method {
         Method::Off => 0,
@@ -230,9 +230,9 @@ impl<'a> MissionView<'a> {
         let header = MissionHeader {
             roadmap_crc: u32_at(16),
             mode: match head[20] {
-                0 => Mode::Labelled,
-                1 => Mode::Unlabelled(Objective::TotalDistance),
-                2 => Mode::Unlabelled(Objective::Makespan),
+                0 => GoalMode::Labelled,
+                1 => GoalMode::Unlabelled(Objective::TotalDistance),
+                2 => GoalMode::Unlabelled(Objective::Makespan),
                 _ => return Err(FileError::Header("mode").into()),
             },
             method: match head[21] {
@@ -278,7 +278,7 @@ impl<'a> MissionView<'a> {
     }
 
     fn check_lists(&self) -> Result<(), MissionError> {
-        let labelled = self.header.mode == Mode::Labelled;
+        let labelled = self.header.mode == GoalMode::Labelled;
         let inside = |place: &Point| {
             self.header.geofence.as_ref().is_none_or(|fence| box_contains(fence, place))
         };
@@ -426,7 +426,7 @@ impl<'a> MissionView<'a> {
             && let Some(share) = view.shares().nth(index)
         {
             (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
-            config.division = Some(view.time_to_ground_s());
+            config.lost_vehicle_down_s = Some(view.time_to_ground_s());
             config.ground = view.header().ground;
         }
         config.radius_m = own.radius_m;

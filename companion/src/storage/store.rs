@@ -42,7 +42,7 @@ use self::window::UploadReassembly;
 use crate::services::parameters::Parameters;
 
 /// Record of the photographed waypoints of an area, as [`crate::mission::photographed`] writes it.
-pub(crate) type Photographed = heapless::Vec<u8, MAX_PROGRAM>;
+pub(crate) type PhotographedRecord = heapless::Vec<u8, MAX_PROGRAM>;
 
 /// State of the flash store.
 #[derive(Clone, Debug)]
@@ -53,9 +53,9 @@ pub struct Store {
     journal: Journal,
     parameters: Parameters,
     /// Slots sealed with this sequence number or a lower one hold a removed file.
-    forgotten: u32,
+    removed_up_to: u32,
     unsaved: bool,
-    photographed: Photographed,
+    photographed: PhotographedRecord,
     unsaved_photographed: bool,
     reassembly: UploadReassembly,
     upload: Option<(File, UploadState)>,
@@ -80,9 +80,9 @@ impl Store {
             in_use: None,
             journal: Journal::default(),
             parameters: Parameters::default(),
-            forgotten: 0,
+            removed_up_to: 0,
             unsaved: false,
-            photographed: Photographed::new(),
+            photographed: PhotographedRecord::new(),
             unsaved_photographed: false,
             reassembly: UploadReassembly::default(),
             upload: None,
@@ -154,7 +154,7 @@ impl Store {
     }
 
     /// Sets the record of photographed waypoints; it is written to flash by a later request.
-    pub(crate) fn store_photographed(&mut self, photographed: Photographed) {
+    pub(crate) fn store_photographed(&mut self, photographed: PhotographedRecord) {
         self.photographed = photographed;
         self.unsaved_photographed = true;
     }
@@ -170,7 +170,7 @@ impl Store {
         match file {
             File::Roadmap | File::Field => {
                 if let Some((_, Seal { sequence, .. })) = self.newest_of(file) {
-                    self.forgotten = sequence;
+                    self.removed_up_to = sequence;
                     self.unsaved = true;
                 }
             }
@@ -214,7 +214,7 @@ impl Store {
     /// The slot with the newest complete roadmap or field that was not removed.
     fn newest_slot(&self) -> Option<usize> {
         let number = |i: &usize| self.slots[*i].seal().map(|seal| seal.sequence);
-        (0..2).filter(|i| number(i).is_some_and(|n| n > self.forgotten)).max_by_key(number)
+        (0..2).filter(|i| number(i).is_some_and(|n| n > self.removed_up_to)).max_by_key(number)
     }
 
     /// The newest slot and its seal, if it holds `file`; of roadmap and field only the newer one

@@ -34,9 +34,9 @@ use planner_core::detour;
 use planner_core::frames::Geodetic;
 use planner_core::{Length, Point};
 
-use self::beside::{DETOUR_MARGIN_M, FieldSearches, LOOK_AHEAD_M};
+use self::beside::{AreaDetourSearches, DETOUR_MARGIN_M, LOOK_AHEAD_M};
 use self::flown::{DetourPurpose, FlownPath};
-use self::homeward::HomewardFlight;
+use self::homeward::HomewardSearch;
 use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
 use crate::swarm::neighbours::MAX_HOVER_MPS;
@@ -58,7 +58,7 @@ const ALL_STAND_S: u64 = 3;
 /// Time for which a vehicle claims the turn to fly a detour before it takes the turn.
 const TURN_CLAIM: Duration = Duration::from_secs(1);
 /// Time by which each blocked vehicle with a lower system id delays this one's claim, seconds.
-const TURN_S: u64 = 2;
+const TURN_DELAY_S: u64 = 2;
 /// Further delay of the next claim after each search that found no detour, seconds.
 const DETOUR_RETRY_S: u64 = 10;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
@@ -104,9 +104,9 @@ pub(crate) struct Detours {
     sought: Option<DetourPurpose>,
     request_read: bool,
     /// Search and flight straight home over an area.
-    pub(crate) home: HomewardFlight,
+    pub(crate) home: HomewardSearch,
     /// Searches for a detour over an area that leads back to the plan's path.
-    field_searches: FieldSearches,
+    area_searches: AreaDetourSearches,
     /// Progress along the plan's path at which the vehicle left it for a detour, metres.
     left_at_m: f32,
     /// Whether the requested detour has come and is not flown yet.
@@ -127,7 +127,7 @@ pub(crate) struct Detours {
     no_way_aside_at: Option<Instant>,
     /// Place of the vehicle before its position jumped, and when; `None` without a jump.
     before_jump: Option<(Point, Instant)>,
-    quiet_since: Option<Instant>,
+    all_standing_since: Option<Instant>,
     /// Since when this vehicle claims the turn to fly a detour.
     claimed_since: Option<Instant>,
     /// When a scan was last due, and when the one under way began.
@@ -212,11 +212,11 @@ impl Detours {
 
     /// Whether the vehicle, in the air over an area, is on its plan's path, or beside it on a
     /// detour that leads back to it.
-    pub(crate) fn keeps_to_plan_over_field<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn keeps_to_plan_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        view.config.division.is_some()
+        view.config.lost_vehicle_down_s.is_some()
             && (!self.is_on_detour() || self.is_beside_plan())
             && !self.left_plan
             && !self.is_homeward()
@@ -226,29 +226,31 @@ impl Detours {
     }
 
     /// Whether a stopped vehicle over an area may now seek a detour that leads back to its path.
-    pub(crate) fn may_detour_over_field<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn may_detour_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
         // Beside its path the vehicle seeks another way back, whatever stopped it.
-        (self.obstructed || self.is_beside_plan() || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
-            && self.keeps_to_plan_over_field(view)
-            && self.field_searches.may_seek(view.now)
+        (self.obstructed
+            || self.is_beside_plan()
+            || self.is_stopped_for_long(view, BLOCKED_HINDERED_WITHIN))
+            && self.keeps_to_plan_over_area(view)
+            && self.area_searches.may_seek(view.now)
     }
 
     /// Ends a detour over an area: with the own plan, if that `came`, else without a return to it.
-    pub(crate) fn end_field_detour(&mut self, came: bool) {
+    pub(crate) fn end_area_detour(&mut self, came: bool) {
         if came {
-            let field_searches = self.field_searches;
+            let field_searches = self.area_searches;
             self.forget_plan();
-            (self.flown, self.field_searches) = (FlownPath::PlanReturned, field_searches);
+            (self.flown, self.area_searches) = (FlownPath::PlanReturned, field_searches);
         } else {
             self.give_up_plan();
         }
     }
 
     /// Whether the requested detour has come and is not flown yet.
-    pub(crate) fn is_ready(&self) -> bool {
+    pub(crate) fn is_detour_ready(&self) -> bool {
         self.detour_ready
     }
 
@@ -324,7 +326,7 @@ impl Detours {
         let stopped = matches!(view.mission.state(), State::Blocked | State::Replanning);
         if !on_ground && !stopped && view.mission.state() != State::Follow {
             (self.blocked, self.obstructed) = (false, false);
-            (self.quiet_since, self.claimed_since, self.blocked_here) = (None, None, None);
+            (self.all_standing_since, self.claimed_since, self.blocked_here) = (None, None, None);
             self.scan.restart();
             self.scan_began = None;
             return None;
@@ -377,13 +379,13 @@ impl Detours {
             FlownPath::Astray => true,
         };
         let dead_end = self.is_stopped_by_others(view)
-            && self.quiet_since.is_some_and(|at| now - at > DEAD_END_AFTER);
+            && self.all_standing_since.is_some_and(|at| now - at > DEAD_END_AFTER);
         let free = if view.mission.state() == State::Blocked {
             BLOCKED_HINDERED_WITHIN
         } else {
             HINDERED_WITHIN
         };
-        let stopped = self.is_stopped(view, free);
+        let stopped = self.is_stopped_for_long(view, free);
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.obstructed);
         let along_m = view.guidance.along_m();
@@ -394,9 +396,9 @@ impl Detours {
         }
         if !view.neighbours.are_all_standing(now) {
             // Another vehicle moved, which may have freed the path.
-            (self.quiet_since, self.failures, self.no_retry) = (None, 0, false);
-        } else if self.quiet_since.is_none() {
-            self.quiet_since = Some(now);
+            (self.all_standing_since, self.failures, self.no_retry) = (None, 0, false);
+        } else if self.all_standing_since.is_none() {
+            self.all_standing_since = Some(now);
         }
         let claims = self.may_claim_turn(view)
             && !view.neighbours.is_turn_claimed_before(view.config.system_id, now);
@@ -405,14 +407,14 @@ impl Detours {
 
     /// Whether the filter has kept the vehicle from continuing for 20 s although it goes first;
     /// over an area also because of a neighbour off the plan.
-    fn is_stopped<const V: usize, const W: usize, const G: usize>(
+    fn is_stopped_for_long<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
         free: Duration,
     ) -> bool {
         let (now, filter) = (view.now, &view.guidance.filter);
-        let for_good =
-            view.config.division.is_some() && !view.neighbours.follows_plan(filter.last_blocker());
+        let for_good = view.config.lost_vehicle_down_s.is_some()
+            && !view.neighbours.follows_plan(filter.last_blocker());
         filter.blocked_for(now, free) > STUCK_AFTER
             || (for_good && filter.hindered_for(now) > STUCK_AFTER)
     }
@@ -429,7 +431,7 @@ impl Detours {
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
         // A vehicle that hovers sways. What blocked the path over an area blocks it until it is as
         // far away as a detour keeps.
-        let waits = view.config.division.is_some()
+        let waits = view.config.lost_vehicle_down_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
         let beside_m = if waits { DETOUR_MARGIN_M } else { BLOCKED_WITHIN_M };
@@ -447,7 +449,7 @@ impl Detours {
             // Over an area the vehicle photographs on, and stops and flies around an obstacle when
             // it comes near.
             |obstacle| {
-                let until_m = match view.config.division {
+                let until_m = match view.config.lost_vehicle_down_s {
                     Some(_) => along_m.max(0.0) + LOOK_AHEAD_M,
                     None => f32::INFINITY,
                 };
@@ -470,13 +472,15 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
         let wait_s = ALL_STAND_S
-            + TURN_S * view.neighbours.blocked_count_before(view.config.system_id)
+            + TURN_DELAY_S * view.neighbours.blocked_count_before(view.config.system_id)
             + DETOUR_RETRY_S * u64::from(self.failures);
         // Over an area there are no turns.
         self.blocked
-            && view.config.division.is_none()
+            && view.config.lost_vehicle_down_s.is_none()
             && view.neighbours.are_all_standing(view.now)
-            && self.quiet_since.is_some_and(|at| view.now - at >= Duration::from_secs(wait_s))
+            && self
+                .all_standing_since
+                .is_some_and(|at| view.now - at >= Duration::from_secs(wait_s))
     }
 
     /// Whether this vehicle may begin its detour: it has claimed the turn, and all others wait.

@@ -248,14 +248,14 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// The inputs of every binding division, and of the one under way where that is to be computed.
-    pub fn losses(&self) -> impl Iterator<Item = &[DivisionInput]> {
+    pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[DivisionInput]> {
         let under_way = self.needs_division().then_some(&self.division_inputs);
         self.divisions.iter().chain(under_way).map(|lots| &lots[..])
     }
 
     /// Sets the hash of the division under way from the CRC of the computed plan and from the
     /// inputs: the same plan may follow from inputs with another lost vehicle.
-    pub fn take_plan_crc(&mut self, plan_crc: u32) {
+    pub fn set_hash_from_plan(&mut self, plan_crc: u32) {
         if self.needs_division() {
             let mut digest = CRC32.digest();
             digest.update(&plan_crc.to_le_bytes());
@@ -437,7 +437,7 @@ impl<const V: usize> Fleet<V> {
     /// Hash of the inputs of all binding divisions, and of the one that is to be computed.
     pub fn division_hash(&self) -> u32 {
         let mut digest = CRC32.digest();
-        for lot in self.losses().flatten() {
+        for lot in self.inputs_of_divisions().flatten() {
             let [low, high] = lot.along_dm.to_le_bytes();
             digest.update(&[u8::from(lot.alive), low, high]);
         }

@@ -41,9 +41,9 @@ use crate::time::{Duration, Instant};
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
     contacts: Vec<NeighbourEntry, V>,
-    heard: Vec<Neighbour, V>,
+    states: Vec<Neighbour, V>,
     /// Number of roster vehicles in `contacts`, sorted by id; behind them are the strangers.
-    roster: usize,
+    roster_count: usize,
     dropped: u16,
     /// When the last scan began that found no vehicle out of the plan on the path.
     clear_at: Instant,
@@ -64,7 +64,7 @@ pub struct Neighbours<const V: usize> {
     /// Heights of the ground of an area that is not level.
     ground: Option<Ground>,
     /// Silence after which a vehicle is on the ground.
-    down: Duration,
+    down_after: Duration,
     /// Distance by which two vehicles in the air over an area may be nearer than their estimates
     /// say, metres; 0 in other missions.
     pair_position_error_m: f32,
@@ -80,8 +80,8 @@ impl<const V: usize> Neighbours<V> {
     pub fn new(roster: &[RosterEntry], own_id: u8, slowest_mps: f32, fastest_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
-            heard: Vec::new(),
-            roster: 0,
+            states: Vec::new(),
+            roster_count: 0,
             dropped: 0,
             clear_at: Instant::ZERO,
             fastest_mps: libm::fmaxf(fastest_mps, MAX_LANDING_MPS),
@@ -92,7 +92,7 @@ impl<const V: usize> Neighbours<V> {
             own_rank: 0,
             fleet: None,
             ground: None,
-            down: DOWN_AFTER,
+            down_after: DOWN_AFTER,
             pair_position_error_m: 0.0,
             roster_next: 0,
         };
@@ -104,7 +104,7 @@ impl<const V: usize> Neighbours<V> {
                 let _ = table.add_contact(entry.system_id, rank as u16);
             }
         }
-        table.roster = table.contacts.len();
+        table.roster_count = table.contacts.len();
         table
     }
 
@@ -126,7 +126,7 @@ impl<const V: usize> Neighbours<V> {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports(LANDED | OUT_OF_PLAN)
         };
-        self.knows_range() && self.contacts[..self.roster].iter().all(beyond)
+        self.knows_range() && self.contacts[..self.roster_count].iter().all(beyond)
     }
 
     /// Rank of this vehicle in the roster.
@@ -168,7 +168,7 @@ impl<const V: usize> Neighbours<V> {
             message_delay: MessageDelay::default(),
             intent_at: None,
             points: Vec::new(),
-            first_unheard_point: 0,
+            unheard_point_count: 0,
             place_on_points: PlaceOnPoints::Unknown,
             extent_m: 0.0,
             unheard_way_m: -1.0,
@@ -192,7 +192,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Index of a vehicle of the roster that has lately sent an intent of our mission.
-    fn roster_rank(&self, id: u8, now: Instant) -> Option<usize> {
+    fn active_roster_index(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.roster_index(id)?;
         self.contacts[at]
             .intent_at
@@ -201,17 +201,17 @@ impl<const V: usize> Neighbours<V> {
     }
 
     fn roster_index(&self, id: u8) -> Option<usize> {
-        self.contacts[..self.roster].binary_search_by_key(&id, |c| c.id).ok()
+        self.contacts[..self.roster_count].binary_search_by_key(&id, |c| c.id).ok()
     }
 
     fn stranger_index(&self, id: u8) -> Option<usize> {
-        let strangers = &self.contacts[self.roster..];
-        strangers.iter().position(|c| c.id == id).map(|at| at + self.roster)
+        let strangers = &self.contacts[self.roster_count..];
+        strangers.iter().position(|c| c.id == id).map(|at| at + self.roster_count)
     }
 
     /// Removes the strangers for which `keep` returns false.
     fn retain_strangers(&mut self, mut keep: impl FnMut(&NeighbourEntry) -> bool) {
-        let mut at = self.roster;
+        let mut at = self.roster_count;
         while let Some(contact) = self.contacts.get(at) {
             if keep(contact) {
                 at += 1;
@@ -222,12 +222,12 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// The entry of a position's sender: that of the roster, else a stranger's, added if it fits.
-    fn slot_for_position(&mut self, id: u8, now: Instant) -> Option<&mut NeighbourEntry> {
-        if let Some(at) = self.roster_rank(id, now).or_else(|| self.stranger_index(id)) {
+    fn entry_for_position(&mut self, id: u8, now: Instant) -> Option<&mut NeighbourEntry> {
+        if let Some(at) = self.active_roster_index(id, now).or_else(|| self.stranger_index(id)) {
             return self.contacts.get_mut(at);
         }
         self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
-        let room = self.contacts.len() - self.roster < MAX_STRANGERS;
+        let room = self.contacts.len() - self.roster_count < MAX_STRANGERS;
         match Some(id).filter(|_| room).and_then(|id| self.add_contact(id, STRANGER_RANK)) {
             Some(at) => self.contacts.get_mut(at),
             None => {
@@ -243,7 +243,7 @@ impl<const V: usize> Neighbours<V> {
     pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             let contact = &mut self.contacts[at];
-            let fresh = contact.sequence.accept(sequence, now);
+            let fresh = contact.sequence.accept_if_new(sequence, now);
             if fresh {
                 contact.intent_sequence = sequence;
             }
@@ -266,7 +266,7 @@ impl<const V: usize> Neighbours<V> {
             alt_m: f64::from(data.alt) * 1e-3,
         };
         let (own, edge_m) = (self.place, self.range_edge_m);
-        let Some(contact) = self.slot_for_position(id, now) else { return };
+        let Some(contact) = self.entry_for_position(id, now) else { return };
         let behind = contact.boot_ms.wrapping_sub(data.time_boot_ms);
         if !place.is_valid() || (contact.position_at.is_some() && behind < RESTART_MS) {
             return;
@@ -325,7 +325,7 @@ impl<const V: usize> Neighbours<V> {
         contact.heard_bits = intent.heard_bits;
         contact.points.clone_from(&intent.points);
         let most = intent.points.len().saturating_sub(1) as u8;
-        contact.first_unheard_point = intent.first_unheard_point.min(most);
+        contact.unheard_point_count = intent.unheard_point_count.min(most);
         contact.unheard_way_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
@@ -344,7 +344,7 @@ impl<const V: usize> Neighbours<V> {
     /// that counts as dead. A vehicle out of the plan opens no gate until a scan has found that it
     /// does not block the path ([`Self::mark_path_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
-        self.heard.clear();
+        self.states.clear();
         self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
         for contact in &self.contacts {
             let progress_m = contact.passed_m(now);
@@ -365,9 +365,9 @@ impl<const V: usize> Neighbours<V> {
                 ..contact.state
             };
             // Cannot overflow: there are as many slots as contacts.
-            let _ = self.heard.push(state);
+            let _ = self.states.push(state);
         }
-        &self.heard
+        &self.states
     }
 
     /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
@@ -389,7 +389,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Greatest message delay of the roster's vehicles, seconds.
     pub(crate) fn max_message_delay_s(&self) -> f32 {
-        self.contacts[..self.roster]
+        self.contacts[..self.roster_count]
             .iter()
             .fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
     }
@@ -397,13 +397,15 @@ impl<const V: usize> Neighbours<V> {
     /// Whether no vehicle of the roster was heard for 3 s: this vehicle's receiver may have failed.
     #[inline(never)]
     pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
-        self.roster > 0
-            && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
+        self.roster_count > 0
+            && self.contacts[..self.roster_count]
+                .iter()
+                .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
     /// An echo of a neighbour's last intent, for the next own intent: of each neighbour in turn.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
-        let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
+        let contact = self.contacts[..self.roster_count].get(turn % self.roster_count.max(1))?;
         IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
     }
 
@@ -444,7 +446,7 @@ impl<const V: usize> Neighbours<V> {
     /// this vehicle.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
-        let roster = &self.contacts[..self.roster];
+        let roster = &self.contacts[..self.roster_count];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
     }
 
@@ -455,7 +457,7 @@ impl<const V: usize> Neighbours<V> {
         if self.are_all_at_rest() {
             return Duration::default();
         }
-        let others = || self.contacts[..self.roster].iter();
+        let others = || self.contacts[..self.roster_count].iter();
         let heard = others().filter_map(|c| c.heard_at).max().unwrap_or(since);
         let hears_us = others().filter_map(|c| c.hears_us_at).max().unwrap_or(since);
         now - heard.min(hears_us).max(since)

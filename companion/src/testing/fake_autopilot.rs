@@ -27,7 +27,7 @@ mod telemetry;
 
 pub(crate) use self::mission::*;
 
-pub type Small = Companion<4, WAYPOINTS, GATES>;
+pub type BenchCompanion = Companion<4, WAYPOINTS, GATES>;
 /// A plan for the bench's companion.
 pub type Plan = VehiclePlan<WAYPOINTS, GATES>;
 pub const WAYPOINTS: usize = 32;
@@ -48,7 +48,7 @@ pub struct Bench {
     pub spool: Duration,
     lifts_at: Instant,
     pub timesyncs: Vec<(i64, i64)>,
-    pub companion: Small,
+    pub companion: BenchCompanion,
     pub now: Instant,
     pub enu: Point,
     pub mode: u32,
@@ -283,7 +283,7 @@ impl Bench {
     /// Runs until the companion is in this state; panics with its texts if it is not within
     /// `seconds`.
     #[track_caller]
-    pub fn until(&mut self, state: crate::State, seconds: f32) {
+    pub fn run_until(&mut self, state: crate::State, seconds: f32) {
         for _ in 0..(seconds * 20.0) as u32 {
             if self.state() == state {
                 return;
@@ -294,11 +294,11 @@ impl Bench {
     }
 
     /// A bench whose mission is started while vehicle 77 stands on its pad, following the plan.
-    pub fn accompanied(config: Config<4>) -> Self {
+    pub fn started_with_neighbour(config: Config<4>) -> Self {
         let mut bench = Self::new(config);
         bench.neighbour =
             Some((Point::new(8.0, 20.0, 0.0), intent::ON_PLAN | intent::GROUNDED, 0.0, 5));
-        bench.until(crate::State::Ready, 6.0);
+        bench.run_until(crate::State::Ready, 6.0);
         bench.start();
         bench
     }
@@ -306,9 +306,9 @@ impl Bench {
     /// A bench whose vehicle follows its path, 2 s after the climb.
     pub fn following(config: Config<4>) -> Self {
         let mut bench = Self::new(config);
-        bench.until(crate::State::Ready, 6.0);
+        bench.run_until(crate::State::Ready, 6.0);
         bench.start();
-        bench.until(crate::State::Follow, 20.0);
+        bench.run_until(crate::State::Follow, 20.0);
         bench.run(2.0);
         assert_eq!(bench.state(), crate::State::Follow);
         bench

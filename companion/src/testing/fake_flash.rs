@@ -10,7 +10,7 @@ use std::vec::Vec;
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
-use planner_core::plan::{Mode, VehicleTask};
+use planner_core::plan::{GoalMode, VehicleTask};
 use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapHeader};
 use planner_core::schedule::ScheduleConfig;
 use rand_core::Rng;
@@ -30,7 +30,7 @@ pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700
 
 /// The power was lost during a request.
 #[derive(Debug)]
-pub struct Cut;
+pub struct PowerLoss;
 
 pub struct Flash {
     pub bytes: Vec<u8>,
@@ -52,7 +52,7 @@ impl Flash {
     }
 
     /// Counts a word that is programmed or erased. Returns whether the power is lost at it.
-    pub fn goes(&mut self) -> bool {
+    pub fn loses_power(&mut self) -> bool {
         self.programmed += 1;
         match &mut self.power {
             Some(0) => true,
@@ -81,10 +81,10 @@ impl Flash {
         }
     }
 
-    pub fn erase(&mut self, at: u32) -> Result<(), Cut> {
+    pub fn erase(&mut self, at: u32) -> Result<(), PowerLoss> {
         assert_eq!(at % LAYOUT.sector_len, 0);
         let words = LAYOUT.sector_len as usize / WORD;
-        let goes = self.goes();
+        let goes = self.loses_power();
         for i in 0..words {
             let at = at as usize + i * WORD;
             if goes && self.rng.next_u32().is_multiple_of(2) {
@@ -94,10 +94,10 @@ impl Flash {
                 self.torn.remove(&((at / WORD) as u32));
             }
         }
-        if goes { Err(Cut) } else { Ok(()) }
+        if goes { Err(PowerLoss) } else { Ok(()) }
     }
 
-    pub fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Cut> {
+    pub fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), PowerLoss> {
         assert!(
             (at as usize).is_multiple_of(WORD)
                 && bytes.len().is_multiple_of(WORD)
@@ -110,9 +110,9 @@ impl Flash {
                 blank && !self.torn.contains(&((at / WORD) as u32)),
                 "programmed twice at {at:#x}"
             );
-            if self.goes() {
+            if self.loses_power() {
                 self.tear(at, word);
-                return Err(Cut);
+                return Err(PowerLoss);
             }
             self.bytes[at..at + WORD].copy_from_slice(word);
         }
@@ -132,12 +132,12 @@ impl ReadFlash for Flash {
 }
 
 /// Executes one request of the store; the bytes of a read are put into `read`.
-pub fn obey(
+pub fn execute(
     flash: &mut Flash,
     request: FlashRequest<'_>,
     erasing: ErasePermission,
     read: &mut [u8; MAX_READ],
-) -> Result<Result<usize, FlashFault>, Cut> {
+) -> Result<Result<usize, FlashFault>, PowerLoss> {
     match request {
         FlashRequest::Erase { at } => {
             assert_eq!(erasing, ErasePermission::Allowed, "erased while armed");
@@ -156,11 +156,15 @@ pub fn obey(
 }
 
 /// Executes the store's requests until it has none.
-pub fn run(store: &mut Store, flash: &mut Flash, erasing: ErasePermission) -> Result<(), Cut> {
+pub fn run(
+    store: &mut Store,
+    flash: &mut Flash,
+    erasing: ErasePermission,
+) -> Result<(), PowerLoss> {
     let mut read = [0; MAX_READ];
     for _ in 0..100_000 {
         let Some(request) = store.poll_request(erasing) else { return Ok(()) };
-        let outcome = obey(flash, request, erasing, &mut read)?;
+        let outcome = execute(flash, request, erasing, &mut read)?;
         store.handle_outcome(outcome.map(|len| &read[..len]));
     }
     panic!("it asks for ever");
@@ -198,7 +202,7 @@ pub fn roadmap(nodes: usize) -> Vec<u8> {
 pub fn mission(vehicles: u8) -> Vec<u8> {
     let header = MissionHeader {
         roadmap_crc: 1,
-        mode: Mode::Labelled,
+        mode: GoalMode::Labelled,
         method: Method::Priority,
         origin: ORIGIN,
         cruise_mps: 2.0,
@@ -222,6 +226,6 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
     bytes
 }
 
-pub fn held(flash: &Flash, extent: Option<Range<u32>>) -> Option<&[u8]> {
+pub fn bytes_at(flash: &Flash, extent: Option<Range<u32>>) -> Option<&[u8]> {
     extent.map(|extent| &flash.bytes[extent.start as usize..extent.end as usize])
 }

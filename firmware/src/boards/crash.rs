@@ -11,7 +11,7 @@ use heapless::String;
 
 use super::{chosen, stack};
 use crate::chips::{ResetCause, fault};
-use crate::kept::{CrashRecord, FileWork, RECORD_WORDS, TEXT};
+use crate::kept::{CrashRecord, FileWork, MAX_TEXT_LEN, RECORD_WORDS};
 
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();
@@ -42,7 +42,7 @@ fn update_record<T>(change: impl FnOnce(&mut CrashRecord) -> T) -> T {
 
 /// Evaluates the crash record at the start. Returns the STATUSTEXT about the last run's end; `None`
 /// if there is nothing to report, as after power-on. To be called once.
-pub fn take_report(cause: ResetCause) -> Option<String<TEXT>> {
+pub fn take_report(cause: ResetCause) -> Option<String<MAX_TEXT_LEN>> {
     critical_section::with(|_| {
         let (kept, said) = CrashRecord::on_start(read_record(), cause);
         write_record(&kept);
@@ -114,7 +114,7 @@ pub fn faulted(pc: u32) -> ! {
         // The program counter is not reported: it lies on the stack that overflowed.
         record_and_restart("Restarted: stack overflow")
     }
-    let mut text = String::<TEXT>::new();
+    let mut text = String::<MAX_TEXT_LEN>::new();
     // Cannot fail: the text has room.
     let _ = write!(text, "Restarted: fault at {pc:#010x}");
     record_and_restart(&text)

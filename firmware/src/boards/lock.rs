@@ -11,11 +11,11 @@ use super::chosen::LINKS_PRIORITY;
 /// cannot be used: it keeps one waiting task. Two waiting tasks of the higher executor would wake
 /// each other for ever, and the lower executor, which holds the mutex, would never run to release
 /// it.
-pub struct HoldsExecutors(());
+pub struct BasepriRawMutex(());
 
 // SAFETY: it is locked by tasks only, never in a device's interrupt; so while it is held no code
 // that may lock it runs.
-unsafe impl RawMutex for HoldsExecutors {
+unsafe impl RawMutex for BasepriRawMutex {
     const INIT: Self = Self(());
 
     fn lock<R>(&self, work: impl FnOnce() -> R) -> R {

@@ -29,7 +29,7 @@ pub mod sections;
 pub mod stack;
 
 #[cfg(all(target_os = "none", feature = "board"))]
-pub use lock::HoldsExecutors;
+pub use lock::BasepriRawMutex;
 
 /// Halts the processor until an interrupt.
 #[cfg(all(target_os = "none", feature = "qemu"))]
@@ -43,7 +43,7 @@ pub fn sleep() {
 
 /// On the host: a critical section in place of the boards' BASEPRI mutex.
 #[cfg(not(all(target_os = "none", feature = "board")))]
-pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+pub type BasepriRawMutex = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 
 /// Records that `work` on the uploaded files with checksum `files` begins; false if it crashed
 /// three starts in a row, then it must not be done. On the host it may always begin.

@@ -11,7 +11,7 @@ use crate::chips::mpu::{Access, Region};
 /// Value of MPU_CTRL: unit enabled; PRIVDEFENA: addresses outside all regions have the default
 /// memory map; HFNMIENA clear: the unit is off in hard fault handlers, whose stack may reach into
 /// the guard.
-const ON: u32 = 1 << 2 | 1;
+const MPU_CTRL_ENABLE: u32 = 1 << 2 | 1;
 
 /// The guard below the stack: an access to it is a fault.
 pub(super) fn stack_guard_region() -> Region {
@@ -21,13 +21,13 @@ pub(super) fn stack_guard_region() -> Region {
 /// Sets regions 0, 1, …; where two overlap the higher number applies. Then enables the unit. To be
 /// called once, at the start.
 pub(super) fn enable_regions(regions: &[Option<Region>]) {
-    // SAFETY: after this only `set` uses the unit. No code or data in use lies where a region
-    // forbids access.
+    // SAFETY: after this only `set_region` uses the unit. No code or data in use lies where a
+    // region forbids access.
     unsafe {
         for (number, region) in regions.iter().enumerate() {
-            set(number as u32, region.as_ref());
+            set_region(number as u32, region.as_ref());
         }
-        (*MPU::PTR).ctrl.write(ON);
+        (*MPU::PTR).ctrl.write(MPU_CTRL_ENABLE);
     }
     dsb();
     isb();
@@ -37,7 +37,7 @@ pub(super) fn enable_regions(regions: &[Option<Region>]) {
 ///
 /// # Safety
 /// No code or data in use lies where the region forbids access.
-pub(super) unsafe fn set(number: u32, region: Option<&Region>) {
+pub(super) unsafe fn set_region(number: u32, region: Option<&Region>) {
     // SAFETY: registers of the unit, which no task uses; the caller guarantees the rest.
     unsafe {
         let mpu = &*MPU::PTR;

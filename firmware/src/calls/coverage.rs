@@ -17,7 +17,7 @@ use planner_core::flight::{VehiclePlan, WaypointRange};
 
 use super::Meter;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use crate::scratch::CoverageWorkspace;
+use crate::scratch::CoverageBenchWorkspace;
 
 /// Most changes of the lanes' order that the planner tries.
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
@@ -59,7 +59,7 @@ impl Checksum {
 
 /// Makes all calls of coverage planning; returns the checksum of their results.
 #[inline(never)]
-pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageWorkspace) -> u32 {
+pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageBenchWorkspace) -> u32 {
     let mut sum = Checksum(1);
     measure_cameras(meter, &mut sum);
     // Area of five vertices, 300 by 150 m; its lanes are 10 m apart.
@@ -109,15 +109,15 @@ fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {
 fn measure_plans(
     meter: &mut impl Meter,
     area: Area<'_>,
-    lent: &mut CoverageWorkspace,
+    lent: &mut CoverageBenchWorkspace,
     sum: &mut Checksum,
 ) {
     let transit = Transit::<1>::empty();
     let few = vehicles(LIMITED_VEHICLES);
-    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageBenchWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
-        tracks::build(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
+        tracks::build_lanes(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
         let work = Work {
             tracks,
             transit: &transit,
@@ -201,18 +201,18 @@ fn flown_lanes(tracks: &Tracks<LANES>, plan: &Plan<VEHICLES>) -> Vec<WaypointRan
 fn measure_division(
     meter: &mut impl Meter,
     area: Area<'_>,
-    lent: &mut CoverageWorkspace,
+    lent: &mut CoverageBenchWorkspace,
     sum: &mut Checksum,
 ) {
     let transit = Transit::<1>::empty();
     let many = vehicles(VEHICLES);
-    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageBenchWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let pack = &mut powell.pack;
     // Lanes along y: 2559 m / 5 m are 512; in this convex area their order is not searched.
     let pattern = pattern(Some(90.0), 5.0);
     meter
-        .call("tracks::build, 512 lanes", size_of_val(build), || {
-            tracks::build(&area, &pattern, &transit, build, tracks)
+        .call("tracks::build_lanes, 512 lanes", size_of_val(build), || {
+            tracks::build_lanes(&area, &pattern, &transit, build, tracks)
         })
         .expect("lanes");
     assert_eq!(tracks.lanes().len(), LANES);
@@ -326,7 +326,11 @@ fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
 }
 
 /// Plans an area with the most vertices, some of them of no-fly zones with the most corners.
-fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
+fn measure_largest_area(
+    meter: &mut impl Meter,
+    lent: &mut CoverageBenchWorkspace,
+    sum: &mut Checksum,
+) {
     let (vertices, rings) = largest_area();
     let area =
         meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
@@ -353,17 +357,17 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
     measure_ways_home(meter, &transit, sum);
-    let CoverageWorkspace { tracks, build, powell, plan, .. } = lent;
+    let CoverageBenchWorkspace { tracks, build, powell, plan, .. } = lent;
     let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
-    let direction = meter.call("sweep::least_width, 256", size_of_val(&hull), || {
-        sweep::least_width(&area, &mut hull)
+    let direction = meter.call("sweep::direction_of_least_width, 256", size_of_val(&hull), || {
+        sweep::direction_of_least_width(&area, &mut hull)
     });
     sum.add(direction.expect("a direction").along.x.to_bits());
     let bytes = size_of_val(build);
     let pattern = pattern(None, 16.0);
     meter
-        .call("tracks::build, 256 vertices", bytes, || {
-            tracks::build(&area, &pattern, &transit, build, tracks)
+        .call("tracks::build_lanes, 256 vertices", bytes, || {
+            tracks::build_lanes(&area, &pattern, &transit, build, tracks)
         })
         .expect("lanes");
     sum.add_tracks(tracks);
@@ -401,9 +405,9 @@ mod tests {
 
     #[test]
     fn all_calls_are_made_and_the_sum_is_the_same_again() {
-        let mut lent = Box::<CoverageWorkspace>::default();
+        let mut lent = Box::<CoverageBenchWorkspace>::default();
         let first = measure_coverage_calls(&mut Desk, &mut lent);
         assert_eq!(measure_coverage_calls(&mut Desk, &mut lent), first);
-        std::println!("lent {} bytes", size_of::<CoverageWorkspace>());
+        std::println!("lent {} bytes", size_of::<CoverageBenchWorkspace>());
     }
 }

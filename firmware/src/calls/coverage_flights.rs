@@ -79,14 +79,15 @@ pub fn measure_coverage_flights(
     lent: &mut scratch::WorkspaceOverlay,
     out: &mut Flights,
 ) -> u32 {
-    measure_whole_plans(meter, lent.area(), out) ^ measure_plan_parts(meter, lent.coverage(), out)
+    measure_whole_plans(meter, lent.coverage_plan(), out)
+        ^ measure_plan_parts(meter, lent.coverage_bench(), out)
 }
 
 /// Measures plans from a mission file, without and with no-fly zones.
 #[inline(never)]
 fn measure_whole_plans(
     meter: &mut impl Meter,
-    lent: &mut scratch::AreaWorkspace,
+    lent: &mut scratch::CoveragePlanWorkspace,
     out: &mut Flights,
 ) -> u32 {
     let mut sum = 1;
@@ -171,7 +172,7 @@ fn spacing(lane_m: f32) -> Spacing {
 fn measure_mission_plans(
     meter: &mut impl Meter,
     zones: &[[[f32; 2]; 4]],
-    lent: &mut scratch::AreaWorkspace,
+    lent: &mut scratch::CoveragePlanWorkspace,
     out: &mut Flights,
     sum: &mut u32,
 ) {
@@ -191,7 +192,7 @@ fn measure_mission_plans(
             "planner::coverage::plan_flights, 3 after two losses, zones",
         ],
     };
-    let lent_bytes = size_of::<scratch::AreaWorkspace>();
+    let lent_bytes = size_of::<scratch::CoveragePlanWorkspace>();
     let mut losses: Vec<[DivisionInput; LIMITED_VEHICLES], 2> = Vec::new();
     for lost in [None, Some(0), Some(1)] {
         if let Some(lost) = lost {
@@ -232,7 +233,7 @@ fn measure_mission_plans(
 #[inline(never)]
 fn measure_plan_parts(
     meter: &mut impl Meter,
-    lent: &mut scratch::CoverageWorkspace,
+    lent: &mut scratch::CoverageBenchWorkspace,
     out: &mut Flights,
 ) -> u32 {
     let mut sum = 1;
@@ -303,14 +304,20 @@ fn measure_division(
     meter: &mut impl Meter,
     case: &Case<'_>,
     [flights_name, again_name]: [&'static str; 2],
-    lent: &mut scratch::CoverageWorkspace,
+    lent: &mut scratch::CoverageBenchWorkspace,
     out: &mut Flights,
     sum: &mut u32,
 ) {
     let mut transit = Transit::<AREA_CORNERS>::empty();
     transit.set_area(case.area).expect("they fit");
-    let scratch::CoverageWorkspace {
-        tracks, build, powell, plan: routes, losses, schedule, ..
+    let scratch::CoverageBenchWorkspace {
+        tracks,
+        build,
+        powell,
+        plan: routes,
+        losses,
+        schedule,
+        ..
     } = lent;
     let pack = &mut powell.pack;
     let looks = super::coverage::MAX_ORDER_CHANGES;
@@ -320,7 +327,7 @@ fn measure_division(
         margin_m: 0.0,
         search_steps: looks,
     };
-    tracks::build(&case.area, &pattern, &transit, build, tracks).expect("lanes");
+    tracks::build_lanes(&case.area, &pattern, &transit, build, tracks).expect("lanes");
     let (vehicles, pads) = vehicles(case.count);
     let work = Work {
         tracks,
@@ -375,8 +382,8 @@ mod tests {
     #[test]
     fn all_flights_are_planned_and_the_sum_is_the_same_again() {
         let mut out = Box::new(Flights::new());
-        let mut area = Box::<scratch::AreaWorkspace>::default();
-        let mut lent = Box::<scratch::CoverageWorkspace>::default();
+        let mut area = Box::<scratch::CoveragePlanWorkspace>::default();
+        let mut lent = Box::<scratch::CoverageBenchWorkspace>::default();
         let mut sums = || {
             [
                 measure_whole_plans(&mut Desk, &mut area, &mut out),

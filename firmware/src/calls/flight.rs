@@ -133,8 +133,8 @@ pub fn measure_flight<M: Meter>(
         let (flags, silent) = match seed % 4 {
             // All neighbours fly detours: each is compared with the whole path ahead.
             1 => (AIR | intent::ON_DETOUR, false),
-            3 => EASY[random_below(&mut rng, EASY.len())],
-            _ => HARD[random_below(&mut rng, HARD.len())],
+            3 => MOSTLY_ON_PLAN[random_below(&mut rng, MOSTLY_ON_PLAN.len())],
+            _ => OFF_PLAN_OR_SILENT[random_below(&mut rng, OFF_PLAN_OR_SILENT.len())],
         };
         // The first neighbour is always heard, so that this vehicle does not lose its swarm link.
         (other.flags, other.silent) = (flags, silent && i > 0);
@@ -224,13 +224,13 @@ const FILTERED: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Pairs from which a neighbour is drawn: its intent's flags, and whether it falls silent.
-const EASY: [(u8, bool); 4] = [
+const MOSTLY_ON_PLAN: [(u8, bool); 4] = [
     (AIR, false),
     (intent::GROUNDED | intent::ON_PLAN | intent::WAITING, false),
     (AIR | intent::ON_DETOUR, false),
     (intent::GROUNDED | intent::LANDED | intent::ON_PLAN, false),
 ];
-const HARD: [(u8, bool); 4] = [
+const OFF_PLAN_OR_SILENT: [(u8, bool); 4] = [
     (intent::FLYING, false),
     (intent::FLYING | intent::OUT_OF_PLAN, false),
     (AIR, true),

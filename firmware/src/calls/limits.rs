@@ -14,7 +14,7 @@ use planner_core::safety::{
     Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet,
 };
 use planner_core::segment::{self, MAX_SNAPPED};
-use planner_core::track::{self, TrackConfig, Tracker};
+use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
 
 use super::limits_results::{HARD_NUMBERS, extreme_points};
@@ -65,11 +65,12 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
     for i in 0..dims.len() * dims.len() {
         let shape = GridShape { dims: [dims[i % 6], dims[i / 6], dims[(i * 5 + 1) % 6]], ..SHAPE };
         let bricks = to.call("voxel::GridShape::bricks", || shape.bricks());
-        let count = to.call("voxel::GridShape::brick_count", || shape.brick_count());
+        let count = to.call("voxel::GridShape::word_count", || shape.word_count());
         assert!(bricks.iter().all(|&b| b as usize <= count.max(b as usize)));
         to.call("voxel::GridShape::max", || shape.max());
-        let (word, mask) =
-            to.call("voxel::GridShape::address", || shape.address([u32::MAX, 7, dims[i / 6]]));
+        let (word, mask) = to.call("voxel::GridShape::word_and_mask", || {
+            shape.word_and_mask([u32::MAX, 7, dims[i / 6]])
+        });
         to.add_count(word ^ mask as usize);
         let grid =
             to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
@@ -168,8 +169,8 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
         sampling: Sampling::Halton,
     };
     let mut nodes = [Point::zeros(); 8];
-    let mut index = to.call("neighbours::Workspace::new", prm::Workspace::<8, 16>::new);
-    assert!(to.call("neighbours::Workspace::is_empty", || index.is_empty()));
+    let mut index = to.call("neighbours::NodeIndex::new", prm::NodeIndex::<8, 16>::new);
+    assert!(to.call("neighbours::NodeIndex::is_empty", || index.is_empty()));
     for hard in HARD_NUMBERS {
         for config in [
             Config { edge_min_m: hard, ..good },
@@ -203,11 +204,11 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
     );
     assert!(prm::sample_nodes(&grid, None, &[Point::zeros()], &good, &mut nodes[..3]).is_err());
     for p in extreme_points() {
-        let indexed = to.call("neighbours::Workspace::build_index", || {
+        let indexed = to.call("neighbours::NodeIndex::build_index", || {
             index.build_index(&[p, Point::zeros()], &good)
         });
         assert_eq!(indexed.is_ok(), p.iter().all(|c| c.abs() <= 1e6));
-        let len = to.call("neighbours::Workspace::len", || index.len());
+        let len = to.call("neighbours::NodeIndex::len", || index.len());
         assert_eq!(len, if indexed.is_ok() { 2 } else { 0 });
         // Ranges of nodes that do not exist yield no edges.
         for range in [0..2, 1..usize::MAX, usize::MAX..usize::MAX] {
@@ -239,7 +240,10 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
 fn call_paths(to: &mut Results<'_, impl Listener>) {
     let mut path: Path<4> = to.call("flight::Path::new", Path::new);
     let track = TrackConfig::default();
-    assert!(track::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
+    assert!(
+        track::advance(&track, &path, &mut ReferenceState::default(), &Advice::FREE, 0.05)
+            .is_none()
+    );
     assert!(path.point_at(f32::NAN).is_none() && path.points_from(0.0, 1.0).next().is_none());
     for round in 0..3 {
         for p in extreme_points() {
@@ -253,10 +257,10 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
         assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
         for (i, &hard) in HARD_NUMBERS.iter().enumerate() {
             let other = HARD_NUMBERS[(i * 5 + round) % HARD_NUMBERS.len()];
-            to.call("flight::Path::label_times", || path.label_times(hard, other));
+            to.call("flight::Path::set_times_at_speed", || path.set_times_at_speed(hard, other));
             to.call("flight::Path::set_last_times", || path.set_last_times(hard, other));
-            to.call("flight::Path::label_times_by", || {
-                path.label_times_by(hard, |from, to| (to - from).norm() * other);
+            to.call("flight::Path::set_times_by_leg", || {
+                path.set_times_by_leg(hard, |from, to| (to - from).norm() * other);
             });
             let at = to
                 .call("flight::Path::point_at", || path.point_at(hard))
@@ -270,7 +274,7 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
             call_tracking(to, &path, hard, other);
         }
         call_tasks(to, &path);
-        to.add_count(push_until_full(&path));
+        to.add_count(waypoint_count(&path));
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
     }
@@ -287,7 +291,7 @@ fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32,
     };
     let length_m = path.length_m();
     for dt_s in [0.05, hard] {
-        let mut tracker = Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 };
+        let mut tracker = ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 };
         let reference = to
             .call("track::advance", || {
                 track::advance(&track, path, &mut tracker, &advice(hard, other), dt_s)
@@ -296,18 +300,19 @@ fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32,
         assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
         assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
         let waits = dt_s.is_nan() || dt_s <= 0.0;
-        assert!(!waits || tracker == Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 });
+        assert!(!waits || tracker == ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 });
     }
     let config = TrackConfig { accel_mps2: hard, response_s: other, ..track };
     let checked = to.call("track::TrackConfig::check", || config.check());
     let good = |x: f32| x > 0.0 && x.is_finite();
     assert_eq!(checked.is_ok(), good(hard) && good(other));
-    track::advance(&config, path, &mut Tracker::default(), &Advice::FREE, 0.05);
+    track::advance(&config, path, &mut ReferenceState::default(), &Advice::FREE, 0.05);
 }
 
 /// Calls of the pictures along a path, with extreme spacings.
 fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
-    let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
+    let last =
+        to.call("flight::Path::last_index", || path.last_index()).expect("a path with waypoints");
     let waypoints = WaypointRange {
         first: PicturePlan::MAX_AREA_WAYPOINTS - 1,
         end: PicturePlan::MAX_AREA_WAYPOINTS,
@@ -326,7 +331,10 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
         let plan = to.call("photographs::PicturePlan::with_area", || {
             plan.with_area(u32::MAX, spacing_m > 0.0)
         });
-        assert_eq!(to.call("photographs::PicturePlan::area", || plan.area()), u32::MAX);
+        assert_eq!(
+            to.call("photographs::PicturePlan::area_waypoint_count", || plan.area_waypoint_count()),
+            u32::MAX
+        );
         let all = to.call("photographs::PicturePlan::count", || plan.count(path));
         let end_m =
             to.call("photographs::PicturePlan::last_picture_m", || plan.last_picture_m(path));
@@ -336,8 +344,8 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
         for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {
             let taken = to
                 .call("photographs::PicturePlan::taken_count", || plan.taken_count(path, along_m));
-            let passed = to.call("photographs::PicturePlan::passed_count", || {
-                plan.passed_count(path, along_m)
+            let passed = to.call("photographs::PicturePlan::certainly_taken_count", || {
+                plan.certainly_taken_count(path, along_m)
             });
             assert!(passed <= taken || spacing_m <= 0.0, "{along_m}: {passed} of {taken}");
             let at_m = to.call("photographs::PicturePlan::last_picture_before_m", || {
@@ -349,26 +357,36 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
             );
         }
         assert!(all as usize >= stretches && stretches <= 4, "{spacing_m}: {all} in {stretches}");
-        for count in [0, 1, all, u32::MAX] {
-            let pictures = WaypointRange { first: 0, end: count };
-            let shown = to.call("photographs::PicturePlan::shown_waypoints", || {
-                plan.shown_waypoints(path, pictures).count()
-            });
-            assert!(shown <= stretches, "{count}: {shown} of {stretches}");
-        }
-        for shots in plan.stretches(path) {
-            let place_m = to.call("photographs::PictureStretch::picture_at_m", || {
-                shots.picture_at_m(shots.count)
-            });
-            to.add(place_m);
-        }
+        call_pictures(to, path, &plan, all);
         let task = Task::Photograph(plan);
         assert!(to.call("flight::Task::leaves_pad", || task.leaves_pad()));
         assert_eq!(to.call("flight::Task::goal", || task.goal()), None);
     }
 }
 
-fn push_until_full<const W: usize>(path: &Path<W>) -> usize {
+/// Calls for the waypoints that pictures show, and for the pictures' places.
+fn call_pictures(
+    to: &mut Results<'_, impl Listener>,
+    path: &Path<4>,
+    plan: &PicturePlan,
+    all: u32,
+) {
+    let stretches = plan.stretches(path).count();
+    for count in [0, 1, all, u32::MAX] {
+        let pictures = WaypointRange { first: 0, end: count };
+        let shown = to.call("photographs::PicturePlan::waypoints_of_pictures", || {
+            plan.waypoints_of_pictures(path, pictures).count()
+        });
+        assert!(shown <= stretches, "{count}: {shown} of {stretches}");
+    }
+    for shots in plan.stretches(path) {
+        let place_m = to
+            .call("photographs::PictureStretch::picture_at_m", || shots.picture_at_m(shots.count));
+        to.add(place_m);
+    }
+}
+
+fn waypoint_count<const W: usize>(path: &Path<W>) -> usize {
     path.waypoints().len()
 }
 
@@ -466,7 +484,7 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             for own in &own {
                 let mut legs = Legs::new();
                 let own = to.call("own::OwnSet::new", || OwnSet::new(own, &mut legs));
-                let away = to.call("own::OwnSet::away_from_box", || own.away_from_box(&p));
+                let away = to.call("own::OwnSet::distance_from_box", || own.distance_from_box(&p));
                 to.add(away.x + away.y + away.z);
                 let near = to.call("own::OwnSet::conflicts", || own.conflicts(&other, &p, hard));
                 to.add_bool(near);

@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
 use planner_core::coverage::pack::{
-    Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work,
+    Heights, PackWorkspace, Plan, Route, RouteDirection, TrackUnit, Vehicle, Work,
 };
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
@@ -217,7 +217,7 @@ fn unusual_routes(
         routes.routes[0] = route;
         assert_eq!(plan(good, &routes, &SWARM), Err(PlanError::Terminals));
     }
-    for (heading, layer) in [(Heading::Backward, 0), (Heading::Forward, u8::MAX)] {
+    for (heading, layer) in [(RouteDirection::Backward, 0), (RouteDirection::Forward, u8::MAX)] {
         let mut routes = routes.clone();
         routes.routes[0] = Route { heading, layer, ..first };
         let _ = plan(good, &routes, &SWARM);

@@ -4,7 +4,7 @@ use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::Spacing;
 use planner_core::coverage::pack::{
-    self, Heading, Heights, PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work,
+    self, Heights, PackWorkspace, Plan, Route, RouteDirection, TrackUnit, Vehicle, Work,
 };
 use planner_core::coverage::powell::{self, powell};
 use planner_core::coverage::tracks::{self, Lane, LanePattern, Tracks};
@@ -21,7 +21,7 @@ pub(super) const VERTICES: usize = 12;
 pub(super) const CORNERS: usize = 4;
 pub(super) const VEHICLES: usize = 3;
 /// Waypoint numbers and range ends that are tried.
-const NUMBERS: [u32; 6] = [0, 1, 7, 1 << 24, u32::MAX - 1, u32::MAX];
+const WAYPOINT_NUMBERS: [u32; 6] = [0, 1, 7, 1 << 24, u32::MAX - 1, u32::MAX];
 
 const CORNERS_OF_ALL: [Flat; 8] = [
     Flat::new(0.0, 0.0),
@@ -60,7 +60,7 @@ pub(super) type ZoneTransit<'a> = Transit<'a, CORNERS>;
 pub(super) struct CoverageMemory {
     pub(super) tracks: Lanes,
     left: Lanes,
-    build: tracks::Workspace<VERTICES>,
+    build: tracks::LaneWorkspace<VERTICES>,
     pub(super) powell: powell::Workspace<VEHICLES>,
     pub(super) plan: Plan<VEHICLES>,
 }
@@ -71,7 +71,7 @@ impl CoverageMemory {
         Self {
             tracks: Tracks::new(),
             left: Tracks::new(),
-            build: tracks::Workspace::new(),
+            build: tracks::LaneWorkspace::new(),
             powell: powell::Workspace::new(),
             plan: Plan::new(),
         }
@@ -112,7 +112,9 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
             assert!(holds || !forbids, "the zone lies in the area");
             let Ok(area) = found else { continue };
             let mut hull: Vec<Flat, VERTICES> = Vec::new();
-            let direction = to.call("sweep::least_width", || sweep::least_width(&area, &mut hull));
+            let direction = to.call("sweep::direction_of_least_width", || {
+                sweep::direction_of_least_width(&area, &mut hull)
+            });
             assert!(direction.is_ok_and(|found| (found.along.norm() - 1.0).abs() < 1e-3));
             to.add(direction.map_or(0.0, |found| found.across.x));
         }
@@ -141,7 +143,7 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
     assert_eq!(to.call("area::Area::rings", || area.rings()).len(), 2);
     assert!(to.call("area::Area::has_no_fly", || area.has_no_fly()));
     let mut none: Vec<Flat, 2> = Vec::new();
-    assert!(sweep::least_width(&area, &mut none).is_err(), "no room for the hull");
+    assert!(sweep::direction_of_least_width(&area, &mut none).is_err(), "no room for the hull");
 }
 
 fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<'static>) {
@@ -191,7 +193,7 @@ fn call_lanes(
     lent: &mut CoverageMemory,
 ) {
     let CoverageMemory { tracks, build, .. } = lent;
-    *build = to.call("strips::Workspace::new", tracks::Workspace::new);
+    *build = to.call("strips::LaneWorkspace::new", tracks::LaneWorkspace::new);
     *tracks = to.call("lanes::Tracks::new", Tracks::new);
     call_waypoint_numbers(to, tracks);
     for hard in HARD_NUMBERS {
@@ -206,8 +208,9 @@ fn call_lanes(
             },
             LanePattern { search_steps: 0, ..PATTERN },
         ] {
-            let built =
-                to.call("tracks::build", || tracks::build(area, &pattern, transit, build, tracks));
+            let built = to.call("tracks::build_lanes", || {
+                tracks::build_lanes(area, &pattern, transit, build, tracks)
+            });
             to.add_bool(built.is_ok());
             if built.is_ok() {
                 call_waypoint_numbers(to, tracks);
@@ -215,7 +218,7 @@ fn call_lanes(
         }
         for end in HARD_NUMBERS {
             let (from, end) = (Flat::new(hard, 0.0), Flat::new(0.0, end));
-            for count in NUMBERS {
+            for count in WAYPOINT_NUMBERS {
                 let lane = Lane { from, to: end, first: count, count, start_m: 0.0, strip: 0 };
                 let length_m = to.call("lanes::Lane::length_m", || lane.length_m());
                 to.add(length_m);
@@ -225,8 +228,11 @@ fn call_lanes(
         }
     }
     let many = LanePattern { spacing: Spacing { lane_m: 1.0, ..SPACING }, ..PATTERN };
-    assert_eq!(tracks::build(area, &many, transit, build, tracks), Err(CoverageError::LanesFull));
-    assert_eq!(tracks::build(area, &PATTERN, transit, build, tracks), Ok(()));
+    assert_eq!(
+        tracks::build_lanes(area, &many, transit, build, tracks),
+        Err(CoverageError::LanesFull)
+    );
+    assert_eq!(tracks::build_lanes(area, &PATTERN, transit, build, tracks), Ok(()));
     call_waypoint_numbers(to, tracks);
 }
 
@@ -236,7 +242,7 @@ fn call_waypoint_numbers(to: &mut Results<'_, impl Listener>, tracks: &Lanes) {
     let lanes = to.call("lanes::Tracks::lanes", || tracks.lanes().len());
     let along = to.call("lanes::Tracks::lane_direction", || tracks.lane_direction());
     let length_m = to.call("lanes::Tracks::length_m", || tracks.length_m());
-    for number in NUMBERS.into_iter().chain([count, count.saturating_sub(1)]) {
+    for number in WAYPOINT_NUMBERS.into_iter().chain([count, count.saturating_sub(1)]) {
         let lane = to.call("lanes::Tracks::lane_of", || tracks.lane_of(number));
         assert!(lane < lanes.max(1));
         let place = to.call("lanes::Tracks::waypoint", || tracks.waypoint(number));
@@ -255,8 +261,8 @@ fn call_divisions(
     lent: &mut CoverageMemory,
 ) {
     let CoverageMemory { tracks, left, .. } = lent;
-    for first in NUMBERS {
-        for end in NUMBERS {
+    for first in WAYPOINT_NUMBERS {
+        for end in WAYPOINT_NUMBERS {
             let done = [WaypointRange { first: 0, end: 2 }, WaypointRange { first, end }];
             for done in [&done[..], &done[1..]] {
                 let found = to.call("divide::remaining_lanes", || {
@@ -264,7 +270,7 @@ fn call_divisions(
                 });
                 assert!(found.is_err() || first <= end && end <= tracks.waypoint_count());
                 to.add_bool(found.is_ok());
-                for number in NUMBERS {
+                for number in WAYPOINT_NUMBERS {
                     let whole = to.call("divide::original_waypoint_number", || {
                         divide::original_waypoint_number(done, number)
                     });
@@ -348,8 +354,8 @@ fn call_packing(
     for vehicles in [&crowd[..], &[]] {
         pack(to, &Work { vehicles, ..good }, ws, plan);
     }
-    for (first, end) in NUMBERS.into_iter().zip(NUMBERS.into_iter().rev()) {
-        for heading in [Heading::Forward, Heading::Backward] {
+    for (first, end) in WAYPOINT_NUMBERS.into_iter().zip(WAYPOINT_NUMBERS.into_iter().rev()) {
+        for heading in [RouteDirection::Forward, RouteDirection::Backward] {
             let whole = Route { vehicle: u8::MAX, first, end, heading, layer: 0, ..plan.routes[0] };
             for route in [whole, Route { first: end, ..whole }] {
                 let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());

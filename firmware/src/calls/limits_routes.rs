@@ -6,7 +6,7 @@ use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::{Flight, Gate, Path, VehiclePlan};
 use planner_core::plan::{
-    self, Goals, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
+    self, GoalMode, Goals, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
@@ -21,10 +21,10 @@ use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
 /// Capacities of these calls: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;
 const WAYPOINTS: usize = 8;
-const PIECES: usize = 256;
+const TIMED_SEGMENTS: usize = 256;
 const GATES: usize = 16;
 
-type Workspace = PlanWorkspace<MAX_NODES, VEHICLES, PIECES>;
+type Workspace = PlanWorkspace<MAX_NODES, VEHICLES, TIMED_SEGMENTS>;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Memory that is lent to the calls.
@@ -92,7 +92,13 @@ const TASK: VehicleTask =
 const TASKS: [VehicleTask; 2] = [TASK, VehicleTask { id: 2, goal: Some(1), ..TASK }];
 
 fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
-    PlanRequest { vehicles, descents_m, mode: Mode::Labelled, schedule: SCHEDULE, max_gates: GATES }
+    PlanRequest {
+        vehicles,
+        descents_m,
+        mode: GoalMode::Labelled,
+        schedule: SCHEDULE,
+        max_gates: GATES,
+    }
 }
 
 fn call_plans(
@@ -106,9 +112,9 @@ fn call_plans(
     let heights = [1.5, 1.5];
     let good = request(&TASKS, &heights);
     let modes = [
-        Mode::Labelled,
-        Mode::Unlabelled(Objective::TotalDistance),
-        Mode::Unlabelled(Objective::Makespan),
+        GoalMode::Labelled,
+        GoalMode::Unlabelled(Objective::TotalDistance),
+        GoalMode::Unlabelled(Objective::Makespan),
     ];
     for mode in modes {
         let request = PlanRequest { mode, ..good };

@@ -52,7 +52,7 @@ pub const READ_ISS_OVERRIDE: u32 = 1;
 
 /// Bits of RCC_AHB2ENR that switch on the clocks of SRAM1, SRAM2 and SRAM3 (RM0433, "RCC AHB2 clock
 /// register"); they are off after a reset.
-pub const D2_SRAM: u32 = 0b111 << 29;
+pub const D2_SRAM_CLOCKS: u32 = 0b111 << 29;
 /// Address of RCC_AHB2ENR.
 pub const RCC_AHB2ENR: u32 = 0x5802_44DC;
 
@@ -96,17 +96,17 @@ pub const NULL: Region = Region::new(0, 256, Access::None);
 /// Address range of external memory, 0x6000_0000 to 0xDFFF_FFFF, four eighths of the address space:
 /// no access, else the processor might read speculatively from memory controllers that are off.
 pub const EXTERNAL: Region =
-    Region { base: 0, len_log2: 32, access: Access::None, without: 0b1000_0111 };
+    Region { base: 0, len_log2: 32, access: Access::None, disabled_eighths: 0b1000_0111 };
 
 /// The sectors of bank 2 that hold a roadmap of `len` bytes at offset `at` of the bank: cached,
 /// read only. An eighth of the bank is one sector of 128 kB, so SRD bits disable the other sectors.
 pub const fn roadmap_region(at: u32, len: u32) -> Region {
     const SECTOR: u32 = 128 << 10;
     let (first, end) = (at / SECTOR, (at + len).div_ceil(SECTOR));
-    let mut region = Region { access: Access::CachedReadOnly, without: 0xFF, ..BANK2 };
+    let mut region = Region { access: Access::CachedReadOnly, disabled_eighths: 0xFF, ..BANK2 };
     let mut sector = first;
     while sector < end && sector < 8 {
-        region.without &= !(1 << sector);
+        region.disabled_eighths &= !(1 << sector);
         sector += 1;
     }
     region

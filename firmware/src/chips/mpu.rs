@@ -24,7 +24,7 @@ pub struct Region {
     pub access: Access,
     /// SRD bits: a set bit disables the region in that eighth of it. Only for regions of 256 bytes
     /// or more.
-    pub without: u8,
+    pub disabled_eighths: u8,
 }
 
 impl Region {
@@ -38,7 +38,7 @@ impl Region {
             "a region's length is a power of two from 32 on"
         );
         assert!(base.is_multiple_of(len), "a region lies on a multiple of its length");
-        Self { base, len_log2: len.trailing_zeros(), access, without: 0 }
+        Self { base, len_log2: len.trailing_zeros(), access, disabled_eighths: 0 }
     }
 
     /// Value of MPU_RBAR for region `number`: base address, VALID bit, region number.
@@ -60,6 +60,6 @@ impl Region {
             // AP 0b110: read only; TEX 0b000, C 1, B 0: normal memory, write-through cache.
             Access::CachedReadOnly => 0b110 << 24 | 1 << 17,
         };
-        XN | attributes | (self.without as u32) << 8 | (self.len_log2 - 1) << 1 | ENABLE
+        XN | attributes | (self.disabled_eighths as u32) << 8 | (self.len_log2 - 1) << 1 | ENABLE
     }
 }

@@ -7,12 +7,12 @@ use super::polygons::{AreaFileError, Polygons, RingXy};
 
 /// Most folders, documents and multi-geometries in a file, which bounds how deep they nest: a file
 /// with more is refused before it is parsed.
-const MAX_FOLDER_DEPTH: usize = 64;
+const MAX_FOLDERS: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     // The parser recurses for each folder and geometry within another one.
     let nested = ["<Folder", "<Document", "<MultiGeometry"];
-    if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > MAX_FOLDER_DEPTH {
+    if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > MAX_FOLDERS {
         return Err(AreaFileError::malformed(
             "KML that can be read",
             &"it has more than 64 folders",

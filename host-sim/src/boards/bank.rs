@@ -7,19 +7,19 @@ use companion::storage::store::{ErasePermission, File, MAX_READ, Store, UploadSt
 
 use planner_core::field;
 
-use crate::flash::{DeskFlash, LAYOUT};
+use crate::flash::{DESK_FLASH_LAYOUT, DeskFlash};
 
 /// Address of flash bank 2 on the emulated board.
-pub const BANK2: u32 = 0x6000_0000;
-/// Address of the word marks, one byte for each flash word: [`ERASED`], [`WHOLE`] (programmed), or
-/// [`TORN`] while the word is being programmed or erased.
-pub const WORD_MARKS: u32 = 0x6020_0000;
+pub const FLASH_BANK2_ADDRESS: u32 = 0x6000_0000;
+/// Address of the word marks, one byte for each flash word: [`ERASED`], [`PROGRAMMED`]
+/// (programmed), or [`TORN`] while the word is being programmed or erased.
+pub const WORD_MARKS_ADDRESS: u32 = 0x6020_0000;
 pub const ERASED: u8 = 0;
-pub const WHOLE: u8 = 1;
+pub const PROGRAMMED: u8 = 1;
 pub const TORN: u8 = 2;
 /// Address and value of a word in memory by which the board's firmware knows that the bank holds an
 /// image.
-pub const BANK_MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
+pub const BANK_IMAGE_MARK: (u32, u32) = (0x6030_0000, 0x464c_4153);
 
 /// Image of a flash bank after the store accepted an upload of these files into an empty bank. The
 /// other slot of each file is erased.
@@ -28,7 +28,7 @@ pub const BANK_MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
 /// The store refuses a file.
 pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
     let mut flash = DeskFlash::open(None)?;
-    let mut store = Store::mount(LAYOUT, &mut flash);
+    let mut store = Store::mount(DESK_FLASH_LAYOUT, &mut flash);
     let mut settle = |store: &mut Store| {
         let mut read = [0; MAX_READ];
         while let Some(request) = store.poll_request(ErasePermission::Allowed) {
@@ -47,7 +47,7 @@ pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8
         for (i, piece) in bytes.chunks(MAX_DATA).enumerate() {
             let taken = store.take_piece((i * MAX_DATA) as u32, piece);
             ensure!(
-                taken == PieceOutcome::Yes,
+                taken == PieceOutcome::Stored,
                 "a board's store refuses {}: {taken:?}",
                 file.name()
             );

@@ -6,9 +6,11 @@ use std::time::Duration;
 use anyhow::ensure;
 use lock_step::ToBoard;
 
-use super::bank::{BANK_MADE, BANK2, ERASED, TORN, WHOLE, WORD_MARKS};
+use super::bank::{
+    BANK_IMAGE_MARK, ERASED, FLASH_BANK2_ADDRESS, PROGRAMMED, TORN, WORD_MARKS_ADDRESS,
+};
 use super::{EmulatedBoard, GrantResult};
-use crate::flash::LAYOUT;
+use crate::flash::DESK_FLASH_LAYOUT;
 use companion::storage::store::WORD;
 
 /// Most bytes of memory in one message.
@@ -73,12 +75,17 @@ impl EmulatedBoard {
     /// # Errors
     /// The QEMU process has ended, or the image has not the length of a bank.
     pub fn load_flash(&mut self, bank: &[u8]) -> anyhow::Result<()> {
-        ensure!(bank.len() == LAYOUT.len() as usize, "a bank has {} bytes", LAYOUT.len());
-        let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
+        ensure!(
+            bank.len() == DESK_FLASH_LAYOUT.len() as usize,
+            "a bank has {} bytes",
+            DESK_FLASH_LAYOUT.len()
+        );
+        let mark =
+            |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { PROGRAMMED };
         let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
-        self.write_memory(BANK2, bank)?;
-        self.write_memory(WORD_MARKS, &marks)?;
-        self.write_memory(BANK_MADE.0, &BANK_MADE.1.to_le_bytes())
+        self.write_memory(FLASH_BANK2_ADDRESS, bank)?;
+        self.write_memory(WORD_MARKS_ADDRESS, &marks)?;
+        self.write_memory(BANK_IMAGE_MARK.0, &BANK_IMAGE_MARK.1.to_le_bytes())
     }
 
     /// Indices of the flash words that are being programmed or erased now.
@@ -86,7 +93,8 @@ impl EmulatedBoard {
     /// # Errors
     /// The QEMU process has ended.
     pub fn torn_flash_words(&mut self) -> anyhow::Result<Vec<usize>> {
-        let marks = self.read_memory(WORD_MARKS, LAYOUT.len() as usize / WORD)?;
+        let marks =
+            self.read_memory(WORD_MARKS_ADDRESS, DESK_FLASH_LAYOUT.len() as usize / WORD)?;
         Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
     }
 
@@ -94,7 +102,7 @@ impl EmulatedBoard {
     ///
     /// # Errors
     /// The QEMU process has ended.
-    pub fn stack_used(&mut self) -> anyhow::Result<usize> {
+    pub fn max_stack_used(&mut self) -> anyhow::Result<usize> {
         let stack = self.read_memory(STACK_ADDRESS, STACK_LEN)?;
         Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == STACK_PAINT).count())
     }

@@ -182,7 +182,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 /// A new companion with the store in its flash, which holds parameters and uploaded files.
 fn start(config: &Config<VEHICLES>, flash: &mut DeskFlash) -> anyhow::Result<Box<DeskCompanion>> {
-    let store = Store::mount(flash::LAYOUT, flash);
+    let store = Store::mount(flash::DESK_FLASH_LAYOUT, flash);
     let mut companion = new_companion(config.clone())?;
     companion.attach_store(store);
     Ok(companion)

@@ -9,9 +9,9 @@ use std::time::Instant;
 use anyhow::Context;
 use serde::Serialize;
 
-use crate::coverage::check::{self, Findings};
+use crate::coverage::check::{self, CoverageFindings};
 use crate::coverage::sorties::Sortie;
-use crate::coverage::{self, CoveragePlan, Flight, export, page};
+use crate::coverage::{self, CoveragePlan, SortieFlight, export, page};
 use crate::files::ResultFiles;
 use crate::output;
 use crate::quote::quoted_path;
@@ -74,9 +74,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let written = add_flights(&planned, &flights, &mut results)?;
     results.add(output::RESULT_FILES[0], result::json(&result)?.as_bytes())?;
     let timing = Timing {
-        search_s: planned.seconds[0] + planned.seconds[1],
-        assignment_s: planned.seconds[2],
-        plan_s: planned.seconds.iter().sum(),
+        search_s: planned.computing_s[0] + planned.computing_s[1],
+        assignment_s: planned.computing_s[2],
+        plan_s: planned.computing_s.iter().sum(),
         wall_s: began.elapsed().as_secs_f64(),
         ..Timing::default()
     };
@@ -102,7 +102,7 @@ fn extra_file_names(scenario: &Scenario) -> Vec<String> {
 /// of the plans.
 fn add_flights(
     planned: &CoveragePlan<'_>,
-    flights: &[Flight],
+    flights: &[SortieFlight],
     results: &mut ResultFiles,
 ) -> anyhow::Result<Vec<String>> {
     let mut written = Vec::new();
@@ -115,7 +115,7 @@ fn add_flights(
         };
         let items = export::flight_items(planned, sortie, stops);
         let plan = result::json(&export::qgc_plan(planned, route, &items))?;
-        let waypoints = export::waypoints(planned, route, &items);
+        let waypoints = export::waypoints_file(planned, route, &items);
         for (kind, text) in [("plan", plan), ("waypoints", waypoints)] {
             written.push(format!("{name}.{kind}"));
             results.add(&format!("{name}.{kind}"), text.as_bytes())?;
@@ -152,7 +152,7 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
 }
 
 /// The `result.json` of a plan and its check.
-pub(crate) fn cover_result(planned: &CoveragePlan<'_>, findings: &Findings) -> CoverResult {
+pub(crate) fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
     let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
@@ -200,7 +200,7 @@ fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
     vehicles.collect()
 }
 
-fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
+fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Path) {
     let coverage = &result.coverage;
     say!("vehicle  waypoints         layer m  leaves s   cost s   cost m");
     for route in &coverage.routes {
@@ -245,12 +245,12 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
         coverage.lanes,
         coverage.angle_deg
     );
-    if let Some([x, y]) = findings.missing {
+    if let Some([x, y]) = findings.first_missing_cell {
         say!("left out   the first cell is at [{x:.1}, {y:.1}]");
     }
     print_terrain(coverage);
-    if findings.forbidden > 0 {
-        say!("no-fly     {} legs enter a no-fly zone", findings.forbidden);
+    if findings.legs_in_no_fly_zones > 0 {
+        say!("no-fly     {} legs enter a no-fly zone", findings.legs_in_no_fly_zones);
     }
     say!(
         "cost       {:.1} s, {:.1} % above the bound of {:.1} s ({})",
@@ -269,7 +269,7 @@ fn print_batteries(planned: &CoveragePlan<'_>) {
         planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none()
     });
     let longest_s = unknown.map(|sortie| sortie.flown_s).fold(0.0, f32::max);
-    if longest_s > 0.0 && !planned.wanted.batteries {
+    if longest_s > 0.0 && !planned.area_settings.batteries {
         say!("batteries  not checked: vehicles without endurance_s fly up to {longest_s:.0} s");
     }
 }

@@ -60,8 +60,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     // A coverage mission has no roadmap, and no field over level ground: empty files are not
     // written.
     let (roadmap, field) = match mission.scenario.area {
-        None => (&mission.roadmap_file[..], &[][..]),
-        Some(_) => (&[][..], &mission.roadmap_file[..]),
+        None => (&mission.roadmap_or_field_file[..], &[][..]),
+        Some(_) => (&[][..], &mission.roadmap_or_field_file[..]),
     };
     let contents = [starts.as_bytes(), goals.as_bytes(), roadmap, field, &mission.mission_file];
     for (name, bytes) in names.iter().zip(contents).filter(|(_, bytes)| !bytes.is_empty()) {

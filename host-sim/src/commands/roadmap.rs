@@ -52,12 +52,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let scenario = load(scenario, None)?;
             let mut results = ResultFiles::single_file(out)?;
             let mission = Mission::prepare_for(scenario, *board, &Progress::on_terminal())?;
-            results.add_file(out, &mission.roadmap_file)?;
+            results.add_file(out, &mission.roadmap_or_field_file)?;
             results.commit()?;
-            print(&mission.view());
+            print(&mission.roadmap_view());
         }
         Action::Info { file } => {
-            let bytes = files::read(file, files::BINARY_BYTES)
+            let bytes = files::read(file, files::MAX_BINARY_BYTES)
                 .with_context(|| format!("cannot read: {}", quoted_path(file)))?;
             let view =
                 parse(&bytes).with_context(|| format!("not a roadmap: {}", quoted_path(file)))?;

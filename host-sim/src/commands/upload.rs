@@ -48,7 +48,7 @@ pub struct Args {
 /// companion refuses the file, or the link fails.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let path = quoted_path(&args.file);
-    let bytes = files::read(&args.file, files::BINARY_BYTES)
+    let bytes = files::read(&args.file, files::MAX_BINARY_BYTES)
         .with_context(|| format!("cannot read: {path}"))?;
     let board = args.board.unwrap_or(&BOARDS[0]);
     let file = file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;

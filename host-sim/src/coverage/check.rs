@@ -14,50 +14,54 @@ pub use super::flight::TimedFlight;
 use super::flight::{Stop, StopAction};
 use super::heights::{self, HeightFindings};
 pub use super::taken::Picture;
-use super::{CoveragePlan, Flight, taken};
+use super::{CoveragePlan, SortieFlight, taken};
 
 /// Most cells of the grid over the area; a larger area gets larger cells.
 const MAX_CHECKED_CELLS: f64 = 4e7;
 
 /// Result of the check.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings {
+pub struct CoverageFindings {
     /// Photographed cells divided by all cells that count, 0 to 1.
     pub covered_share: f64,
     /// Number of cells that count.
     pub cells: u64,
     /// Centre of the first cell that is not photographed, metres east and north; `None` if all are.
-    pub missing: Option<[f64; 2]>,
+    pub first_missing_cell: Option<[f64; 2]>,
     /// Side of a cell, metres.
     pub cell_m: f64,
     /// Number of pictures.
     pub photos: u64,
     /// Number of waypoints at which no picture is taken.
-    pub left: u64,
+    pub missed_waypoints: u64,
     /// Number of waypoints that are flown more than once.
-    pub twice: u64,
+    pub repeated_waypoints: u64,
     /// Number of flights whose waypoint numbers do not rise or fall by one from picture to picture.
-    pub broken: u64,
+    pub broken_routes: u64,
     /// Number of legs that enter a no-fly zone.
-    pub forbidden: u64,
+    pub legs_in_no_fly_zones: u64,
     /// Heights of lanes above terrain; `None` over level ground, and for pictures.
     pub heights: Option<HeightFindings>,
     /// For each picture, by rising time: its time, seconds, and the number of cells that it is the
     /// first to complete.
-    pub over_time: Vec<(f32, u64)>,
+    pub new_cells_over_time: Vec<(f32, u64)>,
 }
 
-impl Findings {
+impl CoverageFindings {
     /// Whether the area is covered, each waypoint flown once, and no other fault was found.
     pub fn is_clean(&self) -> bool {
         self.covered_share >= 1.0
-            && self.left + self.twice + self.broken + self.forbidden == 0
+            && self.missed_waypoints
+                + self.repeated_waypoints
+                + self.broken_routes
+                + self.legs_in_no_fly_zones
+                == 0
             && self.heights.as_ref().is_none_or(HeightFindings::is_clean)
     }
 }
 
 /// Checks the flights of a coverage plan.
-pub fn check_plan(planned: &CoveragePlan<'_>) -> Findings {
+pub fn check_plan(planned: &CoveragePlan<'_>) -> CoverageFindings {
     let flights: Vec<_> = planned.flights();
     check_flights(planned, &flights_to_check(planned, &flights))
 }
@@ -65,9 +69,9 @@ pub fn check_plan(planned: &CoveragePlan<'_>) -> Findings {
 /// Pairs each planned flight with the id of its vehicle, as [`check_flights`] needs it.
 pub fn flights_to_check<'f>(
     planned: &CoveragePlan<'_>,
-    flights: &'f [Flight],
+    flights: &'f [SortieFlight],
 ) -> Vec<TimedFlight<'f>> {
-    let flown = |(sortie, stops, times_s): &'f Flight| {
+    let flown = |(sortie, stops, times_s): &'f SortieFlight| {
         let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         TimedFlight { vehicle, stops, times_s }
     };
@@ -75,17 +79,17 @@ pub fn flights_to_check<'f>(
 }
 
 /// Checks the waypoints, no-fly zones, heights and pictures of flights.
-pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Findings {
-    let mut findings = Findings::default();
+pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> CoverageFindings {
+    let mut findings = CoverageFindings::default();
     count_waypoints(planned, flights, &mut findings);
     for flight in flights {
         let enters = |pair: &&[Stop]| {
             does_leg_enter_zone(planned, &pair[0].position.xy(), &pair[1].position.xy())
         };
-        findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
+        findings.legs_in_no_fly_zones += flight.stops.windows(2).filter(enters).count() as u64;
     }
     findings.heights = heights::check_heights(planned, flights);
-    CoverageCells::finest_needed(planned).judge_coverage(
+    CoverageCells::fine_enough(planned).count_photographed_cells(
         planned,
         planned_pictures(planned, flights),
         &mut findings,
@@ -100,7 +104,7 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
     let taken = |flight: &TimedFlight<'_>| {
         let vehicle = Some(flight.vehicle);
         let stops = flight.stops.iter().zip(flight.times_s);
-        let photos = stops.filter(|(stop, _)| matches!(stop.act, StopAction::Photo(_)));
+        let photos = stops.filter(|(stop, _)| matches!(stop.action, StopAction::Photo(_)));
         let taken =
             photos.map(|(stop, &t_s)| Picture { vehicle, t_s, position: stop.position, heading });
         taken.collect::<Vec<_>>()
@@ -110,11 +114,15 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
 
 /// Checks pictures that were taken in a flight, by the true position of the camera. [`taken`]
 /// counts waypoints without a picture and those flown twice.
-pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Findings {
-    let (left, twice) = taken::count_waypoints(planned, &pictures);
-    let mut findings =
-        Findings { photos: pictures.len() as u64, left, twice, ..Findings::default() };
-    CoverageCells::finest_needed(planned).judge_coverage(planned, pictures, &mut findings);
+pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> CoverageFindings {
+    let (left, twice) = taken::count_left_and_twice(planned, &pictures);
+    let mut findings = CoverageFindings {
+        photos: pictures.len() as u64,
+        missed_waypoints: left,
+        repeated_waypoints: twice,
+        ..CoverageFindings::default()
+    };
+    CoverageCells::fine_enough(planned).count_photographed_cells(planned, pictures, &mut findings);
     findings
 }
 
@@ -128,11 +136,11 @@ pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32
 fn count_waypoints(
     planned: &CoveragePlan<'_>,
     flights: &[TimedFlight<'_>],
-    findings: &mut Findings,
+    findings: &mut CoverageFindings,
 ) {
     let mut times = vec![0u32; planned.tracks.waypoint_count() as usize];
     for flight in flights {
-        let photos = flight.stops.iter().filter_map(|stop| match stop.act {
+        let photos = flight.stops.iter().filter_map(|stop| match stop.action {
             StopAction::Photo(number) => Some(number),
             _ => None,
         });
@@ -141,10 +149,10 @@ fn count_waypoints(
         findings.photos += numbers.len() as u64;
         let step =
             |by: i64| numbers.windows(2).all(|pair| i64::from(pair[1]) - i64::from(pair[0]) == by);
-        findings.broken += u64::from(!step(1) && !step(-1));
+        findings.broken_routes += u64::from(!step(1) && !step(-1));
     }
-    findings.left = times.iter().filter(|times| **times == 0).count() as u64;
-    findings.twice = times.iter().filter(|times| **times > 1).count() as u64;
+    findings.missed_waypoints = times.iter().filter(|times| **times == 0).count() as u64;
+    findings.repeated_waypoints = times.iter().filter(|times| **times > 1).count() as u64;
 }
 
 /// Whether a straight leg enters a no-fly zone. The leg is split where it crosses edges of the
@@ -152,7 +160,7 @@ fn count_waypoints(
 fn does_leg_enter_zone(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> bool {
     let wide = |place: &Flat| [f64::from(place.x), f64::from(place.y)];
     let (a, b) = (wide(from), wide(to));
-    planned.wanted.rings_of(RingKind::NoFly).any(|ring| {
+    planned.area_settings.rings_of(RingKind::NoFly).any(|ring| {
         let ring: Vec<[f64; 2]> = ring.iter().map(wide).collect();
         let mut shares = vec![0.0, 1.0];
         for (c, d) in ring.iter().zip(ring.iter().cycle().skip(1)) {
@@ -195,7 +203,7 @@ impl CoverageCells {
         let along = [f64::from(along.x), f64::from(along.y)];
         let mut cells = Self { along, low: [f64::INFINITY; 2], side: 0.0, size: [0; 2] };
         let mut high = [f64::NEG_INFINITY; 2];
-        for vertex in planned.wanted.rings_of(RingKind::Outer).flatten() {
+        for vertex in planned.area_settings.rings_of(RingKind::Outer).flatten() {
             let place = cells.to_lane_frame(vertex);
             for axis in 0..2 {
                 cells.low[axis] = cells.low[axis].min(place[axis]);
@@ -203,7 +211,7 @@ impl CoverageCells {
             }
         }
         let [wide, tall] = [high[0] - cells.low[0], high[1] - cells.low[1]];
-        let lane_m = f64::from(planned.wanted.spacing.lane_m);
+        let lane_m = f64::from(planned.area_settings.spacing.lane_m);
         cells.side = (lane_m / 10.0).max((wide * tall / MAX_CHECKED_CELLS).sqrt());
         cells.size = [wide, tall].map(|side| (side / cells.side).ceil().max(1.0) as usize);
         cells
@@ -211,10 +219,11 @@ impl CoverageCells {
 
     /// A grid whose cells are halved until at least one of them counts, so that an area narrower
     /// than a cell is checked too; stops at [`MAX_CHECKED_CELLS`].
-    fn finest_needed(planned: &CoveragePlan<'_>) -> Self {
+    fn fine_enough(planned: &CoveragePlan<'_>) -> Self {
         let mut cells = Self::new(planned);
         let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MAX_CHECKED_CELLS;
-        while !cells.cells_inside_area(planned, cells.size, 0.5).contains(&true) && most(cells.size)
+        while !cells.points_inside_area(planned, cells.size, 0.5).contains(&true)
+            && most(cells.size)
         {
             cells.side /= 2.0;
             cells.size = cells.size.map(|count| 2 * count);
@@ -230,13 +239,13 @@ impl CoverageCells {
     /// For each point of a grid, row by row: whether it lies in the area and outside no-fly zones.
     /// The points are the centres of the cells (`offset` 0.5), or their corners (`offset` 0, one
     /// more column and row).
-    fn cells_inside_area(
+    fn points_inside_area(
         &self,
         planned: &CoveragePlan<'_>,
         [columns, rows]: [usize; 2],
         offset: f64,
     ) -> Vec<bool> {
-        let area = planned.wanted;
+        let area = planned.area_settings;
         let rings = |kind| {
             let turned =
                 |ring: &[Flat]| ring.iter().map(|v| self.to_lane_frame(v)).collect::<Vec<_>>();
@@ -290,8 +299,9 @@ impl CoverageCells {
     /// largest rectangle of the same aspect ratio, parallel to the lanes, that lies within the
     /// footprint.
     fn half_footprint(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [f64; 2] {
-        let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.height_m);
-        let above_m = picture.position.z - planned.wanted.ground_m(&picture.position.xy());
+        let (footprint, height_m) =
+            (planned.area_settings.spacing.footprint, planned.area_settings.height_m);
+        let above_m = picture.position.z - planned.area_settings.ground_m(&picture.position.xy());
         let half = [f64::from(footprint.along_m) / 2.0, f64::from(footprint.across_m) / 2.0];
         let askew = f64::from(picture.heading) - self.along[1].atan2(self.along[0]);
         let (cos, sin) = (askew.cos().abs(), askew.sin().abs());
@@ -312,14 +322,14 @@ impl CoverageCells {
         })
     }
 
-    fn judge_coverage(
+    fn count_photographed_cells(
         &self,
         planned: &CoveragePlan<'_>,
         mut pictures: Vec<Picture>,
-        findings: &mut Findings,
+        findings: &mut CoverageFindings,
     ) {
-        let spacing = planned.wanted.spacing;
-        let counted = self.cells_inside_area(planned, self.size, 0.5);
+        let spacing = planned.area_settings.spacing;
+        let counted = self.points_inside_area(planned, self.size, 0.5);
         // Neighbouring pictures overlap by a cell or more: one must show all corners of a cell.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
@@ -331,7 +341,7 @@ impl CoverageCells {
         let mut corners: Vec<bool> = match whole {
             true => vec![false; (columns + 1) * (rows + 1)],
             false => self
-                .cells_inside_area(planned, [columns + 1, rows + 1], 0.0)
+                .points_inside_area(planned, [columns + 1, rows + 1], 0.0)
                 .iter()
                 .map(|held| !held)
                 .collect(),
@@ -376,12 +386,12 @@ impl CoverageCells {
                     }
                 }
             }
-            findings.over_time.push((time, new));
+            findings.new_cells_over_time.push((time, new));
         }
         findings.cell_m = self.side;
         findings.cells = counted.iter().filter(|counted| **counted).count() as u64;
         let missing = counted.iter().zip(&shown).position(|(counted, shown)| *counted && !shown);
-        findings.missing = missing.map(|cell| {
+        findings.first_missing_cell = missing.map(|cell| {
             let at = |axis: usize, index: usize| self.low[axis] + (index as f64 + 0.5) * self.side;
             let (u, v) = (at(0, cell % columns), at(1, cell / columns));
             [u * self.along[0] - v * self.along[1], u * self.along[1] + v * self.along[0]]

@@ -13,9 +13,9 @@ use planner_core::coverage::pack::Route;
 use planner_core::frames::Geodetic;
 use serde_json::{Value, json};
 
-use super::flight::{Stop, StopAction, heading_deg};
+use super::flight::{Stop, StopAction, course_deg};
 use super::sorties::Sortie;
-use super::{CoveragePlan, Flight};
+use super::{CoveragePlan, SortieFlight};
 use crate::scenario::AutopilotKind;
 use crate::scenario::coverage::{HeadingRule, Trigger};
 
@@ -33,7 +33,7 @@ const FRAME_MISSION: u8 = 2;
 
 /// One MAVLink mission item.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Item {
+pub struct MissionItem {
     /// Command: a MAV_CMD number.
     pub command: u16,
     /// Coordinate frame: a MAV_FRAME number.
@@ -46,7 +46,7 @@ pub struct Item {
     pub place: [f64; 3],
 }
 
-impl Item {
+impl MissionItem {
     fn from_command(command: u16, params: [f64; 4]) -> Self {
         Self { command, frame: FRAME_MISSION, params: params.map(Some), place: [0.0; 3] }
     }
@@ -56,23 +56,26 @@ impl Item {
 /// ground there.
 fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
-    Geodetic { alt_m: planned.wanted.origin.alt_m + f64::from(start.z), ..planned.geodetic(&start) }
+    Geodetic {
+        alt_m: planned.area_settings.origin.alt_m + f64::from(start.z),
+        ..planned.geodetic(&start)
+    }
 }
 
 /// Yaw commanded at stop `index`, degrees clockwise from north, rounded to 0.01: the lanes' common
 /// direction, or, with [`HeadingRule::Lane`], the direction of flight along the stop's lane.
 fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
     let along = planned.tracks.lane_direction();
-    let sweep = heading_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
+    let sweep = course_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
     let own = stops[index].lane;
     let neighbours = [index.checked_sub(1).map(|i| (i, index)), Some((index, index + 1))];
     let step = neighbours.into_iter().flatten().find_map(|(a, b)| {
         let (from, to) = (stops.get(a)?, stops.get(b)?);
         let apart = (to.position - from.position).xy().norm() > 1e-3;
         (apart && own.is_some() && from.lane == own && to.lane == own)
-            .then(|| heading_deg(&from.position, &to.position))
+            .then(|| course_deg(&from.position, &to.position))
     });
-    let yaw = match planned.wanted.heading {
+    let yaw = match planned.area_settings.heading {
         HeadingRule::Sweep => sweep,
         HeadingRule::Lane => step.unwrap_or(sweep),
     };
@@ -80,7 +83,11 @@ fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
 }
 
 /// All mission items of one flight, from its delay and take-off to the return.
-pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item> {
+pub fn flight_items(
+    planned: &CoveragePlan<'_>,
+    sortie: &Sortie,
+    stops: &[Stop],
+) -> Vec<MissionItem> {
     let (scenario, route) = (planned.scenario, &sortie.route);
     let home = home_position(planned, route);
     let start = scenario.vehicles[usize::from(route.vehicle)].start;
@@ -92,7 +99,7 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
             round_to(f64::from(position.z - start.z), 1e3),
         ]
     };
-    let waypoint = |index: usize| Item {
+    let waypoint = |index: usize| MissionItem {
         command: NAV_WAYPOINT,
         frame: FRAME_RELATIVE,
         params: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, stops, index))],
@@ -102,26 +109,31 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
     let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
     let mut items = Vec::new();
     if sortie.depart_s > 0.0 {
-        items.push(Item::from_command(NAV_DELAY, [f64::from(sortie.depart_s), -1.0, -1.0, -1.0]));
+        items.push(MissionItem::from_command(
+            NAV_DELAY,
+            [f64::from(sortie.depart_s), -1.0, -1.0, -1.0],
+        ));
     }
     items.extend([
-        Item {
+        MissionItem {
             command: NAV_TAKEOFF,
             frame: FRAME_RELATIVE,
             params: [Some(0.0), Some(0.0), Some(0.0), None],
             place: [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(top, 1e3)],
         },
-        Item::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
+        MissionItem::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
     ]);
     for (index, stop) in stops.iter().enumerate().skip(2) {
         let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
         let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;
         let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
-        match (stop.act, planned.wanted.trigger) {
-            (StopAction::Pad, _) => items.push(Item::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
+        match (stop.action, planned.area_settings.trigger) {
+            (StopAction::Pad, _) => {
+                items.push(MissionItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]))
+            }
             (StopAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
-                items.push(Item::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
+                items.push(MissionItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
                 if let Some(last) = items.last_mut() {
                     last.place[0] = 1.0;
@@ -134,19 +146,22 @@ pub fn flight_items(planned: &CoveragePlan<'_>, sortie: &Sortie, stops: &[Stop])
                 if trigger == Trigger::Distance && begins && !ends {
                     let mut later =
                         stops[index + 1..].iter().take_while(|next| next.lane == stop.lane);
-                    let next = later.find(|next| matches!(next.act, StopAction::Photo(_)));
-                    let step = next.map_or(planned.wanted.spacing.waypoint_m, |next| {
+                    let next = later.find(|next| matches!(next.action, StopAction::Photo(_)));
+                    let step = next.map_or(planned.area_settings.spacing.waypoint_m, |next| {
                         (next.position - stop.position).xy().norm()
                     });
                     // Takes a picture at once, then one each `step` metres.
                     let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
-                    items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
+                    items.push(MissionItem::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
                     // Takes the last picture at once and stops the trigger. Autopilots check the
                     // distance some times a second, so pictures are a little further apart than
                     // `step`, and the last one would otherwise lie beyond the lane's end.
-                    items.push(Item::from_command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
+                    items.push(MissionItem::from_command(
+                        DO_SET_CAM_TRIGG_DIST,
+                        [0.0, 0.0, 1.0, 0.0],
+                    ));
                 }
             }
             (StopAction::Transit | StopAction::Lane, _) => items.push(waypoint(index)),
@@ -160,10 +175,10 @@ fn round_to(value: f64, by: f64) -> f64 {
 }
 
 /// The mission of one flight as a QGroundControl `.plan` document (JSON).
-pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Value {
+pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[MissionItem]) -> Value {
     let home = home_position(planned, route);
     let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
-    let item = |(index, item): (usize, &Item)| {
+    let item = |(index, item): (usize, &MissionItem)| {
         let mut params: Vec<Value> =
             item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
         params.extend(item.place.map(Value::from));
@@ -211,7 +226,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> Va
 }
 
 /// The mission of one flight as `.waypoints` text: one item a line, home first.
-pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> String {
+pub fn waypoints_file(planned: &CoveragePlan<'_>, route: &Route, items: &[MissionItem]) -> String {
     let home = home_position(planned, route);
     let mut text = "QGC WPL 110\n".to_owned();
     let mut line =
@@ -239,14 +254,14 @@ pub fn waypoints(planned: &CoveragePlan<'_>, route: &Route, items: &[Item]) -> S
 
 /// A CSV table with every stop of every flight: vehicle, order, time, action, waypoint number where
 /// a picture is taken, WGS84 and ENU position, sortie, and height of the ground there.
-pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
+pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> String {
     let mut text =
         "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n"
             .to_owned();
     for (sortie, stops, times) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
-            let (act, number) = match stop.act {
+            let (act, number) = match stop.action {
                 StopAction::Pad => ("pad", String::new()),
                 StopAction::Transit => ("transit", String::new()),
                 StopAction::Lane => ("lane", String::new()),
@@ -262,7 +277,7 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
                 p.y,
                 p.z,
                 sortie.number,
-                planned.wanted.ground_m(&p.xy())
+                planned.area_settings.ground_m(&p.xy())
             );
         }
     }
@@ -271,7 +286,7 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[Flight]) -> String {
 
 /// GeoJSON features: the rings of the area, its holes and no-fly zones, and a line along the lanes
 /// of each flight.
-pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
+pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Value {
     let place = |x: f32, y: f32| {
         let place = planned.geodetic(&Point::new(x, y, 0.0));
         json!([round_to(place.lon_deg, 1e9), round_to(place.lat_deg, 1e9)])
@@ -279,7 +294,7 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
     let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];
     let mut features = Vec::new();
     for (kind, name) in kinds {
-        for ring in planned.wanted.rings_of(kind) {
+        for ring in planned.area_settings.rings_of(kind) {
             let mut places: Vec<Value> = ring.iter().map(|v| place(v.x, v.y)).collect();
             places.extend(places.first().cloned());
             features.push(json!({
@@ -290,8 +305,9 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Value {
         }
     }
     for (sortie, stops, _) in flights {
-        let photos =
-            stops.iter().filter(|stop| matches!(stop.act, StopAction::Photo(_) | StopAction::Lane));
+        let photos = stops
+            .iter()
+            .filter(|stop| matches!(stop.action, StopAction::Photo(_) | StopAction::Lane));
         let places: Vec<Value> =
             photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
         let geometry = match places.as_slice() {

@@ -37,7 +37,7 @@ pub struct Stop {
     /// Position, metres ENU.
     pub position: Point,
     /// Action at the stop.
-    pub act: StopAction,
+    pub action: StopAction,
     /// Index of the lane that the stop lies on; `None` outside lanes.
     pub lane: Option<u16>,
 }
@@ -58,10 +58,10 @@ pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
         let index = usize::from(route.vehicle);
         (&planned.vehicles[index], planned.scenario.vehicles[index].start)
     };
-    let heights = planned.wanted.heights;
+    let heights = planned.area_settings.heights;
     let layer_m = heights.mission_m + f32::from(route.layer) * heights.layer_m;
     let at = |place: &Flat, height_m: f32| Point::new(place.x, place.y, height_m);
-    let stop = |position: Point, act: StopAction| Stop { position, act, lane: None };
+    let stop = |position: Point, act: StopAction| Stop { position, action: act, lane: None };
     let (first, last) = route.end_waypoints();
     let ends = [first, last].map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.place));
     let mut stops =
@@ -104,7 +104,8 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
                     from = between.last().copied().unwrap_or(from);
                 }
                 between.pop();
-                let stop = |position: Point| Stop { position, act: StopAction::Lane, lane: None };
+                let stop =
+                    |position: Point| Stop { position, action: StopAction::Lane, lane: None };
                 stops.extend(between.into_iter().map(stop));
                 from
             }
@@ -119,9 +120,9 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
 /// Point where the vehicle begins its first lane: at the height of the pictures, or over terrain at
 /// the height from which the lane has the fewest corners.
 fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Point {
-    match &planned.following {
+    match &planned.terrain_following {
         Some(following) => following.start_point(begin, end),
-        None => Point::new(begin.x, begin.y, planned.wanted.heights.mission_m),
+        None => Point::new(begin.x, begin.y, planned.area_settings.heights.mission_m),
     }
 }
 
@@ -129,7 +130,9 @@ fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Poi
 /// ground there is no other.
 fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point> {
     let mut corners = Vec::new();
-    let Some(following) = &planned.following else { return vec![Point::new(to.x, to.y, from.z)] };
+    let Some(following) = &planned.terrain_following else {
+        return vec![Point::new(to.x, to.y, from.z)];
+    };
     let followed: Result<(), Infallible> = following.corners_to(from, to, |corner| {
         corners.push(corner);
         Ok(())
@@ -150,7 +153,7 @@ fn add_picture_stops(
     stops: &mut Vec<Stop>,
 ) {
     let along_m = |place: &Flat| (place - path[0].xy()).norm();
-    let by_waypoint = planned.wanted.trigger == Trigger::Waypoint;
+    let by_waypoint = planned.area_settings.trigger == Trigger::Waypoint;
     let mut leg = 0;
     for (number, place) in places {
         let at_m = along_m(place);
@@ -159,7 +162,7 @@ fn add_picture_stops(
             let corner = path[leg];
             // With trigger by waypoint the stop of the picture already stands for this corner.
             if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
-                stops.push(Stop { position: corner, act: StopAction::Lane, lane });
+                stops.push(Stop { position: corner, action: StopAction::Lane, lane });
             }
         }
         let end = path[(leg + 1).min(path.len() - 1)];
@@ -171,7 +174,7 @@ fn add_picture_stops(
         };
         let height_m = path[leg].z + (end.z - path[leg].z) * share;
         let position = Point::new(place.x, place.y, height_m);
-        stops.push(Stop { position, act: StopAction::Photo(*number), lane });
+        stops.push(Stop { position, action: StopAction::Photo(*number), lane });
     }
 }
 
@@ -186,7 +189,7 @@ fn corners_between(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> Fixed<
 }
 
 /// Course from `from` to `to`, degrees clockwise from north, 0 to 360.
-pub fn heading_deg(from: &Point, to: &Point) -> f32 {
+pub fn course_deg(from: &Point, to: &Point) -> f32 {
     (to.x - from.x).atan2(to.y - from.y).to_degrees().rem_euclid(360.0)
 }
 

@@ -2,7 +2,7 @@
 
 use planner_core::plan::SwarmPlan;
 
-use super::check::{self, Findings, Picture};
+use super::check::{self, CoverageFindings, Picture};
 use super::{CoveragePlan, page, result};
 use crate::report::{Outline, Plot};
 use crate::result::CoverageResult;
@@ -34,7 +34,7 @@ pub fn judge_pictures<const V: usize, const W: usize>(
     for sortie in &mut planned.sorties {
         sortie.depart_s = plan.flights[usize::from(sortie.route.vehicle)].depart_s;
     }
-    let findings: Findings = check::check_pictures(&planned, pictures);
+    let findings: CoverageFindings = check::check_pictures(&planned, pictures);
     Ok(FlightFindings {
         result: result::coverage_result(&planned, &findings),
         outlines: page::area_outlines(&planned),

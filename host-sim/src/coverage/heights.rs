@@ -41,7 +41,7 @@ pub fn check_heights(
     planned: &CoveragePlan<'_>,
     flights: &[TimedFlight<'_>],
 ) -> Option<HeightFindings> {
-    let terrain = planned.wanted.terrain.as_ref()?;
+    let terrain = planned.area_settings.terrain.as_ref()?;
     let sample_m = (terrain.grid.cell_m() / 4.0).min(MAX_SAMPLE_SPACING_M);
     let mut findings = HeightFindings {
         least_m: f32::INFINITY,
@@ -55,13 +55,14 @@ pub fn check_heights(
             planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
         let vehicle = &planned.vehicles[index];
         for leg in flight.stops.windows(2) {
-            if leg.iter().any(|stop| stop.act == StopAction::Pad) {
+            if leg.iter().any(|stop| stop.action == StopAction::Pad) {
                 continue;
             }
             let (from, to) = (leg[0].position, leg[1].position);
             let [least_m, most_m] = height_range_above_ground(planned, &from, &to, sample_m);
-            findings.too_low += u64::from(least_m < planned.wanted.height_m - HEIGHT_ROUNDING_M);
-            if leg.iter().any(|stop| stop.act == StopAction::Transit) {
+            findings.too_low +=
+                u64::from(least_m < planned.area_settings.height_m - HEIGHT_ROUNDING_M);
+            if leg.iter().any(|stop| stop.action == StopAction::Transit) {
                 continue;
             }
             findings.least_m = findings.least_m.min(least_m);
@@ -89,13 +90,13 @@ fn height_range_above_ground(
     let parts = (step.xy().norm() / sample_m).ceil().max(1.0) as usize;
     let heights = (0..=parts).map(|part| {
         let at = from + step * (part as f32 / parts as f32);
-        at.z - planned.wanted.ground_m(&at.xy())
+        at.z - planned.area_settings.ground_m(&at.xy())
     });
     heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], h| [least.min(h), most.max(h)])
 }
 
 /// Whether a stop is at the height of the lanes: on a lane or on the way from one lane to the next,
 /// not on a transit in a layer.
-pub fn is_on_lane_or_transit(stop: &Stop) -> bool {
-    matches!(stop.act, StopAction::Photo(_) | StopAction::Lane)
+pub fn is_at_lane_height(stop: &Stop) -> bool {
+    matches!(stop.action, StopAction::Photo(_) | StopAction::Lane)
 }

@@ -11,7 +11,7 @@ use crate::files::{self, ResultFiles};
 use crate::quote::quoted_path;
 
 /// Name of the file with the pictures taken so far.
-const NAME: &str = "pictures.json";
+const FILE_NAME: &str = "pictures.json";
 
 /// Time, seconds; east, north and up, metres; heading, radians: one picture in the file.
 type PictureRow = [f32; 5];
@@ -28,11 +28,11 @@ impl PictureStore {
     /// # Errors
     /// The file cannot be read, or holds no list of pictures.
     pub fn open(dir: &Path) -> anyhow::Result<Self> {
-        let path = dir.join(NAME);
+        let path = dir.join(FILE_NAME);
         let mut before = Vec::new();
         if path.exists() {
             let bad = || format!("no pictures of earlier flights: {}", quoted_path(&path));
-            let text = files::read(&path, files::BINARY_BYTES).with_context(bad)?;
+            let text = files::read(&path, files::MAX_BINARY_BYTES).with_context(bad)?;
             let rows: Vec<PictureRow> = serde_json::from_slice(&text).with_context(bad)?;
             // Pictures of earlier flights count as taken at time 0, before this flight.
             let picture = |[_, x, y, z, heading]: PictureRow| Picture {
@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(pictures, [Picture { t_s: 0.0, ..picture }, Picture { t_s: 1.0, ..picture }]);
         kept.store_pictures(&pictures, true).unwrap();
         assert!(PictureStore::open(dir.path()).unwrap().before.is_empty());
-        std::fs::write(dir.path().join(NAME), "[[1, 2]]").unwrap();
+        std::fs::write(dir.path().join(FILE_NAME), "[[1, 2]]").unwrap();
         assert!(PictureStore::open(dir.path()).is_err());
     }
 }

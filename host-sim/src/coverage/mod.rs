@@ -46,7 +46,7 @@ const MAX_OFF_GROUND_M: f32 = 1.5;
 
 /// A sortie, its stops, and the time at which each stop is passed, seconds after the mission's
 /// start.
-pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
+pub type SortieFlight = (Sortie, Vec<flight::Stop>, Vec<f32>);
 
 impl<'a> CoveragePlan<'a> {
     /// Plans the coverage mission of a scenario by the given method.
@@ -80,7 +80,7 @@ impl<'a> CoveragePlan<'a> {
             .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
         let vehicles: Vec<Vehicle> =
             scenario.vehicles.iter().map(|v| planner_vehicle(v, scenario)).collect();
-        check_places(scenario, &area, &vehicles)?;
+        check_starts_outside_zones(scenario, &area, &vehicles)?;
         let failed = |error: CoverageError| explain_error(error, wanted, scenario.vehicles.len());
         let began = Instant::now();
         let mut transit = Box::new(Transit::empty());
@@ -109,8 +109,8 @@ impl<'a> CoveragePlan<'a> {
         let following = terrain_following(wanted)?;
         let mut planned = Self {
             scenario,
-            wanted,
-            following,
+            area_settings: wanted,
+            terrain_following: following,
             area,
             method,
             vehicles,
@@ -121,7 +121,7 @@ impl<'a> CoveragePlan<'a> {
             plan,
             shares,
             lower_bound_s,
-            seconds,
+            computing_s: seconds,
         };
         planned.sorties = match wanted.batteries {
             true => planned.cut_into_sorties()?,
@@ -136,7 +136,7 @@ impl<'a> CoveragePlan<'a> {
     /// not used. ENU heights cannot be used far away: the plane that touches the earth at the
     /// origin is 780 m above the ground 100 km away.
     pub fn geodetic(&self, place: &Point) -> Geodetic {
-        let origin = &self.wanted.origin;
+        let origin = &self.area_settings.origin;
         let mut up_m = 0.0;
         let mut found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
         for _ in 0..3 {
@@ -148,7 +148,7 @@ impl<'a> CoveragePlan<'a> {
 
     /// The flight of each sortie: its stops, and the time at which each is passed, seconds after
     /// the mission's start.
-    pub fn flights(&self) -> Vec<Flight> {
+    pub fn flights(&self) -> Vec<SortieFlight> {
         let flight = |sortie: &Sortie| {
             let stops = flight::route_stops(self, &sortie.route);
             let mut times_s = flight::stop_times_s(self, &sortie.route, &stops);
@@ -186,7 +186,7 @@ impl<'a> CoveragePlan<'a> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
             let vehicle = &self.scenario.vehicles[index];
-            let lasts_s = sorties::battery_duration_s(vehicle);
+            let lasts_s = sorties::battery_hover_s(vehicle);
             let too_long = |error: LaneTooLong| {
                 anyhow::anyhow!(
                     "battery too small: {}: vehicle {} would fly {:.0} s for lane {} alone; its battery lasts {lasts_s:.0} s, \
@@ -229,7 +229,7 @@ impl<'a> CoveragePlan<'a> {
                 bail!(
                     "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: \
                      fewer vehicles, or places further apart",
-                    self.wanted.place
+                    self.area_settings.place
                 );
             };
             self.least_separation_m = self.least_separation_m.min(least_m);
@@ -306,8 +306,8 @@ fn build_tracks(
     let (angle_deg, margin_m) = (wanted.angle_deg, wanted.margin_m);
     let pattern = LanePattern { spacing: wanted.usable, angle_deg, margin_m, search_steps };
     let mut tracks = Box::new(Tracks::new());
-    let mut workspace = Box::new(tracks::Workspace::<MAX_VERTICES>::new());
-    tracks::build(area, &pattern, transit, &mut workspace, &mut tracks)?;
+    let mut workspace = Box::new(tracks::LaneWorkspace::<MAX_VERTICES>::new());
+    tracks::build_lanes(area, &pattern, transit, &mut workspace, &mut tracks)?;
     Ok(tracks)
 }
 
@@ -316,7 +316,7 @@ fn build_tracks(
 ///
 /// # Errors
 /// A vehicle starts too far above or below the ground; the error names it.
-pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
+pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
     let above_m =
         |vehicle: &crate::scenario::Vehicle| vehicle.start.z - area.ground_m(&vehicle.start.xy());
@@ -334,7 +334,11 @@ pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
 }
 
 /// Checks that no vehicle starts inside a no-fly zone.
-fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> anyhow::Result<()> {
+fn check_starts_outside_zones(
+    scenario: &Scenario,
+    area: &Area<'_>,
+    vehicles: &[Vehicle],
+) -> anyhow::Result<()> {
     if let Some(index) = vehicles.iter().position(|vehicle| area.is_in_no_fly_zone(&vehicle.place))
     {
         let place = &scenario.vehicle_places[index];
@@ -349,7 +353,7 @@ fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> a
 /// The planner's description of a vehicle: pad, speeds and weight.
 fn planner_vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
-    let [climb_mps, descend_mps] = vehicle.climbs_mps();
+    let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
     Vehicle {
         place,
         home: place,

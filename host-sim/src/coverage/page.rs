@@ -5,9 +5,9 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
-use super::check::Findings;
+use super::check::CoverageFindings;
 use super::flight::Stop;
-use super::{CoveragePlan, Flight, parts};
+use super::{CoveragePlan, SortieFlight, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
 /// Spacing of the points of a height profile along a path, metres.
@@ -16,8 +16,8 @@ const PROFILE_SPACING_M: f32 = 5.0;
 /// All data of the report page of a coverage plan.
 pub fn report_data(
     planned: &CoveragePlan<'_>,
-    flights: &[Flight],
-    findings: &Findings,
+    flights: &[SortieFlight],
+    findings: &CoverageFindings,
     result: serde_json::Value,
 ) -> ReportData {
     let scenario = planned.scenario;
@@ -55,11 +55,11 @@ pub fn report_data(
 /// Plots of the share photographed and, over terrain, of the heights.
 fn coverage_plots(
     planned: &CoveragePlan<'_>,
-    flights: &[Flight],
-    findings: &Findings,
+    flights: &[SortieFlight],
+    findings: &CoverageFindings,
 ) -> Vec<Plot> {
     let mut plots = vec![photographed_share_plot(findings)];
-    if planned.following.is_some() {
+    if planned.terrain_following.is_some() {
         plots.push(height_profile_plot(planned, flights));
     }
     plots
@@ -67,7 +67,7 @@ fn coverage_plots(
 
 /// Plot with two curves for each flight: the height of its path and that of the ground below it,
 /// metres, over time.
-fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Plot {
+fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Plot {
     let mut curves = Vec::new();
     for (sortie, stops, times_s) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
@@ -81,7 +81,7 @@ fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[Flight]) -> Plot {
                 let (at, t_s) =
                     (leg[0].position + step * share, times[0] + (times[1] - times[0]) * share);
                 for (curve, height_m) in
-                    [(&mut path, at.z), (&mut ground, planned.wanted.ground_m(&at.xy()))]
+                    [(&mut path, at.z), (&mut ground, planned.area_settings.ground_m(&at.xy()))]
                 {
                     curve.t_s.push(t_s);
                     curve.values.push(height_m);
@@ -102,17 +102,21 @@ pub(super) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
     ];
     let outline = |ring: &[Flat], kind| Outline {
         kind,
-        points: ring.iter().map(|v| Point::new(v.x, v.y, planned.wanted.ground_m(v))).collect(),
+        points: ring
+            .iter()
+            .map(|v| Point::new(v.x, v.y, planned.area_settings.ground_m(v)))
+            .collect(),
     };
-    let shown = |(kind, shown)| planned.wanted.rings_of(kind).map(move |ring| outline(ring, shown));
+    let shown =
+        |(kind, shown)| planned.area_settings.rings_of(kind).map(move |ring| outline(ring, shown));
     kinds.into_iter().flat_map(shown).collect()
 }
 
 /// Plot of the share of the area that pictures show, per cent, over time.
-pub(super) fn photographed_share_plot(findings: &Findings) -> Plot {
+pub(super) fn photographed_share_plot(findings: &CoverageFindings) -> Plot {
     let mut cells = 0;
     let mut curve = Curve { name: "photographed".to_owned(), ..Curve::default() };
-    for (time, new) in &findings.over_time {
+    for (time, new) in &findings.new_cells_over_time {
         cells += new;
         curve.t_s.push(*time);
         curve.values.push(100.0 * cells as f32 / findings.cells.max(1) as f32);

@@ -8,12 +8,12 @@ use planner_core::Point;
 use planner_core::flight::{Flight as PathFlight, Task, WaypointRange};
 
 use super::CoveragePlan;
-use super::Flight;
+use super::SortieFlight;
 use super::check::{self, Picture};
 use super::flight::{Stop, StopAction};
 use crate::capacity::WAYPOINTS;
 use crate::mission::{Mission, SwarmPlan};
-use crate::report::{CoverageLayers, Division, Footprint, Part, Taken};
+use crate::report::{CoverageLayers, Division, Footprint, Part, WaypointTransfer};
 use crate::swarm::Flight as Flown;
 use crate::swarm::divisions::Division as Begun;
 
@@ -21,10 +21,10 @@ use crate::swarm::divisions::Division as Begun;
 type WaypointOwners = BTreeMap<u32, u8>;
 
 /// Coverage data of the report page for a plan that was not flown.
-pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[Flight]) -> CoverageLayers {
+pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> CoverageLayers {
     let mut parts: Vec<Part> = Vec::new();
     for (sortie, stops, _) in flights {
-        let photos = |stop: &&Stop| matches!(stop.act, StopAction::Photo(_));
+        let photos = |stop: &&Stop| matches!(stop.action, StopAction::Photo(_));
         let photos: Vec<&Stop> = stops.iter().filter(photos).collect();
         let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
         let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);
@@ -73,7 +73,7 @@ pub fn flown_layers(
         losses.extend((division.number > 0).then_some(&division.lots[..]));
         let rest = match losses.is_empty() && flight.done.is_empty() {
             true => None,
-            false => Some(mission.plan_rest(&flight.done, losses.iter().copied())?),
+            false => Some(mission.plan_remaining(&flight.done, losses.iter().copied())?),
         };
         let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
         let own = waypoint_owners(flights);
@@ -108,7 +108,7 @@ fn coverage_layers(
         corners,
     };
     let footprints = pictures.iter().zip(corners).map(footprint).collect();
-    CoverageLayers { lane_m: planned.wanted.spacing.lane_m, divisions, footprints }
+    CoverageLayers { lane_m: planned.area_settings.spacing.lane_m, divisions, footprints }
 }
 
 fn flight_part(flight: &PathFlight<WAYPOINTS>) -> Part {
@@ -128,8 +128,8 @@ fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
     let mut owners = WaypointOwners::new();
     for flight in flights {
         let Task::Photograph(photographs) = &flight.task else { continue };
-        for range in
-            photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: u32::MAX })
+        for range in photographs
+            .waypoints_of_pictures(&flight.path, WaypointRange { first: 0, end: u32::MAX })
         {
             owners.extend((range.first..range.end).map(|number| (number, flight.id)));
         }
@@ -138,12 +138,15 @@ fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
 }
 
 /// Numbers of waypoints that went from one vehicle to another, by pair of vehicles.
-fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<Taken> {
+fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<WaypointTransfer> {
     let mut counts = BTreeMap::<(u8, u8), u32>::new();
     for (number, to) in now {
         if let Some(from) = before.get(number).filter(|from| *from != to) {
             *counts.entry((*from, *to)).or_default() += 1;
         }
     }
-    counts.into_iter().map(|((from, to), waypoints)| Taken { from, to, waypoints }).collect()
+    counts
+        .into_iter()
+        .map(|((from, to), waypoints)| WaypointTransfer { from, to, waypoints })
+        .collect()
 }

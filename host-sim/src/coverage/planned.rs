@@ -45,9 +45,9 @@ pub struct CoveragePlan<'a> {
     /// The scenario that was planned.
     pub scenario: &'a Scenario,
     /// Section `[area]` of the scenario, with settings of the plan.
-    pub wanted: &'a coverage::Area,
+    pub area_settings: &'a coverage::Area,
     /// Surface that paths follow over terrain; `None` over level ground.
-    pub following: Option<TerrainFollowing<'a>>,
+    pub terrain_following: Option<TerrainFollowing<'a>>,
     /// The area's rings, checked.
     pub area: Area<'a>,
     /// Method by which the path was divided among vehicles.
@@ -70,5 +70,5 @@ pub struct CoveragePlan<'a> {
     /// Least planned distance between two vehicles, metres; infinite for a single vehicle.
     pub least_separation_m: f32,
     /// Computing times of lanes, of ways around no-fly zones, and of routes, seconds.
-    pub seconds: [f64; 3],
+    pub computing_s: [f64; 3],
 }

@@ -3,12 +3,12 @@
 use planner_core::coverage::pack::Route;
 
 use super::CoveragePlan;
-use super::check::Findings;
+use super::check::CoverageFindings;
 use super::sorties::Sortie;
 use crate::result::{CoverageResult, RouteResult, SortieResult, TerrainResult, rounded};
 
 /// The coverage section from a plan and the check of its pictures.
-pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &Findings) -> CoverageResult {
+pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverageResult {
     let routes = &planned.plan.routes;
     let max_cost_s = planned.max_cost_s();
     let costs: Vec<f64> = routes.iter().map(|route| f64::from(planned.cost_s(route))).collect();
@@ -18,8 +18,8 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &Findings) -> Cover
         covered_share: findings.covered_share,
         waypoints: planned.tracks.waypoint_count(),
         lanes: planned.tracks.lanes().len(),
-        lane_m: rounded(planned.wanted.spacing.lane_m),
-        waypoint_m: rounded(planned.wanted.spacing.waypoint_m),
+        lane_m: rounded(planned.area_settings.spacing.lane_m),
+        waypoint_m: rounded(planned.area_settings.spacing.waypoint_m),
         angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
         max_cost_s: rounded(max_cost_s),
         mean_cost_s: rounded(mean as f32),
@@ -28,8 +28,8 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &Findings) -> Cover
         lower_bound_s: rounded(planned.lower_bound_s),
         gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
         photos: findings.photos,
-        twice: findings.twice,
-        left: findings.left,
+        twice: findings.repeated_waypoints,
+        left: findings.missed_waypoints,
         terrain: findings.heights.as_ref().map(|heights| TerrainResult {
             ground_least_m: rounded(heights.least_m),
             ground_most_m: rounded(heights.most_m),
@@ -42,7 +42,7 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &Findings) -> Cover
 }
 
 fn route_results(planned: &CoveragePlan<'_>) -> Vec<RouteResult> {
-    let heights = planned.wanted.heights;
+    let heights = planned.area_settings.heights;
     let sortie = |sortie: &Sortie| SortieResult {
         first: sortie.route.first,
         last: sortie.route.end - 1,

@@ -114,7 +114,7 @@ mod tests {
 
     fn flight(places: &[[f32; 3]]) -> (Vec<Stop>, Vec<f32>) {
         let stop =
-            |p: &[f32; 3]| Stop { position: Point::from(*p), act: StopAction::Lane, lane: None };
+            |p: &[f32; 3]| Stop { position: Point::from(*p), action: StopAction::Lane, lane: None };
         let stops: Vec<Stop> = places.iter().map(stop).collect();
         let mut times = vec![0.0];
         for pair in stops.windows(2) {

@@ -42,7 +42,7 @@ pub(super) fn whole_route_sortie(planned: &CoveragePlan<'_>, route: Route) -> So
 
 /// Time that a vehicle hovers on a full battery, seconds; the simulator's default where the
 /// scenario gives none.
-pub fn battery_duration_s(vehicle: &scenario::Vehicle) -> f32 {
+pub fn battery_hover_s(vehicle: &scenario::Vehicle) -> f32 {
     vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
 }
 
@@ -50,12 +50,12 @@ pub fn battery_duration_s(vehicle: &scenario::Vehicle) -> f32 {
 /// leg.
 pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let index = usize::from(route.vehicle);
-    let (vehicle, heights) = (&planned.vehicles[index], planned.wanted.heights);
+    let (vehicle, heights) = (&planned.vehicles[index], planned.area_settings.heights);
     let over_lanes_m = f32::from(route.layer) * heights.layer_m;
     let top_m = heights.mission_m + over_lanes_m;
     let up_m = (top_m - planned.scenario.vehicles[index].start.z).abs() + over_lanes_m;
     let level_s = route.ground_m / vehicle.cruise_mps + turns_extra_s(planned, route);
-    if planned.following.is_some() {
+    if planned.terrain_following.is_some() {
         return level_s + terrain_extra_s(planned, route);
     }
     level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
@@ -70,7 +70,7 @@ fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
         up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
         down_m => -down_m / vehicle.descend_mps,
     });
-    let corners = stops.iter().filter(|stop| stop.act == StopAction::Lane).count() as f32;
+    let corners = stops.iter().filter(|stop| stop.action == StopAction::Lane).count() as f32;
     ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 
@@ -82,7 +82,7 @@ fn turns_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let lanes = (to - from + 1) as f32;
     let stop_s = cruise_mps / PLANNED_ACCEL_MPS2;
     // The way from one lane to the next may be too short to reach cruise speed.
-    let step_m = planned.wanted.spacing.lane_m.min(cruise_mps * stop_s);
+    let step_m = planned.area_settings.spacing.lane_m.min(cruise_mps * stop_s);
     let step_s = 2.0 * (step_m / PLANNED_ACCEL_MPS2).sqrt() - step_m / cruise_mps;
     (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
 }
@@ -110,7 +110,7 @@ pub fn cut_route(
         return Ok(vec![*route]);
     }
     let lanes = RouteLanes::new(planned, route);
-    let count = lanes.ways_m.len();
+    let count = lanes.pad_distances_m.len();
     // For each number of lanes: fewest sorties that fly them, their total time, seconds, and index
     // of the first lane of the last of these sorties.
     let mut best = vec![(0u32, 0.0f64, 0usize)];
@@ -123,7 +123,7 @@ pub fn cut_route(
             .map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
         let found = all.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         best.push(found.ok_or_else(|| LaneTooLong {
-            lane: planned.tracks.lane_of(lanes.bounds[end - 1]),
+            lane: planned.tracks.lane_of(lanes.lane_starts[end - 1]),
             takes_s: route_duration_s(planned, &lanes.sub_route(end - 1, end)),
         })?);
     }
@@ -146,9 +146,9 @@ struct RouteLanes<'a> {
     planned: &'a CoveragePlan<'a>,
     route: &'a Route,
     /// First waypoint of each lane within the route, and the end of the route (exclusive).
-    bounds: Vec<u32>,
+    lane_starts: Vec<u32>,
     /// For each lane: distance from the pad to its first waypoint and to its last, metres.
-    ways_m: Vec<[f32; 2]>,
+    pad_distances_m: Vec<[f32; 2]>,
 }
 
 impl<'a> RouteLanes<'a> {
@@ -163,17 +163,17 @@ impl<'a> RouteLanes<'a> {
             tracks.waypoint(number).map_or(0.0, |place| planned.transit.distance_m(&pad, &place))
         };
         let ways_m = bounds.windows(2).map(|pair| [way_m(pair[0]), way_m(pair[1] - 1)]).collect();
-        Self { planned, route, bounds, ways_m }
+        Self { planned, route, lane_starts: bounds, pad_distances_m: ways_m }
     }
 
     /// The lanes `first..end` of the route as a route of their own.
     fn sub_route(&self, first: usize, end: usize) -> Route {
-        let (planned, heights) = (self.planned, self.planned.wanted.heights);
+        let (planned, heights) = (self.planned, self.planned.area_settings.heights);
         let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];
-        let (from, to) = (self.bounds[first], self.bounds[end]);
+        let (from, to) = (self.lane_starts[first], self.lane_starts[end]);
         let inside_m = planned.tracks.distance_to_waypoint_m(to - 1)
             - planned.tracks.distance_to_waypoint_m(from);
-        let ground_m = self.ways_m[first][0] + inside_m + self.ways_m[end - 1][1];
+        let ground_m = self.pad_distances_m[first][0] + inside_m + self.pad_distances_m[end - 1][1];
         let top_m = heights.mission_m + f32::from(self.route.layer) * heights.layer_m;
         let delay_s = top_m / vehicle.climb_mps + top_m / vehicle.descend_mps;
         Route {

@@ -7,14 +7,14 @@
 //! pictures. A waypoint has its picture
 //!
 //! - if a picture was taken within half a spacing of it along its lane, or within
-//!   [`Tolerance::off_m`] where that is more;
+//!   [`Tolerance::max_along_m`] where that is more;
 //! - or if the last picture before it and the first one after it on its lane are no further apart
-//!   than the spacing plus `off_m`: one of them is then as far off as a picture may be.
+//!   than the spacing plus `max_along_m`: one of them is then as far off as a picture may be.
 //!
 //! A picture belongs to a lane if it is within half a lane spacing of it, or within
 //! [`Tolerance::beside_m`] where that is more. A missing picture leaves a gap of two spacings, so
-//! it is found while a spacing is more than `off_m`. On a short lane whose waypoints are nearer
-//! than the spacing it may not be found; the check of cells then decides whether the area is
+//! it is found while a spacing is more than `max_along_m`. On a short lane whose waypoints are
+//! nearer than the spacing it may not be found; the check of cells then decides whether the area is
 //! photographed.
 //!
 //! A waypoint is flown twice if vehicles came to it twice: each picture counts for its nearest
@@ -66,18 +66,18 @@ impl Tolerance {
 
     /// Greatest distance along the lane between a waypoint and its picture, metres;
     /// [`margins::usable_footprint`] plans with the same.
-    pub fn off_m(&self) -> f32 {
+    pub fn max_along_m(&self) -> f32 {
         self.beside_m + self.late_m
     }
 }
 
 /// Number of waypoints without a picture, and number of waypoints flown more than once.
-pub fn count_waypoints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
+pub fn count_left_and_twice(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
     let tolerance = Tolerance::of_plan(planned);
     let lanes = planned.tracks.lanes();
     let left: u64 =
-        lanes.iter().map(|lane| left_on_lane(planned, lane, pictures, &tolerance)).sum();
-    (left, flown_twice(lanes, planned.tracks.waypoint_count(), pictures))
+        lanes.iter().map(|lane| count_left_on_lane(planned, lane, pictures, &tolerance)).sum();
+    (left, count_flown_twice(lanes, planned.tracks.waypoint_count(), pictures))
 }
 
 /// Distance of a point along a lane from its first waypoint, and distance beside the lane, metres.
@@ -91,16 +91,16 @@ fn along_and_beside(lane: &Lane, place: &Flat) -> (f32, f32) {
     }
 }
 
-fn left_on_lane(
+fn count_left_on_lane(
     planned: &CoveragePlan<'_>,
     lane: &Lane,
     pictures: &[Picture],
     tolerance: &Tolerance,
 ) -> u64 {
-    let spacing = planned.wanted.spacing;
+    let spacing = planned.area_settings.spacing;
     let beside_m = tolerance.beside_m.max(spacing.lane_m / 2.0);
-    let near_m = tolerance.off_m().max(spacing.waypoint_m / 2.0);
-    let widest_m = spacing.waypoint_m + tolerance.off_m();
+    let near_m = tolerance.max_along_m().max(spacing.waypoint_m / 2.0);
+    let widest_m = spacing.waypoint_m + tolerance.max_along_m();
     let places = pictures.iter().map(|picture| along_and_beside(lane, &picture.position.xy()));
     let mut taken: Vec<f32> =
         places.filter(|(_, off_m)| *off_m <= beside_m).map(|(along_m, _)| along_m).collect();
@@ -128,7 +128,7 @@ fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
     lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
 }
 
-fn flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
+fn count_flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
     let mut passes = vec![0_u32; waypoints as usize];
     let mut vehicles: Vec<Option<u8>> = pictures.iter().map(|picture| picture.vehicle).collect();
     vehicles.sort_unstable();
@@ -172,7 +172,7 @@ mod tests {
         };
         let mut pictures: Vec<Picture> = waypoints.map(picture).collect();
         change(&mut pictures);
-        count_waypoints(&planned, &pictures)
+        count_left_and_twice(&planned, &pictures)
     }
 
     #[test]

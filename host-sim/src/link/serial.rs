@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serialport::SerialPort;
 
-use super::transport::{Link, is_would_block};
+use super::transport::{Link, is_transient};
 
 /// Most bytes that wait to be written, if the line is slower than its sender: less than a second at
 /// 57600 baud. A frame that would exceed it is dropped, since old setpoints are worse than none.
@@ -30,7 +30,7 @@ impl Port {
 
 /// Whether an error only means that no byte can be read or written now.
 fn is_idle(error: &io::Error) -> bool {
-    error.kind() == io::ErrorKind::TimedOut || is_would_block(error)
+    error.kind() == io::ErrorKind::TimedOut || is_transient(error)
 }
 
 impl Link for Port {

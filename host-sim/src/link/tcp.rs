@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-use super::transport::{Link, is_would_block};
+use super::transport::{Link, is_transient};
 
 /// Most bytes that wait for a peer: about ten seconds of all that a PX4 streams.
 const MAX_QUEUED_BYTES: usize = 256 * 1024;
@@ -30,7 +30,7 @@ impl Connection {
                 io::ErrorKind::UnexpectedEof,
                 "the other side closed the connection",
             )),
-            Err(error) if is_would_block(&error) => Ok(0),
+            Err(error) if is_transient(&error) => Ok(0),
             result => result,
         }
     }
@@ -42,7 +42,7 @@ impl Connection {
             match self.stream.write(&self.queue[sent..]) {
                 Ok(0) => break,
                 Ok(count) => sent += count,
-                Err(error) if is_would_block(&error) => break,
+                Err(error) if is_transient(&error) => break,
                 Err(error) => return Err(error),
             }
         }

@@ -37,7 +37,7 @@ pub trait Link: Send {
 
 /// Whether an error only means that nothing can be read or written now. A refused connection counts
 /// too: UDP reports it while the peer does not listen.
-pub(super) fn is_would_block(error: &io::Error) -> bool {
+pub(super) fn is_transient(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, Interrupted, WouldBlock};
     matches!(error.kind(), WouldBlock | Interrupted | ConnectionRefused)
 }

@@ -4,16 +4,16 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use super::transport::{Link, is_would_block};
+use super::transport::{Link, is_transient};
 
 /// A peer that has sent nothing for this long is sent nothing any more.
-const CLIENT_LIFETIME: Duration = Duration::from_secs(60);
+const PEER_TIMEOUT: Duration = Duration::from_secs(60);
 /// Most peers of one hub; a further one replaces the peer that was heard longest ago.
-const MAX_CLIENTS: usize = 16;
+const MAX_PEERS: usize = 16;
 
 fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {
     match socket.send_to(bytes, to) {
-        Err(error) if !is_would_block(&error) => Err(error),
+        Err(error) if !is_transient(&error) => Err(error),
         _ => Ok(()),
     }
 }
@@ -46,7 +46,7 @@ impl Link for UdpPeer {
             match self.socket.recv_from(buffer) {
                 Ok((len, from)) if from == self.peer => return Ok(len),
                 Ok(_) => {}
-                Err(error) if is_would_block(&error) => return Ok(0),
+                Err(error) if is_transient(&error) => return Ok(0),
                 Err(error) => return Err(error),
             }
         }
@@ -81,8 +81,8 @@ impl UdpHub {
             client.1 = now;
             return;
         }
-        if self.clients.len() == MAX_CLIENTS {
-            let oldest = (0..MAX_CLIENTS).min_by_key(|&k| self.clients[k].1).unwrap_or(0);
+        if self.clients.len() == MAX_PEERS {
+            let oldest = (0..MAX_PEERS).min_by_key(|&k| self.clients[k].1).unwrap_or(0);
             self.clients.swap_remove(oldest);
         }
         self.clients.push((from, now));
@@ -96,13 +96,13 @@ impl Link for UdpHub {
                 self.remember_peer(from);
                 Ok(len)
             }
-            Err(error) if is_would_block(&error) => Ok(0),
+            Err(error) if is_transient(&error) => Ok(0),
             Err(error) => Err(error),
         }
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.clients.retain(|client| client.1.elapsed() < CLIENT_LIFETIME);
+        self.clients.retain(|client| client.1.elapsed() < PEER_TIMEOUT);
         for &(to, _) in &self.clients {
             transmit(&self.socket, bytes, to)?;
         }

@@ -37,7 +37,7 @@ impl ClearanceField {
                     }
                 }
             }
-            let mut scratch = Scratch::new(nx.max(ny));
+            let mut scratch = LineTransform::new(nx.max(ny));
             for row in layer.chunks_mut(nx) {
                 scratch.line.copy_from(row.iter().copied());
                 scratch.transform();
@@ -54,7 +54,7 @@ impl ClearanceField {
         // Transform along z; the memory order changes so that each column is contiguous.
         let mut squared = vec![0; nx * ny * nz];
         squared.par_chunks_mut(nx * nz).enumerate().for_each(|(j, sheet)| {
-            let mut scratch = Scratch::new(nz);
+            let mut scratch = LineTransform::new(nz);
             for (i, column) in sheet.chunks_mut(nz).enumerate() {
                 scratch.line.copy_from(layers.iter().skip(j * nx + i).step_by(nx * ny).copied());
                 scratch.transform();
@@ -82,7 +82,7 @@ impl ClearanceField {
 }
 
 /// Buffers for the transform along one line of cells.
-struct Scratch {
+struct LineTransform {
     line: Vec<u16>,
     out: Vec<u16>,
     /// Parabolas of the lower envelope, from left to right.
@@ -111,7 +111,7 @@ impl CopyFrom for Vec<u16> {
     }
 }
 
-impl Scratch {
+impl LineTransform {
     fn new(length: usize) -> Self {
         let line = Vec::with_capacity(length);
         Self { out: line.clone(), line, envelope: Vec::with_capacity(length) }

@@ -30,7 +30,7 @@ pub enum Unknown {
     Free,
 }
 
-/// A map with three states per cell, two bits each, in the bricks of [`GridShape::address`].
+/// A map with three states per cell, two bits each, in the bricks of [`GridShape::word_and_mask`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupancyMap {
     shape: GridShape,
@@ -63,7 +63,7 @@ impl OccupancyMap {
             );
             return Err(MapError::Grid { file: name.into(), why });
         }
-        let words = vec![0; shape.brick_count()];
+        let words = vec![0; shape.word_count()];
         Ok(Self { shape, occupied: words.clone(), free: words })
     }
 
@@ -124,13 +124,13 @@ impl OccupancyMap {
                 }
             }
         });
-        map.settle_free(&free_share);
+        map.mark_free_cells(&free_share);
         Ok(map)
     }
 
     /// Turns unknown cells that free leaves fill entirely into free cells; `free_share` is in cell
     /// order, x fastest.
-    fn settle_free(&mut self, free_share: &[f32]) {
+    fn mark_free_cells(&mut self, free_share: &[f32]) {
         let dims = self.shape.dims;
         // The tolerance is far above the rounding of the sum; an unknown cube with a twentieth of
         // the cell's edge still keeps the cell unknown.
@@ -192,7 +192,7 @@ impl OccupancyMap {
 
     /// State of a cell. Panics for a cell outside the grid.
     pub fn state_at(&self, cell: [u32; 3]) -> Occupancy {
-        let (word, mask) = self.shape.address(cell);
+        let (word, mask) = self.shape.word_and_mask(cell);
         if self.occupied[word] & mask != 0 {
             Occupancy::Occupied
         } else if self.free[word] & mask != 0 {
@@ -204,7 +204,7 @@ impl OccupancyMap {
 
     /// Sets the state of a cell. Panics for a cell outside the grid.
     pub fn set(&mut self, cell: [u32; 3], state: Occupancy) {
-        let (word, mask) = self.shape.address(cell);
+        let (word, mask) = self.shape.word_and_mask(cell);
         self.set_bits(word, mask, state);
     }
 
@@ -221,7 +221,7 @@ impl OccupancyMap {
     /// Sets the state of all cells in `from..to` along each axis. Panics beyond the grid.
     pub fn fill(&mut self, from: [u32; 3], to: [u32; 3], state: Occupancy) {
         let [bx, by, _] = self.shape.bricks();
-        let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, from[axis], to[axis]));
+        let [xs, ys, zs] = [0, 1, 2].map(|axis| brick_masks(axis, from[axis], to[axis]));
         for &(k, z) in &zs {
             for &(j, y) in &ys {
                 for &(i, x) in &xs {
@@ -249,14 +249,20 @@ impl OccupancyMap {
             Unknown::Blocked => (not_free, Some(occupied), None, Outside::Blocked),
             Unknown::Free => (occupied, None, Some(not_free), Outside::Free),
         };
-        VoxelMap { shape: self.shape, words, seen, never_sample, outside }
+        VoxelMap {
+            shape: self.shape,
+            obstacle_words: words,
+            seen_obstacle_words: seen,
+            never_sample_words: never_sample,
+            outside,
+        }
     }
 
     /// For each brick, the bits of its cells inside the grid; bricks at the upper faces may extend
     /// beyond it.
     fn inside_mask(&self) -> Vec<u64> {
         let mut words = Vec::with_capacity(self.free.len());
-        let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, 0, self.shape.dims[axis]));
+        let [xs, ys, zs] = [0, 1, 2].map(|axis| brick_masks(axis, 0, self.shape.dims[axis]));
         for (_, z) in &zs {
             for (_, y) in &ys {
                 words.extend(xs.iter().map(|(_, x)| x & y & z));
@@ -267,7 +273,7 @@ impl OccupancyMap {
 }
 
 /// Bricks along one axis that the cells `from..to` reach into: index, and mask of those cells.
-fn lanes(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
+fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
     let lane = |c: u32| match axis {
         0 => 0x1111_1111_1111_1111 << c,
         1 => 0x000f_000f_000f_000f << (4 * c),
@@ -287,12 +293,12 @@ pub struct VoxelMap {
     /// Dimensions, corner and resolution of the grid.
     pub shape: GridShape,
     /// One bit per cell: set if the cell is an obstacle.
-    pub words: Vec<u64>,
-    /// Bits of the occupied cells alone, if unknown cells are obstacles too; `None` if `words`
-    /// holds no unknown cells.
-    pub seen: Option<Vec<u64>>,
+    pub obstacle_words: Vec<u64>,
+    /// Bits of the occupied cells alone, if unknown cells are obstacles too; `None` if
+    /// `obstacle_words` holds no unknown cells.
+    pub seen_obstacle_words: Option<Vec<u64>>,
     /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
-    pub never_sample: Option<Vec<u64>>,
+    pub never_sample_words: Option<Vec<u64>>,
     /// Whether the space beyond the map's faces is an obstacle.
     pub outside: Outside,
 }
@@ -300,13 +306,13 @@ pub struct VoxelMap {
 impl VoxelMap {
     /// The bit grid of obstacles that planner-core queries.
     pub fn grid(&self) -> VoxelGrid<'_> {
-        VoxelGrid::new(self.shape, self.outside, &self.words)
+        VoxelGrid::new(self.shape, self.outside, &self.obstacle_words)
             .expect("the words were made for the shape")
     }
 
     /// The bit grid of cells in which no roadmap node may lie; space beyond the map counts as such.
-    pub fn never_sample(&self) -> VoxelGrid<'_> {
-        let words = self.never_sample.as_deref().unwrap_or(&self.words);
+    pub fn never_sample_grid(&self) -> VoxelGrid<'_> {
+        let words = self.never_sample_words.as_deref().unwrap_or(&self.obstacle_words);
         VoxelGrid::new(self.shape, Outside::Blocked, words)
             .expect("the words were made for the shape")
     }
@@ -314,8 +320,10 @@ impl VoxelMap {
     /// Whether a cell is an obstacle only because it is unknown. Panics for a cell outside the
     /// grid.
     pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
-        let (word, mask) = self.shape.address(cell);
-        self.seen.as_ref().is_some_and(|seen| self.words[word] & !seen[word] & mask != 0)
+        let (word, mask) = self.shape.word_and_mask(cell);
+        self.seen_obstacle_words
+            .as_ref()
+            .is_some_and(|seen| self.obstacle_words[word] & !seen[word] & mask != 0)
     }
 
     /// Height on which a vehicle that sinks vertically from `point` comes to stand, metres: the top
@@ -426,10 +434,10 @@ mod tests {
         };
         let blocked = map.voxel_map(Unknown::Blocked);
         assert_eq!(ones(&blocked.grid()), counts.occupied + counts.unknown);
-        assert_eq!(ones(&blocked.never_sample()), counts.occupied + counts.unknown);
+        assert_eq!(ones(&blocked.never_sample_grid()), counts.occupied + counts.unknown);
         let free = map.voxel_map(Unknown::Free);
         assert_eq!(ones(&free.grid()), counts.occupied);
-        assert_eq!(ones(&free.never_sample()), counts.occupied + counts.unknown);
+        assert_eq!(ones(&free.never_sample_grid()), counts.occupied + counts.unknown);
         assert_eq!((blocked.outside, free.outside), (Outside::Blocked, Outside::Free));
     }
 

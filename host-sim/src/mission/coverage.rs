@@ -34,9 +34,9 @@ use crate::{map, margins};
 
 /// Climb from the pad after which a vehicle flies its path, and descent at the path's end, metres;
 /// less where the pictures are taken lower above the ground.
-const PATH_OVER_PAD_M: f32 = 3.0;
+const TAKEOFF_HEIGHT_M: f32 = 3.0;
 /// Distance by which the map extends beyond area and pads, and above the highest layer, metres.
-const AROUND_AREA_M: f32 = 30.0;
+const MAP_MARGIN_M: f32 = 30.0;
 
 type DeskWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 
@@ -67,7 +67,7 @@ pub(super) fn prepare(
         .collect();
     check_batteries(&planned)?;
     check_height(&planned)?;
-    let top_m = PATH_OVER_PAD_M.min(above_ground_m(planned.wanted));
+    let top_m = TAKEOFF_HEIGHT_M.min(pictures_above_ground_m(planned.area_settings));
     drop(planned);
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
@@ -91,7 +91,7 @@ pub(super) fn prepare(
     let mut mission =
         Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
-        mission.roadmap_file = terrain.field.to_vec();
+        mission.roadmap_or_field_file = terrain.field.to_vec();
     }
     mission.encode_area(&climbs)?;
     let mut ws = on_heap(DeskWorkspace::new);
@@ -116,9 +116,9 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
         let beyond_hover = sim_autopilot::power_ratio_at_speed(cruise_mps) - 1.0;
         let takes_s =
             sorties::route_duration_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
-        let lasts_s = sorties::battery_duration_s(vehicle);
+        let lasts_s = sorties::battery_hover_s(vehicle);
         if takes_s > USABLE_CHARGE * lasts_s {
-            let hint = match planned.wanted.batteries {
+            let hint = match planned.area_settings.batteries {
                 true => {
                     "`cover` writes a plan for each sortie, which autopilots fly without a companion"
                 }
@@ -142,7 +142,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 /// Refuses pictures so low that a vehicle whose estimate is too high by the greatest error could
 /// touch the ground.
 fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
-    let height_m = above_ground_m(planned.wanted);
+    let height_m = pictures_above_ground_m(planned.area_settings);
     for vehicle in &planned.scenario.vehicles {
         let lower_m =
             margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.personality);
@@ -151,7 +151,7 @@ fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
             bail!(
                 "pictures too low: {}: at {height_m:.2} m vehicle {} may touch the ground, {least_m:.2} m are needed\nhint: \
                  its estimate may be {lower_m:.2} m too high, and it strays by {TRACKING_M} m",
-                planned.wanted.place,
+                planned.area_settings.place,
                 vehicle.id
             );
         }
@@ -166,13 +166,13 @@ pub fn division_method(scenario: &Scenario) -> Method {
 
 /// The terrain settings of the mission file: height above ground, tolerance, lowest and highest
 /// ground.
-fn ground_of(area: &scenario::coverage::Area, terrain: &Terrain) -> anyhow::Result<Ground> {
+fn ground_settings(area: &scenario::coverage::Area, terrain: &Terrain) -> anyhow::Result<Ground> {
     let [low_m, high_m] = ground_height_range_m(terrain)?;
     Ok(Ground { height_m: area.height_m, tolerance_m: terrain.tolerance_m, low_m, high_m })
 }
 
 /// Least height of the pictures above the ground, metres.
-fn above_ground_m(area: &scenario::coverage::Area) -> f32 {
+fn pictures_above_ground_m(area: &scenario::coverage::Area) -> f32 {
     if area.terrain.is_some() { area.height_m } else { area.heights.mission_m }
 }
 
@@ -187,17 +187,18 @@ fn ground_height_range_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
 /// A map of level ground below area and pads. Over terrain its ground is at the terrain's lowest
 /// height; the real heights are then in the terrain's grid.
 fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
-    let places = planned.wanted.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
+    let places =
+        planned.area_settings.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
     let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
     for place in places {
         let place = Point::new(place.x, place.y, 0.0);
         (low, high) = (low.inf(&place), high.sup(&place));
     }
-    let heights = planned.wanted.heights;
+    let heights = planned.area_settings.heights;
     high.z = heights.mission_m + heights.layer_m * (planned.vehicles.len() + 1) as f32;
-    let around = Point::new(AROUND_AREA_M, AROUND_AREA_M, 0.0);
-    high.z += AROUND_AREA_M;
-    if let Some(terrain) = &planned.wanted.terrain {
+    let around = Point::new(MAP_MARGIN_M, MAP_MARGIN_M, 0.0);
+    high.z += MAP_MARGIN_M;
+    if let Some(terrain) = &planned.area_settings.terrain {
         low.z = ground_height_range_m(terrain)?[0];
     }
     let cell_m = planned.scenario.map.resolution_m;
@@ -228,7 +229,11 @@ impl Mission {
             spacing: area.usable,
             angle_deg: area.angle_deg,
             margin_m: area.margin_m,
-            ground: area.terrain.as_ref().map(|terrain| ground_of(area, terrain)).transpose()?,
+            ground: area
+                .terrain
+                .as_ref()
+                .map(|terrain| ground_settings(area, terrain))
+                .transpose()?,
         };
         let (rings, vertices) = (&area.rings[..], &area.vertices[..]);
         let block = MissionBlock::Coverage(CoverageParts { header, shares, rings, vertices });
@@ -277,7 +282,7 @@ impl Mission {
     /// The field of heights that paths follow over terrain, parsed as on a board; `None` over level
     /// ground.
     fn height_field(&self) -> Option<FieldView<'_>> {
-        FieldView::parse(&self.roadmap_file).ok()
+        FieldView::parse(&self.roadmap_or_field_file).ok()
     }
 
     /// Plans the coverage mission from its start, with nothing photographed.
@@ -290,7 +295,7 @@ impl Mission {
     ///
     /// # Errors
     /// No plan was found; the error says why.
-    pub fn plan_rest<'l>(
+    pub fn plan_remaining<'l>(
         &self,
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [DivisionInput]>,
@@ -349,7 +354,7 @@ impl Mission {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
                 "the route of vehicle {id} has too many corners: {path}: not one lane fits into a path of {WAYPOINTS} \
                  waypoints\nhint: no-fly zones with fewer corners{}",
-                if self.roadmap_file.is_empty() {
+                if self.roadmap_or_field_file.is_empty() {
                     ""
                 } else {
                     ", or a larger area.terrain_tolerance_m"

@@ -9,7 +9,7 @@ use planner_core::plan::{self, PlanError, PlanWorkspace};
 use planner_core::schedule::ScheduleError;
 
 use super::ready::{Mission, SwarmPlan};
-use crate::capacity::{BoardCapacity, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
+use crate::capacity::{BoardCapacity, NUCLEO_H743, PICO2, WAYPOINTS, on_heap};
 
 impl Mission {
     /// Text about the first capacity of a board that the mission or its plan exceeds; `None` if the
@@ -19,7 +19,7 @@ impl Mission {
         let of_mission = || board.mission_excess(&mission);
         match mission.kind() {
             MissionKind::Goals => board
-                .roadmap_excess(&self.view())
+                .roadmap_excess(&self.roadmap_view())
                 .or_else(of_mission)
                 .or_else(|| self.plan_limit_exceeded(plan, board)),
             MissionKind::Coverage(area) => {
@@ -37,9 +37,13 @@ impl Mission {
     fn plan_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
         const WHOLE: BoardCapacity = NUCLEO_H743;
         let planned = if board.nodes == WHOLE.nodes {
-            self.plan_crc_on_board::<{ WHOLE.nodes }, { WHOLE.vehicles }, { WHOLE.pieces }>(board)
+            self.plan_crc_on_board::<{ WHOLE.nodes }, { WHOLE.vehicles }, { WHOLE.timed_segments }>(
+                board,
+            )
         } else {
-            self.plan_crc_on_board::<{ HALF.nodes }, { HALF.vehicles }, { HALF.pieces }>(board)
+            self.plan_crc_on_board::<{ PICO2.nodes }, { PICO2.vehicles }, { PICO2.timed_segments }>(
+                board,
+            )
         };
         let name = board.name;
         match planned {
@@ -49,10 +53,10 @@ impl Mission {
                 "vehicle {id} meets too many others, {name} holds {} gates of one vehicle",
                 board.gates
             )),
-            Err(PlanError::Schedule(id, ScheduleError::PiecesFull | ScheduleError::Blocked)) => {
+            Err(PlanError::Schedule(id, ScheduleError::SegmentsFull | ScheduleError::Blocked)) => {
                 Some(format!(
                     "no schedule for vehicle {id} with the {} timed segments that {name} holds",
-                    board.pieces
+                    board.timed_segments
                 ))
             }
             Err(PlanError::Path(id, PathError::PathFull)) => Some(format!(
@@ -72,7 +76,7 @@ impl Mission {
         let mut plan = on_heap(plan::SwarmPlan::<V, WAYPOINTS>::new);
         planner::plan_goals(
             &self.mission_view(),
-            &self.view(),
+            &self.roadmap_view(),
             board.gates,
             &mut workspace,
             &mut plan,

@@ -10,7 +10,7 @@ use companion::storage::mission_file::{
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
-use planner_core::plan::{self, Mode, Objective, VehicleTask};
+use planner_core::plan::{self, GoalMode, Objective, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleConfig, ScheduleError};
 
@@ -46,7 +46,7 @@ pub struct Mission {
     pub roadmap: Roadmap,
     /// Bytes of the roadmap file for a board; over terrain those of the field file; empty over
     /// level ground.
-    pub roadmap_file: Vec<u8>,
+    pub roadmap_or_field_file: Vec<u8>,
     /// Bytes of the mission file for a board.
     pub mission_file: Vec<u8>,
     /// The vehicles' tasks, in the order of the scenario.
@@ -90,7 +90,7 @@ impl Mission {
             map,
             goals: Vec::new(),
             roadmap: Roadmap { nodes: Vec::new(), edges: Vec::new(), heights_m: Vec::new() },
-            roadmap_file: Vec::new(),
+            roadmap_or_field_file: Vec::new(),
             mission_file: Vec::new(),
             tasks,
             descents_m: Vec::new(),
@@ -122,8 +122,8 @@ impl Mission {
     }
 
     /// The roadmap file, parsed as on a board: each call checks the whole file.
-    pub fn view(&self) -> RoadmapView<'_> {
-        parse_roadmap(&self.roadmap_file)
+    pub fn roadmap_view(&self) -> RoadmapView<'_> {
+        parse_roadmap(&self.roadmap_or_field_file)
     }
 
     /// Height of the ground on which a vehicle that sinks vertically from `place` would come to
@@ -140,7 +140,7 @@ impl Mission {
         RoadmapSize {
             nodes: self.roadmap.nodes.len(),
             edges: self.roadmap.edges.len(),
-            bytes: self.roadmap_file.len(),
+            bytes: self.roadmap_or_field_file.len(),
         }
     }
 
@@ -172,7 +172,10 @@ impl Mission {
     pub(super) fn encode(&self, block: &MissionBlock<'_>) -> anyhow::Result<Vec<u8>> {
         let scenario = &self.scenario;
         let header = MissionHeader {
-            roadmap_crc: self.roadmap_file.last_chunk().map_or(0, |crc| u32::from_le_bytes(*crc)),
+            roadmap_crc: self
+                .roadmap_or_field_file
+                .last_chunk()
+                .map_or(0, |crc| u32::from_le_bytes(*crc)),
             mode: planner_mode(&scenario.mission),
             method: scenario.deconfliction.method,
             origin: scenario.map.origin,
@@ -204,10 +207,10 @@ fn parse_roadmap(roadmap_file: &[u8]) -> RoadmapView<'_> {
     RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 
-fn planner_mode(mission: &scenario::Mission) -> Mode {
+fn planner_mode(mission: &scenario::Mission) -> GoalMode {
     match (mission.mode, mission.objective) {
-        (scenario::Mode::Labelled, _) => Mode::Labelled,
-        (_, scenario::Objective::Total) => Mode::Unlabelled(Objective::TotalDistance),
-        (_, scenario::Objective::Makespan) => Mode::Unlabelled(Objective::Makespan),
+        (scenario::Mode::Labelled, _) => GoalMode::Labelled,
+        (_, scenario::Objective::Total) => GoalMode::Unlabelled(Objective::TotalDistance),
+        (_, scenario::Objective::Makespan) => GoalMode::Unlabelled(Objective::Makespan),
     }
 }

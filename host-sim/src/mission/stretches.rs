@@ -15,7 +15,7 @@ const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 /// the whole route fits into its path.
 fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
-    let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.goes_on)?;
+    let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.is_first_part)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
     Some(flight.depart_s + end.arrive_s - COMMITMENT_S)
 }
@@ -70,8 +70,9 @@ impl Mission {
                     MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES
                 );
             }
-            next =
-                next_division_inputs(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);
+            next = next_division_inputs(
+                &*self.plan_remaining(&[], losses.iter().map(|lots| &lots[..]))?,
+            );
         }
         Ok(())
     }

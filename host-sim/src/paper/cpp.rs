@@ -11,7 +11,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cpp_data::{
-    COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT_COLUMNS,
+    COSTS_M, FLIGHT_TIMES_TABLES, LONG_TRACK_COLUMNS, MEAN_LARGEST_TIME_S, PLANNING_S, REAL_S,
+    SHORT_COLUMNS, TABLE_4_COSTS_M,
 };
 use super::cpp_figures;
 use super::cpp_rows::{Row, Summary};
@@ -202,7 +203,7 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
             let scenario = paper_scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
             let mut times = Vec::with_capacity(TIMED_RUNS);
             for _ in 0..TIMED_RUNS {
-                times.push(CoveragePlan::new(&scenario, method)?.seconds.iter().sum::<f64>());
+                times.push(CoveragePlan::new(&scenario, method)?.computing_s.iter().sum::<f64>());
             }
             times.sort_by(f64::total_cmp);
             *slot = times[TIMED_RUNS / 2];
@@ -215,7 +216,7 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
 /// ground.
 fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
-    for (method, theirs) in METHODS[1..].iter().zip(FEWER_M) {
+    for (method, theirs) in METHODS[1..].iter().zip(TABLE_4_COSTS_M) {
         let ours = tables.plan_costs(&scenario, *method, "m")?;
         tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
     }
@@ -224,10 +225,13 @@ fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
 
 fn flown(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
-    for table in &FLOWN {
+    for table in &FLIGHT_TIMES_TABLES {
         let method = Method::named(table.method).map_err(anyhow::Error::msg)?;
-        let (polygon, columns) =
-            if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT_COLUMNS) };
+        let (polygon, columns) = if table.long {
+            (LONG_TRACK, LONG_TRACK_COLUMNS)
+        } else {
+            (SHORT_TRACK, SHORT_COLUMNS)
+        };
         for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
             let scenario = paper_scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
             let ours = tables.plan_costs(&scenario, method, "s")?;
@@ -240,7 +244,8 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
             }
         }
     }
-    for ((track, ours), theirs) in ["5, short", "5, long"].into_iter().zip(mean_max).zip(MEAN_MAX_S)
+    for ((track, ours), theirs) in
+        ["5, short", "5, long"].into_iter().zip(mean_max).zip(MEAN_LARGEST_TIME_S)
     {
         for (i, method) in METHODS.into_iter().enumerate() {
             let both = [vec![rounded(ours[i] as f32)], vec![theirs[i]]];
@@ -304,13 +309,13 @@ mod tests {
     #[test]
     fn what_was_printed_agrees_with_itself() {
         let mut mean_max = [[0.0; 3]; 2];
-        for table in &FLOWN {
+        for table in &FLIGHT_TIMES_TABLES {
             let index = METHODS.iter().position(|m| m.name() == table.method).expect("a method");
             for times in table.times_s {
                 mean_max[usize::from(table.long)][index] += Summary::of(times).max / 12.0;
             }
         }
-        for (ours, printed) in mean_max.iter().flatten().zip(MEAN_MAX_S.iter().flatten()) {
+        for (ours, printed) in mean_max.iter().flatten().zip(MEAN_LARGEST_TIME_S.iter().flatten()) {
             assert!((ours - printed).abs() < 0.01, "{ours} {printed}");
         }
         assert!((Summary::of(&COSTS_M[2]).sd - 3.53).abs() < 0.01);

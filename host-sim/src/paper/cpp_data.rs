@@ -2,7 +2,7 @@
 
 /// One of Tables A1 to A12: flight times of each vehicle in Gazebo, seconds, for six pairs of lane
 /// spacing and height.
-pub(super) struct Flown {
+pub(super) struct FlightTimesTable {
     /// Number of the table.
     pub(super) name: &'static str,
     /// Whether the track is the long one, with lanes of 320 m; the short one has lanes of 150 m.
@@ -17,12 +17,12 @@ pub(super) struct Flown {
 pub(super) const SHORT_COLUMNS: [(f64, f64); 6] =
     [(10.0, 35.0), (10.0, 45.0), (10.0, 55.0), (5.0, 35.0), (5.0, 45.0), (5.0, 55.0)];
 /// Columns of the tables of the long track: spacing and height, metres.
-pub(super) const LONG: [(f64, f64); 6] =
+pub(super) const LONG_TRACK_COLUMNS: [(f64, f64); 6] =
     [(10.0, 35.0), (10.0, 45.0), (10.0, 55.0), (15.0, 35.0), (15.0, 45.0), (15.0, 55.0)];
 
 /// Tables A1 to A12.
-pub(super) const FLOWN: [Flown; 12] = [
-    Flown {
+pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
+    FlightTimesTable {
         name: "A1",
         long: false,
         method: "simple-binpat",
@@ -35,7 +35,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[287.0, 293.0, 248.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A2",
         long: false,
         method: "binpat",
@@ -48,7 +48,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[426.0, 412.0, 396.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A3",
         long: false,
         method: "powell-binpat",
@@ -61,7 +61,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[401.0, 426.0, 412.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A4",
         long: false,
         method: "simple-binpat",
@@ -74,7 +74,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[314.0, 308.0, 358.0, 284.0, 316.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A5",
         long: false,
         method: "binpat",
@@ -87,7 +87,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[318.0, 350.0, 352.0, 312.0, 355.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A6",
         long: false,
         method: "powell-binpat",
@@ -100,7 +100,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[311.0, 355.0, 329.0, 338.0, 351.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A7",
         long: true,
         method: "simple-binpat",
@@ -113,7 +113,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[680.0, 799.0, 832.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A8",
         long: true,
         method: "binpat",
@@ -126,7 +126,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[745.0, 697.0, 633.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A9",
         long: true,
         method: "powell-binpat",
@@ -139,7 +139,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[636.0, 700.0, 652.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A10",
         long: true,
         method: "simple-binpat",
@@ -152,7 +152,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[596.0, 618.0, 547.0, 683.0, 673.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A11",
         long: true,
         method: "binpat",
@@ -165,7 +165,7 @@ pub(super) const FLOWN: [Flown; 12] = [
             &[555.0, 629.0, 558.0, 522.0, 584.0],
         ],
     },
-    Flown {
+    FlightTimesTable {
         name: "A12",
         long: true,
         method: "powell-binpat",
@@ -193,10 +193,11 @@ pub(super) const PLANNING_S: [[f64; 6]; 3] = [
 
 /// Table 4: distance costs, metres: BINPAT, then POWELL, which leaves the first vehicle on the
 /// ground.
-pub(super) const FEWER_M: [[f64; 3]; 2] = [[390.72, 401.93, 394.62], [0.0, 370.73, 383.99]];
+pub(super) const TABLE_4_COSTS_M: [[f64; 3]; 2] = [[390.72, 401.93, 394.62], [0.0, 370.73, 383.99]];
 
 /// Table 5: mean of the largest times, seconds: short and long track, by method.
-pub(super) const MEAN_MAX_S: [[f64; 3]; 2] = [[300.42, 330.08, 322.0], [795.58, 754.25, 735.42]];
+pub(super) const MEAN_LARGEST_TIME_S: [[f64; 3]; 2] =
+    [[300.42, 330.08, 322.0], [795.58, 754.25, 735.42]];
 
 /// Table 6: real flight, seconds, three vehicles, by method.
 pub(super) const REAL_S: [[f64; 3]; 3] =

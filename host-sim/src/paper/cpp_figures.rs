@@ -89,7 +89,7 @@ pub(super) fn route_figures(
 
 /// A map from above of the area and the UAVs; with `shown` also of the routes, and their costs.
 fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
-    let corners = planned.wanted.rings_of(RingKind::Outer).flatten();
+    let corners = planned.area_settings.rings_of(RingKind::Outer).flatten();
     let flights = planned.flights();
     let (mut costs, mut most_s) = (Vec::new(), 0.0f32);
     let vehicles = planned.scenario.vehicles.iter().enumerate();
@@ -121,12 +121,12 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
 
 /// Whose values a panel shows: ours, or those that the paper printed.
 #[derive(Clone, Copy)]
-enum Figures {
+enum ValueSource {
     Ours,
     Theirs,
 }
 
-impl Figures {
+impl ValueSource {
     const BOTH: [(Self, &'static str); 2] =
         [(Self::Ours, "ours, planned"), (Self::Theirs, "theirs, flown in Gazebo")];
 
@@ -144,7 +144,7 @@ pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.track.is_some()).collect();
     let (mut times, mut spreads) = (Vec::new(), Vec::new());
     for (fleet, letter) in FLEETS.into_iter().zip('a'..) {
-        for (whose, name) in Figures::BOTH {
+        for (whose, name) in ValueSource::BOTH {
             let title = format!("({letter}) {fleet} UAVs: {name}");
             let own = |row: &&&Row| row.ours.len() == fleet;
             let value = |row: &Row| whose.of(row).map(|summary| summary.mean);
@@ -153,7 +153,7 @@ pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
         }
     }
     for (track, letter) in TRACKS.into_iter().zip('a'..) {
-        for (whose, name) in Figures::BOTH {
+        for (whose, name) in ValueSource::BOTH {
             let title = format!("({letter}) {track} track: {name}");
             let own: Vec<&Row> =
                 rows.iter().filter(|row| row.track == Some(track)).copied().collect();

@@ -29,7 +29,7 @@ pub struct Division {
     /// Waypoints and path of each vehicle that still flies.
     pub parts: Vec<Part>,
     /// Waypoints that this division moves from one vehicle to another.
-    pub taken: Vec<Taken>,
+    pub taken: Vec<WaypointTransfer>,
 }
 
 /// What one vehicle photographs in a division.
@@ -49,7 +49,7 @@ pub struct Part {
 
 /// Waypoints that a division moves from one vehicle to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Taken {
+pub struct WaypointTransfer {
     /// Vehicle that was to photograph the waypoints before.
     pub from: u8,
     /// Vehicle that is to photograph the waypoints now.

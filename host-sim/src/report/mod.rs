@@ -16,7 +16,7 @@ mod track;
 
 use anyhow::Context;
 
-pub use coverage::{CoverageLayers, Division, Part, Taken};
+pub use coverage::{CoverageLayers, Division, Part, WaypointTransfer};
 pub use data::{
     Curve, Event, Level, Limit, Outline, OutlineKind, Plot, ReportData, RoadmapLines,
     SphereObstacle, VehicleTrack, vehicle_color,

@@ -198,11 +198,11 @@ mod tests {
 
     fn surface(dims: [u32; 3], filled: impl Fn([u32; 3]) -> bool) -> MapSurface {
         let shape = GridShape { dims, min: Point::new(1.0, 2.0, 3.0), resolution_m: 0.5 };
-        let mut words = vec![0; shape.brick_count()];
+        let mut words = vec![0; shape.word_count()];
         for k in 0..dims[2] {
             for j in 0..dims[1] {
                 for i in (0..dims[0]).filter(|&i| filled([i, j, k])) {
-                    let (word, mask) = shape.address([i, j, k]);
+                    let (word, mask) = shape.word_and_mask([i, j, k]);
                     words[word] |= mask;
                 }
             }

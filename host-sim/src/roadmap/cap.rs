@@ -235,7 +235,7 @@ fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     let sources = PATH_SOURCES.min(rows.len());
     let searches: Vec<Vec<(u32, u32)>> = (0..sources)
         .into_par_iter()
-        .map(|source| paths_from(source * rows.len() / sources, rows, class))
+        .map(|source| shortest_path_edge_counts(source * rows.len() / sources, rows, class))
         .collect();
     let mut usage = vec![0; edges];
     for (edge, paths) in searches.into_iter().flatten() {
@@ -246,7 +246,11 @@ fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
 
 /// The edges of the shortest paths from `source` to all nodes over edges of at least `class`, each
 /// with the number of these paths that lead over it (Dijkstra 1959).
-fn paths_from(source: usize, rows: &[Vec<OutgoingEdge>], class: u8) -> Vec<(u32, u32)> {
+fn shortest_path_edge_counts(
+    source: usize,
+    rows: &[Vec<OutgoingEdge>],
+    class: u8,
+) -> Vec<(u32, u32)> {
     let mut way_m = vec![f32::INFINITY; rows.len()];
     let mut last_edge = vec![None; rows.len()];
     let (mut settled, mut order) = (vec![false; rows.len()], Vec::new());

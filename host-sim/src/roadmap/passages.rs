@@ -171,7 +171,7 @@ impl<'a> CellSearch<'a> {
     fn shortest_cell_path(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
         let ends: BTreeSet<usize> = self.cells_seen_from(to).into_iter().collect();
         let grid = self.map.grid();
-        let never_sample = self.map.never_sample();
+        let never_sample = self.map.never_sample_grid();
         let cells = self.shape.dims.iter().map(|&d| d as usize).product();
         let (mut cost, mut came) = (vec![f32::INFINITY; cells], vec![u32::MAX; cells]);
         let mut open = BinaryHeap::new();

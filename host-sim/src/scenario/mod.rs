@@ -21,7 +21,7 @@ use crate::quote::quoted_path;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
-pub use sim_autopilot::{AutopilotKind, Estimator};
+pub use sim_autopilot::{AutopilotKind, EstimatorErrors};
 pub use types::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode,
     Objective, Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
@@ -58,7 +58,7 @@ pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
 fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
     let text = reader::Text { file, text };
     sections::read_root(text, |root| match (root.get("map"), root.get("area")) {
-        (None, Some(_)) => sections::area::coverage(text, root, folder),
+        (None, Some(_)) => sections::area::read_coverage_scenario(text, root, folder),
         _ => sections::goals::goals_mission(text, root, folder),
     })
 }

@@ -169,8 +169,8 @@ impl<'a> Value<'a> {
     }
 }
 
-/// A table whose keys are read one by one; [`Table::finish`] refuses keys that were never asked
-/// for.
+/// A table whose keys are read one by one; [`Table::refuse_unknown_keys`] refuses keys that were
+/// never asked for.
 pub(super) struct Table<'a> {
     pub(super) text: Text<'a>,
     pub(super) span: Span,
@@ -268,7 +268,7 @@ impl<'a> Table<'a> {
     }
 
     /// Refuses the first key in the file that was neither read nor declared.
-    pub(super) fn finish(&self) -> Result<()> {
+    pub(super) fn refuse_unknown_keys(&self) -> Result<()> {
         let known = self.known.borrow();
         let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let Some((key, _)) = unknown.min_by_key(|(key, _)| key.span().start) else { return Ok(()) };

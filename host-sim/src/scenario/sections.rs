@@ -62,7 +62,7 @@ pub(super) fn read_root<T>(
         "area",
         "formation",
     ]);
-    root.finish()?;
+    root.refuse_unknown_keys()?;
     read(&root)
 }
 
@@ -142,7 +142,7 @@ fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
     let lat_deg = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
     let lon_deg = table.required("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
     let alt_m = table.required("alt_m", hint)?.f64(&(-1000.0..=20_000.0))?;
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok(Geodetic { lat_deg, lon_deg, alt_m })
 }
 
@@ -170,7 +170,7 @@ fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
         )?,
         origin: origin.unwrap_or(DEFAULT_ORIGIN),
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok((map, origin.is_some()))
 }
 
@@ -207,7 +207,7 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
         )?,
         passages: table.boolean("passages")?,
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     let in_metres = roadmap.edge_min_share.is_none() && roadmap.edge_max_share.is_none();
     if in_metres && roadmap.edge_min_m >= roadmap.edge_max_m {
         let (min, max) = (roadmap.edge_min_m, roadmap.edge_max_m);
@@ -280,7 +280,7 @@ fn read_geofence(value: &Value<'_>) -> Result<Geofence> {
     let hint = "a geofence is { min = [x, y, z], max = [x, y, z] }";
     let (min, max) =
         (read_point(&table.required("min", hint)?)?, read_point(&table.required("max", hint)?)?);
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     if (0..3).any(|axis| min[axis] >= max[axis]) {
         return Err(value.error("must have every coordinate of min below that of max"));
     }
@@ -360,7 +360,7 @@ fn read_vehicle(
             unsupported.push(unsupported_error(table.text, &value.span, key));
         }
     }
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     let spans =
         VehicleSpans { start: start.span, goal: goal.map(|v| v.span), table: table.span.clone() };
     Ok((vehicle, spans))

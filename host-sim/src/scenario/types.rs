@@ -7,7 +7,7 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 use planner_core::prm::Sampling;
-use sim_autopilot::{AutopilotKind, Estimator};
+use sim_autopilot::{AutopilotKind, EstimatorErrors};
 
 use super::coverage::Area;
 use super::error::ScenarioError;
@@ -201,7 +201,7 @@ const DEFAULT_DESCEND_MPS: f32 = 1.0;
 
 impl Vehicle {
     /// Speeds of climb and descent, V_a and V_d, m/s.
-    pub fn climbs_mps(&self) -> [f32; 2] {
+    pub fn climb_and_descent_mps(&self) -> [f32; 2] {
         [
             self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS),
             self.descend_mps.unwrap_or(DEFAULT_DESCEND_MPS),
@@ -255,7 +255,7 @@ pub struct Simulation {
     /// Standard deviation of the estimated position, metres.
     pub position_noise_m: f32,
     /// How far the autopilots' position estimates err.
-    pub estimator: Estimator,
+    pub estimator: EstimatorErrors,
     /// Baud rate of the serial links between companions and autopilots.
     pub serial_baud: u32,
     /// Probability that a byte on a serial link is corrupted.

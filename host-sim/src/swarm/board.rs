@@ -36,9 +36,9 @@ pub struct Board {
 /// The simulated links that a board is connected to during a step.
 pub struct BoardLinks<'a> {
     /// Bytes on their way from the simulated autopilot to the board.
-    pub up: &'a mut SerialLink,
+    pub to_board: &'a mut SerialLink,
     /// Bytes on their way from the board to the simulated autopilot.
-    pub down: &'a mut SerialLink,
+    pub to_autopilot: &'a mut SerialLink,
     /// The swarm's simulated radio.
     pub radio: &'a mut Radio,
     /// Index of the board's vehicle among the radio's stations.
@@ -46,7 +46,7 @@ pub struct BoardLinks<'a> {
     /// True positions of all stations, ENU metres.
     pub places: &'a [Point],
     /// Called with each STATUSTEXT of the board.
-    pub said: &'a mut dyn FnMut(&str),
+    pub on_text: &'a mut dyn FnMut(&str),
 }
 
 /// How the simulation is connected to a board.
@@ -125,7 +125,7 @@ impl Board {
         if core::mem::take(runs) {
             board.finish_grant()?;
         }
-        board.stack_used().map(Some)
+        board.max_stack_used().map(Some)
     }
 
     /// Carries bytes between the board, its autopilot and the radio up to `now_us`, the end of a
@@ -146,7 +146,7 @@ impl Board {
                 let started_us = lock_step.started_us;
                 for PortBytes { port, at_us, bytes } in sent {
                     match port {
-                        Port::Autopilot => lines.down.write(started_us + at_us, &bytes),
+                        Port::Autopilot => lines.to_autopilot.write(started_us + at_us, &bytes),
                         Port::Swarm => self.broadcast_frames(now_us, &bytes, lines),
                     }
                 }
@@ -159,7 +159,7 @@ impl Board {
     /// Passes on, in both directions, the bytes that have arrived by `now_us` on opened links.
     fn exchange_bytes(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         let BoardConnection::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
-        while let Some((_, bytes)) = lines.up.next_by(now_us) {
+        while let Some((_, bytes)) = lines.to_board.take_write_by(now_us) {
             autopilot.send(&bytes)?;
         }
         while let Some(packet) = lines.radio.receive(now_us, lines.station) {
@@ -179,14 +179,14 @@ impl Board {
         let from_autopilot = drain(autopilot)?;
         let from_radio = radio.as_mut().map(drain).transpose()?;
         if !from_autopilot.is_empty() {
-            lines.down.write(now_us, &from_autopilot);
+            lines.to_autopilot.write(now_us, &from_autopilot);
         }
         match from_radio {
             Some(bytes) => self.broadcast_frames(now_us, &bytes, lines),
             None => {
                 let mut input = &from_autopilot[..];
                 while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
-                    self.note_report(&frame, &mut lines.said);
+                    self.note_report(&frame, &mut lines.on_text);
                 }
             }
         }
@@ -200,7 +200,7 @@ impl Board {
             let mut packet = [0; MAX_FRAME_LEN];
             let length = frame.encode(&mut packet);
             lines.radio.broadcast(now_us, Some(lines.station), lines.places, &packet[..length]);
-            self.note_report(&frame, &mut lines.said);
+            self.note_report(&frame, &mut lines.on_text);
         }
     }
 
@@ -250,7 +250,7 @@ impl LockStep {
                 bytes: packet.to_vec(),
             });
         }
-        while let Some((arrives_us, bytes)) = lines.up.next_by(until_us) {
+        while let Some((arrives_us, bytes)) = lines.to_board.take_write_by(until_us) {
             pieces.push(PortBytes { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
         }
         self.runs = true;

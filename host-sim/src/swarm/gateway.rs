@@ -19,7 +19,7 @@ use super::radio::Radio;
 use crate::link::Link;
 
 /// Message ids passed on from companions: HEARTBEAT, COMMAND_ACK, STATUSTEXT.
-const FROM_COMPANIONS: [u32; 3] = [0, 77, 253];
+const FORWARDED_MESSAGE_IDS: [u32; 3] = [0, 77, 253];
 /// Longest datagram, bytes: within the MTU of any usual network path.
 const MAX_DATAGRAM: usize = 1400;
 
@@ -96,9 +96,9 @@ impl Gateway {
     }
 }
 
-/// Whether a packet's frame, one a packet from companions, is among [`FROM_COMPANIONS`].
+/// Whether a packet's frame, one a packet from companions, is among [`FORWARDED_MESSAGE_IDS`].
 fn is_for_ground(packet: &[u8]) -> bool {
     let mut input = packet;
     let frame = Framer::new().next(Instant::ZERO, &mut input);
-    frame.is_some_and(|frame| FROM_COMPANIONS.contains(&frame.message_id))
+    frame.is_some_and(|frame| FORWARDED_MESSAGE_IDS.contains(&frame.message_id))
 }

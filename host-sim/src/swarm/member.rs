@@ -15,7 +15,7 @@ use super::step::{STEP_S, STEP_US};
 use crate::boards::STACK_LEN;
 use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
 use crate::coverage::check::Picture;
-use crate::flash::{DeskFlash, LAYOUT};
+use crate::flash::{DESK_FLASH_LAYOUT, DeskFlash};
 use crate::mission::{Mission, OwnPlan};
 use crate::report::{self, Level};
 use crate::say;
@@ -50,14 +50,14 @@ pub struct SimulatedVehicle {
     /// How a plan request is answered.
     pub planner: Planner,
     /// Text of the last warning of the mission table since the vehicle last followed its path.
-    pub cause: Option<&'static str>,
+    pub last_warning: Option<&'static str>,
     /// When the vehicle first left the ground, seconds.
     pub took_off_s: Option<f64>,
     /// When the vehicle first stood on the ground again, disarmed, seconds.
     pub landed_s: Option<f64>,
     config: Config<VEHICLES>,
-    up: SerialLink,
-    down: SerialLink,
+    to_companion: SerialLink,
+    to_autopilot: SerialLink,
     ground_m: f32,
     bytes: Vec<u8>,
     /// When the companion last started, microseconds of simulation time.
@@ -85,11 +85,11 @@ impl SimulatedVehicle {
             config,
             plan_requests: PlanRequests::new(),
             planner: Planner::Sound,
-            cause: None,
+            last_warning: None,
             took_off_s: None,
             landed_s: None,
-            up: SerialLink::new(serial, seed, 2 * id),
-            down: SerialLink::new(serial, seed, 2 * id + 1),
+            to_companion: SerialLink::new(serial, seed, 2 * id),
+            to_autopilot: SerialLink::new(serial, seed, 2 * id + 1),
             ground_m: autopilot.start.z - autopilot.vehicle.radius_m,
             bytes: Vec::new(),
             companion_us: 0,
@@ -111,7 +111,7 @@ impl SimulatedVehicle {
     fn start_companion(&mut self) -> anyhow::Result<()> {
         self.companion = new_companion(self.config.clone())?;
         if let Some(flash) = &mut self.flash {
-            self.companion.attach_store(Store::mount(LAYOUT, flash));
+            self.companion.attach_store(Store::mount(DESK_FLASH_LAYOUT, flash));
         }
         Ok(())
     }
@@ -184,14 +184,14 @@ impl SimulatedVehicle {
 
     /// No byte passes between companion and autopilot until `until_us`.
     pub fn stall_serial(&mut self, until_us: u64) {
-        self.up.stall(until_us);
-        self.down.stall(until_us);
+        self.to_companion.stall(until_us);
+        self.to_autopilot.stall(until_us);
     }
 
     /// Sets the share of bytes that the serial link changes, 0 to 1.
     pub fn set_serial_corruption(&mut self, share: f64) {
-        self.up.set_corruption(share);
-        self.down.set_corruption(share);
+        self.to_companion.set_corruption(share);
+        self.to_autopilot.set_corruption(share);
     }
 
     /// The companion's own time: since its last start.
@@ -231,16 +231,16 @@ impl SimulatedVehicle {
                 break;
             }
             if !booting {
-                self.up.write(now_us, &buffer[..length]);
+                self.to_companion.write(now_us, &buffer[..length]);
             }
         }
         if self.board.is_some() {
             self.step_board(now_us, station, radio, places, log)?;
         } else {
-            self.up.read(now_us, &mut self.bytes);
+            self.to_companion.read(now_us, &mut self.bytes);
             self.step_companion(now_us, station, radio, places, log);
         }
-        self.down.read(now_us, &mut self.bytes);
+        self.to_autopilot.read(now_us, &mut self.bytes);
         if !self.bytes.is_empty() && !booting {
             self.autopilot.handle_bytes(&self.bytes);
         }
@@ -275,9 +275,19 @@ impl SimulatedVehicle {
                 text: text.to_owned(),
             });
         };
-        let (up, down) = (&mut self.up, &mut self.down);
+        let (up, down) = (&mut self.to_companion, &mut self.to_autopilot);
         board
-            .step(now_us, &mut BoardLinks { up, down, radio, station, places, said: &mut said })
+            .step(
+                now_us,
+                &mut BoardLinks {
+                    to_board: up,
+                    to_autopilot: down,
+                    radio,
+                    station,
+                    places,
+                    on_text: &mut said,
+                },
+            )
             .with_context(|| format!("the board of vehicle {id}"))
     }
 
@@ -313,7 +323,7 @@ impl SimulatedVehicle {
                     log.push(report::Event { t_s, vehicle, level: Level::Info, text });
                 }
                 Event::StateChanged { from, to, text, warning } => {
-                    self.log_transition(from, to, text, warning);
+                    self.note_warning(from, to, text, warning);
                     log.push(self.log_entry(now_us, from, to, text));
                 }
             }
@@ -334,14 +344,16 @@ impl SimulatedVehicle {
 
     /// Faults of the vehicle's serial link in `lasted_s` seconds, as text; `None` without faults.
     pub fn link_trouble(&self, lasted_s: f64) -> Option<String> {
-        self.up.describe_fault(lasted_s).or_else(|| self.down.describe_fault(lasted_s))
+        self.to_companion
+            .describe_fault(lasted_s)
+            .or_else(|| self.to_autopilot.describe_fault(lasted_s))
     }
 
     /// Gives a ground station's frame to a board that has no radio of ours, by the autopilot's
     /// serial link, as an autopilot forwards it.
     pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
-            self.up.write(now_us, frame);
+            self.to_companion.write(now_us, frame);
         }
     }
 
@@ -363,11 +375,11 @@ impl SimulatedVehicle {
         self.killed || now_us < self.boots_until_us
     }
 
-    fn log_transition(&mut self, from: State, to: State, text: &'static str, warning: bool) {
+    fn note_warning(&mut self, from: State, to: State, text: &'static str, warning: bool) {
         if warning && !text.is_empty() {
-            self.cause = Some(text);
+            self.last_warning = Some(text);
         } else if to == State::Follow || from == State::Aborted {
-            self.cause = None;
+            self.last_warning = None;
         }
     }
 
@@ -393,7 +405,7 @@ impl SimulatedVehicle {
 
     /// How the vehicle's flight ended: the state of its mission, and the warning that led there.
     pub fn describe_end(&self) -> String {
-        match (self.killed, self.cause) {
+        match (self.killed, self.last_warning) {
             (true, _) => "Killed".to_owned(),
             (false, Some(cause)) => format!("{:?}: {cause}", self.state()),
             (false, None) => format!("{:?}", self.state()),
@@ -430,7 +442,7 @@ impl SimulatedVehicle {
             if length == 0 {
                 break;
             }
-            self.down.write(now_us, &buffer[..length]);
+            self.to_autopilot.write(now_us, &buffer[..length]);
         }
         loop {
             let length = self.companion.poll_transmit(Link::Swarm, &mut buffer);

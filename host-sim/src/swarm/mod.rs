@@ -219,7 +219,7 @@ impl<'a> SimulationRun<'a> {
             scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
         // Lanes of two vehicles may lie side by side, and one vehicle waits for as long as the
         // other one is on its lanes: that is no deadlock.
-        referee.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
+        referee.retracts_ended_deadlocks = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {
             mission,
             plan,
@@ -254,7 +254,7 @@ impl<'a> SimulationRun<'a> {
             member.step(step, i, mission, radio, places, log)?;
             if let Some(wanted) = member.next_plan_request() {
                 let own = match member.planner {
-                    Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
+                    Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_or_field_file),
                     _ => mission.answer_plan_request(plan, i, wanted, &mut member.companion),
                 };
                 if wanted == PlanKind::Mission {

@@ -48,7 +48,7 @@ pub struct Observation {
     /// Phase of the vehicle's flight.
     pub phase: Phase,
     /// Whether the vehicle stands still by command of operator or pilot.
-    pub ordered: bool,
+    pub holds_by_command: bool,
     /// Arc length along its path, metres; `None`: moving by 1 m counts as progress instead.
     pub progress_m: Option<f32>,
 }
@@ -96,7 +96,7 @@ pub struct Referee<'a> {
     window: Sample,
     /// Whether a deadlock that dissolves is taken back: where faults strike, vehicles wait until it
     /// is known what became of the one struck, and for their turn to fly around it.
-    pub waits_end: bool,
+    pub retracts_ended_deadlocks: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
     pub obstacles: Vec<(Point, f32)>,
     /// Number of times that a body began to touch an obstacle.
@@ -146,7 +146,7 @@ impl<'a> Referee<'a> {
             touching: vec![false; vehicles.len() * vehicles.len()],
             recorded_s: f64::NEG_INFINITY,
             window: NOTHING,
-            waits_end: false,
+            retracts_ended_deadlocks: false,
             obstacles: Vec::new(),
             wall_contacts: 0,
             violations: 0,
@@ -341,13 +341,13 @@ impl<'a> Referee<'a> {
             Some(progress_m) => progress_m > vehicle.best_progress_m + MIN_PROGRESS_M,
             None => (now.position - vehicle.progressed_at).norm() > OFF_HOVER_M,
         };
-        if now.phase != Phase::Flying || now.ordered || moved {
+        if now.phase != Phase::Flying || now.holds_by_command || moved {
             vehicle.best_progress_m =
                 now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
             vehicle.progressed_at = now.position;
             vehicle.progressed_s = t_s;
             let ends = moved || now.phase == Phase::TakeOffOrLanding;
-            if std::mem::take(&mut vehicle.stuck) && ends && self.waits_end {
+            if std::mem::take(&mut vehicle.stuck) && ends && self.retracts_ended_deadlocks {
                 self.deadlocks -= 1;
                 let text = no_progress();
                 if let Some(at) =

@@ -122,7 +122,7 @@ impl SerialLink {
     /// Replaces the content of `out` by the bytes that have arrived by `now_us`.
     pub fn read(&mut self, now_us: u64, out: &mut Vec<u8>) {
         out.clear();
-        while let Some((_, bytes)) = self.next_by(now_us) {
+        while let Some((_, bytes)) = self.take_write_by(now_us) {
             out.extend(bytes);
         }
     }
@@ -130,7 +130,7 @@ impl SerialLink {
     /// Takes the next write whose last byte arrives by `until_us`: its time of arrival and its
     /// bytes. `until_us` may be in the future; `None` if there is none, or the link is stalled
     /// then.
-    pub fn next_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
+    pub fn take_write_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
         let &(arrives_us, length) = self.writes.front()?;
         if arrives_us > until_us || until_us < self.stalled_until_us {
             return None;

@@ -16,7 +16,7 @@ use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
 use crate::scenario::{Companion, Vehicle};
 
 /// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
-const DEFAULT_RANGE_M: f32 = 500.0;
+const UNLIMITED_RANGE_M: f32 = 500.0;
 /// Least radio range that a companion's settings may have, metres.
 const MIN_RANGE_M: f32 = 1.0;
 
@@ -51,7 +51,7 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
                     member.attach_board(Board::open(autopilot, radio.as_ref())?);
                 }
                 Companion::Emulated { program, log } => {
-                    let (roadmap, file) = (&mission.roadmap_file, &mission.mission_file);
+                    let (roadmap, file) = (&mission.roadmap_or_field_file, &mission.mission_file);
                     member.attach_board(Board::emulate(program, log, roadmap, file)?);
                 }
             }
@@ -110,7 +110,7 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     // The operator sets this radio range; from 500 m on, radio silence is never explained by
     // distance.
     let radio_range_m = match scenario.simulation.radio_range_m {
-        range_m if range_m < DEFAULT_RANGE_M => range_m.max(MIN_RANGE_M),
+        range_m if range_m < UNLIMITED_RANGE_M => range_m.max(MIN_RANGE_M),
         _ => REACHES_ALL_M,
     };
     let method = scenario.deconfliction.method;

@@ -4,7 +4,7 @@
 use std::iter::Peekable;
 use std::path::Path;
 
-use super::crs::{Crs, System};
+use super::crs::{CoordinateSystem, Crs};
 use super::error::TerrainError;
 use super::limits::{MAX_BYTES, MAX_CELLS};
 use super::raster::Raster;
@@ -22,18 +22,18 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let beside = path.with_extension("prj");
     let crs = match beside.is_file() {
         true => parse_coordinate_system(&files::read_text(&beside)?)?,
-        false => Crs::Unsaid,
+        false => Crs::Unstated,
     };
     parse(&text, crs)
 }
 
 fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
-    let system = System::wkt(text.trim())?;
+    let system = CoordinateSystem::wkt(text.trim())?;
     if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) {
         let hint = "heights of an .asc are metres, and those of a grid in feet may be feet: gdalwarp -t_srs to metres";
         return Err(TerrainError::System { what: "units that are not metres".to_owned(), hint });
     }
-    Ok(Crs::Said(Box::new(system)))
+    Ok(Crs::Stated(Box::new(system)))
 }
 
 /// What the lines before the heights say.

@@ -10,7 +10,7 @@ use std::path::Path;
 use las::{Header, PointDataBuilder, Reader};
 use planner_core::coverage::Flat;
 
-use super::crs::{Crs, System, wkt_height_unit_m};
+use super::crs::{CoordinateSystem, Crs, wkt_height_unit_m};
 use super::error::TerrainError;
 use super::frame::{Frame, widened_window};
 use super::geokeys::GeoKeys;
@@ -100,7 +100,7 @@ fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
         record(34735).unwrap_or_default().chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]));
     let keys = GeoKeys::new(&directory.collect::<Vec<_>>());
     let crs = match (&text, header.has_wkt_crs()) {
-        (Some(text), true) => Crs::Said(Box::new(System::wkt(text)?)),
+        (Some(text), true) => Crs::Stated(Box::new(CoordinateSystem::wkt(text)?)),
         _ => keys.crs(text.as_deref())?,
     };
     let said = match text.as_deref().and_then(wkt_height_unit_m) {

@@ -17,21 +17,21 @@ pub(super) const US_FOOT_M: f64 = 1200.0 / 3937.0;
 #[derive(Debug)]
 pub(super) enum Crs {
     /// The file does not state one.
-    Unsaid,
+    Unstated,
     /// The file states this one.
-    Said(Box<System>),
+    Stated(Box<CoordinateSystem>),
 }
 
 /// A coordinate system that a file states.
 #[derive(Debug)]
-pub(super) struct System {
+pub(super) struct CoordinateSystem {
     own: Proj,
     wgs84: Proj,
     /// Metres in a unit of its horizontal coordinates; `None` if these are degrees.
     pub unit_m: Option<f64>,
 }
 
-impl System {
+impl CoordinateSystem {
     /// The system with this code in the EPSG register.
     pub(super) fn epsg(code: u16) -> Result<Self, TerrainError> {
         let name = format!("EPSG:{code}");
@@ -98,7 +98,7 @@ impl Crs {
     /// Refuses a file without a coordinate system, unless the mission's own coordinates are metres.
     pub(super) fn check(&self, metres: bool) -> Result<(), TerrainError> {
         match self {
-            Self::Unsaid if !metres => Err(TerrainError::Nowhere(
+            Self::Unstated if !metres => Err(TerrainError::Nowhere(
                 "a .prj beside an .asc or gdal_translate -a_srs say it; in a mission with coordinates = \"metres\" its numbers \
                  are metres about the origin",
             )),
@@ -110,8 +110,8 @@ impl Crs {
     /// horizontal coordinates, or metres if these are degrees.
     pub(super) fn height_unit_m(&self) -> f64 {
         match self {
-            Self::Unsaid => 1.0,
-            Self::Said(system) => system.unit_m.unwrap_or(1.0),
+            Self::Unstated => 1.0,
+            Self::Stated(system) => system.unit_m.unwrap_or(1.0),
         }
     }
 
@@ -119,8 +119,8 @@ impl Crs {
     /// domain.
     pub(super) fn to_mission(&self, origin: &Geodetic, place: [f64; 2]) -> Option<Flat> {
         match self {
-            Self::Unsaid => Some(Flat::new(place[0] as f32, place[1] as f32)),
-            Self::Said(system) => {
+            Self::Unstated => Some(Flat::new(place[0] as f32, place[1] as f32)),
+            Self::Stated(system) => {
                 let [lon_deg, lat_deg] = system.to_degrees(place)?;
                 let place = Geodetic { lat_deg, lon_deg, alt_m: origin.alt_m };
                 place.is_valid().then(|| geodetic_to_enu(origin, &place).xy())
@@ -129,10 +129,10 @@ impl Crs {
     }
 
     /// A place in the mission frame as the file's coordinates; `None` outside the system's domain.
-    pub(super) fn of_mission(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
+    pub(super) fn from_mission(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
         match self {
-            Self::Unsaid => Some([f64::from(place.x), f64::from(place.y)]),
-            Self::Said(system) => {
+            Self::Unstated => Some([f64::from(place.x), f64::from(place.y)]),
+            Self::Stated(system) => {
                 // The place at the origin's altitude there, not on the plane that touches the earth
                 // at the origin: found in three iterations.
                 let mut up_m = 0.0;

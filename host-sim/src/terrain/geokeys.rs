@@ -1,6 +1,6 @@
 //! GeoKeys: how GeoTIFF, and point clouds before LAS 1.4, state their coordinate system.
 
-use super::crs::{Crs, System, unit_m};
+use super::crs::{CoordinateSystem, Crs, unit_m};
 use super::error::{TerrainError, WARP_HINT};
 
 const MODEL: u16 = 1024;
@@ -11,15 +11,15 @@ const LENGTH_UNIT: u16 = 3076;
 const VERTICAL: u16 = 4096;
 const HEIGHT_UNIT: u16 = 4099;
 /// Value of a key whose system is user-defined, by other keys.
-const OWN: u16 = 32767;
+const USER_DEFINED: u16 = 32767;
 /// EPSG codes of vertical systems, national and global, with heights above sea level in metres.
-const METRES: [u16; 18] = [
+const METRE_HEIGHT_SYSTEMS: [u16; 18] = [
     3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647,
     7837, 9274,
 ];
 /// EPSG codes of vertical systems in feet: international here, US survey below.
-const FEET: [u16; 1] = [8228];
-const US_FEET: [u16; 1] = [6360];
+const FOOT_HEIGHT_SYSTEMS: [u16; 1] = [8228];
+const US_FOOT_HEIGHT_SYSTEMS: [u16; 1] = [6360];
 
 /// The GeoKeys of a file: id and value.
 #[derive(Debug)]
@@ -46,25 +46,26 @@ impl GeoKeys {
     pub(super) fn crs(&self, wkt: Option<&str>) -> Result<Crs, TerrainError> {
         let (projected, geographic) = (self.get(PROJECTED), self.get(GEOGRAPHIC));
         let system = match (self.get(MODEL), projected, geographic) {
-            (Some(1), Some(code), _) if code != OWN => System::epsg(code)?,
-            (Some(2), _, Some(code)) if code != OWN => System::epsg(code)?,
+            (Some(1), Some(code), _) if code != USER_DEFINED => CoordinateSystem::epsg(code)?,
+            (Some(2), _, Some(code)) if code != USER_DEFINED => CoordinateSystem::epsg(code)?,
             (Some(3), ..) => {
                 return Err(TerrainError::system("coordinates about the middle of the earth"));
             }
             _ => match wkt {
-                Some(wkt) => System::wkt(wkt)?,
-                None if self.0.is_empty() => return Ok(Crs::Unsaid),
+                Some(wkt) => CoordinateSystem::wkt(wkt)?,
+                None if self.0.is_empty() => return Ok(Crs::Unstated),
                 None => return Err(TerrainError::system("a system of its own")),
             },
         };
-        let said = self.get(LENGTH_UNIT).filter(|code| *code != OWN).map(unit_m).transpose()?;
+        let said =
+            self.get(LENGTH_UNIT).filter(|code| *code != USER_DEFINED).map(unit_m).transpose()?;
         if let (Some(said), Some(known)) = (said, system.unit_m)
             && (said - known).abs() > 1e-6
         {
             let what = format!("units of {said} m, its coordinate system in units of {known} m");
             return Err(TerrainError::System { what, hint: WARP_HINT });
         }
-        Ok(Crs::Said(Box::new(system)))
+        Ok(Crs::Stated(Box::new(system)))
     }
 
     /// Metres in a unit of height; `None` if the keys do not state it.
@@ -74,9 +75,9 @@ impl GeoKeys {
         }
         match self.get(VERTICAL) {
             None => Ok(None),
-            Some(code) if METRES.contains(&code) => Ok(Some(1.0)),
-            Some(code) if FEET.contains(&code) => Ok(Some(super::crs::FOOT_M)),
-            Some(code) if US_FEET.contains(&code) => Ok(Some(super::crs::US_FOOT_M)),
+            Some(code) if METRE_HEIGHT_SYSTEMS.contains(&code) => Ok(Some(1.0)),
+            Some(code) if FOOT_HEIGHT_SYSTEMS.contains(&code) => Ok(Some(super::crs::FOOT_M)),
+            Some(code) if US_FOOT_HEIGHT_SYSTEMS.contains(&code) => Ok(Some(super::crs::US_FOOT_M)),
             Some(code) => {
                 Err(TerrainError::system(&format!("heights of EPSG:{code} without their unit")))
             }

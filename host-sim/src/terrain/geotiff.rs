@@ -65,7 +65,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let crs = keys.crs(None)?;
     let unit_m = match (keys.height_unit_m()?, &crs) {
         (Some(unit_m), _) => unit_m,
-        (None, Crs::Said(system)) if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) => {
+        (None, Crs::Stated(system)) if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) => {
             let hint = "gdal_edit.py -a_srs EPSG:2994+8228, with your numbers, says the unit of its heights";
             return Err(TerrainError::System {
                 what: "feet, and does not say whether its heights are".to_owned(),

@@ -103,7 +103,7 @@ impl HeightGrid {
 
     /// Keeps the heights so far as those at the cells' centres; cells may then be raised above
     /// them.
-    pub(super) fn keep_middles(&mut self) {
+    pub(super) fn keep_centre_heights(&mut self) {
         self.middles_m.clone_from(&self.heights_m);
     }
 

@@ -72,7 +72,7 @@ impl Raster {
                 }
             }
         }
-        grid.keep_middles();
+        grid.keep_centre_heights();
         for row in rows.0..rows.1 {
             for column in columns.0..columns.1 {
                 let height_m = self.heights_m[row * self.columns + column];
@@ -89,7 +89,7 @@ impl Raster {
 
     /// The height of the file's cell at a place; `None` where it has none, and outside the file.
     pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
-        let [column, row] = self.cell_coordinates(self.crs.of_mission(origin, place)?);
+        let [column, row] = self.cell_coordinates(self.crs.from_mission(origin, place)?);
         let inside =
             column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         let height_m =
@@ -132,8 +132,9 @@ impl Raster {
         let places = shares().flat_map(|s| {
             shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t)))
         });
-        let cells = places
-            .filter_map(|place| Some(self.cell_coordinates(self.crs.of_mission(origin, &place)?)));
+        let cells = places.filter_map(|place| {
+            Some(self.cell_coordinates(self.crs.from_mission(origin, &place)?))
+        });
         let [from, to] = cells.map(|cell| [cell, cell]).reduce(|a, b| {
             let pick =
                 |f: fn(f64, f64) -> f64, i: usize| [f(a[i][0], b[i][0]), f(a[i][1], b[i][1])];

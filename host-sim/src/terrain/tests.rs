@@ -80,7 +80,7 @@ proptest! {
         let corner = corner.map(|at| at as f32);
         let text = asc(columns, corner.map(f64::from), f64::from(cell), &rows);
         let frame = Frame { origin: &ORIGIN, metres: true, window: None };
-        let raster = asc::parse(&text, Crs::Unsaid).unwrap();
+        let raster = asc::parse(&text, Crs::Unstated).unwrap();
         let grid = raster.resampled(&frame).unwrap();
         prop_assert_eq!(grid.size(), [columns, count]);
         prop_assert_eq!(grid.cell_m(), cell);
@@ -123,7 +123,7 @@ proptest! {
         ]),
     ) {
         let raster = geotiff_of(&values, model, code, corner, cell);
-        let Crs::Said(system) = &raster.crs else { panic!("it names its system") };
+        let Crs::Stated(system) = &raster.crs else { panic!("it names its system") };
         let [lon_deg, lat_deg] = system.to_degrees(corner).unwrap();
         // A frame that begins there, as missions are near their origin.
         let origin = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };

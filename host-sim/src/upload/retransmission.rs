@@ -50,7 +50,7 @@ impl Retransmission {
 
     /// Whether a request sent at `sent_at` has timed out. If so the timeout doubles and the window
     /// halves, once for all requests sent before.
-    pub fn is_over(&mut self, sent_at: Clock, now: Clock) -> bool {
+    pub fn check_timeout(&mut self, sent_at: Clock, now: Clock) -> bool {
         let over = now.saturating_duration_since(sent_at) > self.wait;
         if over && sent_at >= self.doubled_at {
             self.wait = (2 * self.wait).min(Duration::from_secs_f32(MAX_TIMEOUT_S));
@@ -107,7 +107,7 @@ mod tests {
                 next += 1;
             }
             for (piece, sent_at, repeated) in &mut under_way {
-                if retransmission.is_over(*sent_at, now) {
+                if retransmission.check_timeout(*sent_at, now) {
                     (*sent_at, *repeated) = (now, true);
                     send(*piece);
                 }
@@ -151,7 +151,7 @@ mod tests {
             .map(|_| {
                 let over = (1..)
                     .map(|ms| sent_at + Duration::from_millis(ms))
-                    .find(|now| retransmission.is_over(sent_at, *now));
+                    .find(|now| retransmission.check_timeout(sent_at, *now));
                 let wait = over.expect("some time") - sent_at;
                 sent_at += wait;
                 wait.as_millis()
@@ -159,6 +159,6 @@ mod tests {
             .collect();
         assert_eq!(waits, [401, 801, 1601, 2001]);
         retransmission.note_round_trip(Duration::from_millis(20));
-        assert!(retransmission.is_over(sent_at, sent_at + Duration::from_millis(401)));
+        assert!(retransmission.check_timeout(sent_at, sent_at + Duration::from_millis(401)));
     }
 }

@@ -220,7 +220,7 @@ impl<'a> Area<'a> {
     fn check_sizes(&self) -> Result<(), AreaError> {
         // As much as a strip half as long as the perimeter and a millimetre wide.
         let is_flat = |(_, ring): (_, &[Flat])| {
-            fabs(doubled_signed_area(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
+            fabs(signed_area_m2(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
         };
         match self.rings_with_kind().position(is_flat) {
             Some(ring) => Err(AreaError::NoArea { ring: ring as u16 }),
@@ -281,7 +281,7 @@ pub(super) fn edges_of(ring: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + Cl
 }
 
 /// Signed area of a ring, m²: positive if it turns left. In f64, since large terms cancel.
-pub(super) fn doubled_signed_area(ring: &[Flat]) -> f64 {
+pub(super) fn signed_area_m2(ring: &[Flat]) -> f64 {
     let base = ring[0];
     let twice: f64 = edges_of(ring).map(|(a, b)| cross_product(&(a - base), &(b - base))).sum();
     twice / 2.0

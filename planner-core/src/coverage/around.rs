@@ -43,7 +43,7 @@ const MAX_SIDESTEP_RINGS: usize = 20;
 const SIDESTEP_DIRECTIONS: usize = 16;
 
 /// Fence, no-fly zones, terrain and keep-out zones that legs have to respect.
-struct FreeSpace<'a, 't, const N: usize> {
+struct LegConstraints<'a, 't, const N: usize> {
     transit: &'a Transit<'t, N>,
     field: Option<FieldView<'a>>,
     obstacles: &'a [KeepOutZone],
@@ -51,7 +51,7 @@ struct FreeSpace<'a, 't, const N: usize> {
     fence: Option<(Point, Point)>,
 }
 
-impl<const N: usize> FreeSpace<'_, '_, N> {
+impl<const N: usize> LegConstraints<'_, '_, N> {
     fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
         let touches =
             |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
@@ -103,7 +103,8 @@ pub fn plan_detour<const N: usize, const W: usize>(
         return Err(DetourError::Search(SearchError::NoPath));
     };
     detour::shrink_zones(obstacles, &request.here);
-    let clear = FreeSpace { transit, field, obstacles, here: request.here, fence: request.fence };
+    let clear =
+        LegConstraints { transit, field, obstacles, here: request.here, fence: request.fence };
     let from = |points: &[Point], out: &mut Path<W>| {
         write_path(request, points, out).map_err(DetourError::Path)
     };
@@ -152,7 +153,7 @@ pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
 }
 
 /// The nearest point on the rings that is outside all zones and reached by a free straight leg.
-fn nearest_reachable_place<const N: usize>(clear: &FreeSpace<'_, '_, N>) -> Option<Point> {
+fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) -> Option<Point> {
     let here = clear.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
     let place = |i: usize| {
@@ -189,7 +190,7 @@ impl VisibilityGraph {
     /// `points`, both ends included. Returns false if there is none.
     fn find_shortest_path<const N: usize, const W: usize>(
         &mut self,
-        clear: &FreeSpace<'_, '_, N>,
+        clear: &LegConstraints<'_, '_, N>,
         from: &Point,
         to: &Point,
         points: &mut Vec<Point, W>,
@@ -244,7 +245,7 @@ impl VisibilityGraph {
     /// around keep-out zones that reach this height. More than the capacity are dropped.
     fn collect_nodes<const N: usize>(
         &mut self,
-        clear: &FreeSpace<'_, '_, N>,
+        clear: &LegConstraints<'_, '_, N>,
         from: &Point,
         to: &Point,
     ) {

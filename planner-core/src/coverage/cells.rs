@@ -33,7 +33,7 @@ pub(super) fn group_into_cells(lanes: &mut [Lane]) {
 }
 
 /// Whether a cell begins at lane `k`, or the lanes end there.
-pub(super) fn is_break(lanes: &[Lane], k: usize) -> bool {
+pub(super) fn is_cell_boundary(lanes: &[Lane], k: usize) -> bool {
     k == 0 || k == lanes.len() || lanes[k - 1].first != lanes[k].first
 }
 
@@ -46,7 +46,7 @@ pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<
     }
     let mut turned = false;
     for k in 0..lanes.len() {
-        turned = !is_break(lanes, k) && !turned;
+        turned = !is_cell_boundary(lanes, k) && !turned;
         if turned {
             lanes[k].reverse();
         }
@@ -69,7 +69,7 @@ pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<
 
 /// How a cell is flown: whether from its last lane to its first, and whether each lane is reversed.
 #[derive(Clone, Copy, Default)]
-struct Entry {
+struct CellEntry {
     backwards: bool,
     turned: bool,
 }
@@ -80,9 +80,9 @@ fn nearest_cell<const N: usize>(
     lanes: &[Lane],
     done: usize,
     transit: &Transit<'_, N>,
-) -> (usize, Entry) {
+) -> (usize, CellEntry) {
     let here = lanes[done - 1].to;
-    let mut best = (f32::INFINITY, done, Entry::default());
+    let mut best = (f32::INFINITY, done, CellEntry::default());
     let mut from = done;
     while from < lanes.len() {
         let to = end_of_cell(lanes, from);
@@ -92,7 +92,7 @@ fn nearest_cell<const N: usize>(
                 if (corner - here).length() < best.0 {
                     let way = transit.distance_m(&here, &corner);
                     if way < best.0 {
-                        best = (way, from, Entry { backwards, turned });
+                        best = (way, from, CellEntry { backwards, turned });
                     }
                 }
             }
@@ -103,7 +103,7 @@ fn nearest_cell<const N: usize>(
 }
 
 fn end_of_cell(lanes: &[Lane], from: usize) -> usize {
-    (from + 1..lanes.len()).find(|k| is_break(lanes, *k)).unwrap_or(lanes.len())
+    (from + 1..lanes.len()).find(|k| is_cell_boundary(lanes, *k)).unwrap_or(lanes.len())
 }
 
 #[cfg(test)]

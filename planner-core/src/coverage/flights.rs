@@ -13,7 +13,7 @@ use heapless::Vec;
 use self::builder::{FlightPathBuilder, point_at_height};
 use super::divide;
 use super::lanes::Lane;
-use super::pack::{Heading, Plan, Route, Vehicle, Work};
+use super::pack::{Plan, Route, RouteDirection, Vehicle, Work};
 use crate::field::follow::TerrainFollowing;
 use crate::flight::{
     Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange,
@@ -83,7 +83,7 @@ pub struct FlightInputs<'a> {
 /// Plans the flights of all vehicles, flight `i` for vehicle `i`, with their take-off times. A
 /// vehicle on its pad without a route stays there. If a route has more than `W` corners or is
 /// longer than [`MAX_PATH_LENGTH_M`], the flight covers its first lanes only
-/// ([`PicturePlan::goes_on`]): as many as leave room for the path home. The next division
+/// ([`PicturePlan::is_first_part`]): as many as leave room for the path home. The next division
 /// ([`super::losses`]) divides the others.
 ///
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a
@@ -246,8 +246,14 @@ fn schedule_in_order<const V: usize, const W: usize>(
             most_gates[usize::from(i)] += own;
             most_gates[index(place)] += theirs;
         };
-        let departure =
-            schedule::departure_and_conflicts(cfg, flight, (0.0, 0.0), &mut before, ws, &mut count);
+        let departure = schedule::departure_with_conflict_counts(
+            cfg,
+            flight,
+            (0.0, 0.0),
+            &mut before,
+            ws,
+            &mut count,
+        );
         out.flights[usize::from(i)].depart_s = departure.map_err(|error| (place, error))?;
     }
     Ok(most_gates)
@@ -348,7 +354,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     let done =
         swarm.photographed.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
     let area = work.tracks.waypoint_count().saturating_add(done);
-    let backward = route.heading == Heading::Backward;
+    let backward = route.heading == RouteDirection::Backward;
     let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, backward);
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
@@ -360,7 +366,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     draft.add_legs_around_zones(&place(route.end_waypoints().0)?, layer_m)?;
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let (low, high) = (*lanes.start(), *lanes.end());
-    photographs.goes_on = most <= high - low;
+    photographs.is_first_part = most <= high - low;
     for lane in lanes.take(most) {
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
@@ -422,7 +428,7 @@ fn finish_with_return<const N: usize, const W: usize>(
         let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
         leg_duration_s(way_m, vehicle.cruise_mps) + leg_duration_s(libm::fabsf(up_m), z_mps)
     };
-    draft.path.label_times_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
+    draft.path.set_times_by_leg(pad.climb_m / swarm.schedule.vertical_mps, seconds);
     let mut flight = Flight {
         id: pad.id,
         task: Task::Photograph(way_home.photographs),

@@ -13,7 +13,7 @@ use super::{CoverageError, Flat};
 use crate::{Length, sort};
 
 /// Orders lanes that are given by both their ends, all parallel, and turns them as they are flown:
-/// by the same search as the lanes of [`super::tracks::build`].
+/// by the same search as the lanes of [`super::tracks::build_lanes`].
 ///
 /// # Errors
 /// Spacings that are wrong, memory that is too small, [`CoverageError::NothingToCover`] where no

@@ -200,7 +200,7 @@ fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: u
         let sure = fate.alive || fate.along_m.is_infinite();
         let count = if sure { taken } else { taken.saturating_sub(1) };
         for range in
-            photographs.shown_waypoints(&flight.path, WaypointRange { first: 0, end: count })
+            photographs.waypoints_of_pictures(&flight.path, WaypointRange { first: 0, end: count })
         {
             ws.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }

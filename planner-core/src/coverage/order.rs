@@ -12,7 +12,7 @@
 //! straight lines would be shorter.
 
 use super::Flat;
-use super::cells::{is_break, order_cells};
+use super::cells::{is_cell_boundary, order_cells};
 use super::lanes::Lane;
 use super::transit::Transit;
 use crate::Length;
@@ -105,7 +105,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         let mut gained = false;
         for i in 0..lanes.len() {
             for j in i..lanes.len() {
-                if !is_break(lanes, i) || !is_break(lanes, j + 1) {
+                if !is_cell_boundary(lanes, i) || !is_cell_boundary(lanes, j + 1) {
                     continue;
                 }
                 if !self.take_search_step() {
@@ -140,7 +140,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         let count = lanes.len();
         for len in 1..=MAX_MOVED.min(count.saturating_sub(1)) {
             for i in 0..=count - len {
-                if !is_break(lanes, i) || !is_break(lanes, i + len) {
+                if !is_cell_boundary(lanes, i) || !is_cell_boundary(lanes, i + len) {
                     continue;
                 }
                 if !self.take_search_step() {
@@ -178,7 +178,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
             more_m: links_m - self.transit_length_m(before, after) - MIN_GAIN_M,
             at: None,
         };
-        for place in (0..i).chain(i + len + 1..=lanes.len()).filter(|k| is_break(lanes, *k)) {
+        for place in (0..i).chain(i + len + 1..=lanes.len()).filter(|k| is_cell_boundary(lanes, *k))
+        {
             if !self.take_search_step() {
                 break;
             }

@@ -60,7 +60,7 @@ pub enum TrackUnit {
 
 /// Direction in which a route is flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heading {
+pub enum RouteDirection {
     /// In ascending order of waypoint numbers.
     Forward,
     /// In descending order of waypoint numbers.
@@ -77,7 +77,7 @@ pub struct Route {
     /// Highest waypoint number of the route plus one.
     pub end: u32,
     /// Direction in which the route is flown.
-    pub heading: Heading,
+    pub heading: RouteDirection,
     /// Transit layer, from 1: it is this many layer heights above the height of pictures.
     pub layer: u8,
     /// Length over ground, metres: transit to the first waypoint, route, transit home.
@@ -93,8 +93,8 @@ impl Route {
     pub fn end_waypoints(&self) -> (u32, u32) {
         let last = self.end.saturating_sub(1);
         match self.heading {
-            Heading::Forward => (self.first, last),
-            Heading::Backward => (last, self.first),
+            RouteDirection::Forward => (self.first, last),
+            RouteDirection::Backward => (last, self.first),
         }
     }
 
@@ -102,8 +102,8 @@ impl Route {
     pub fn waypoints(&self) -> impl Iterator<Item = u32> + use<> {
         let Self { first, end, heading, .. } = *self;
         (first..end).map(move |i| match heading {
-            Heading::Forward => i,
-            Heading::Backward => end - 1 - (i - first),
+            RouteDirection::Forward => i,
+            RouteDirection::Backward => end - 1 - (i - first),
         })
     }
 }
@@ -236,7 +236,11 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     /// Length over ground of a vehicle's flight along a route with these ends, metres, and the
     /// direction in which it is shorter.
     #[inline(never)]
-    pub(super) fn ground_distance_m(&self, vehicle: &Vehicle, ends: &RouteEnds) -> (f32, Heading) {
+    pub(super) fn ground_distance_m(
+        &self,
+        vehicle: &Vehicle,
+        ends: &RouteEnds,
+    ) -> (f32, RouteDirection) {
         let transit_m = |from: &Flat, to: &Flat| {
             self.transit.distance_m(&vehicle.place, from)
                 + self.transit.distance_m(to, &vehicle.home)
@@ -249,8 +253,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
             transit_m(&ends.last, &ends.first)
         };
         match backward < forward {
-            true => (backward + ends.inside_m, Heading::Backward),
-            false => (forward + ends.inside_m, Heading::Forward),
+            true => (backward + ends.inside_m, RouteDirection::Backward),
+            false => (forward + ends.inside_m, RouteDirection::Forward),
         }
     }
 }
@@ -413,7 +417,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
             vehicle: 0,
             first: start,
             end,
-            heading: Heading::Forward,
+            heading: RouteDirection::Forward,
             layer: 0,
             ground_m: 0.0,
             cost_m: 0.0,

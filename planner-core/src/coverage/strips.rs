@@ -18,7 +18,7 @@ use crate::sort;
 pub(super) const WIDTH_ROUNDING: f32 = 1e-4;
 
 /// Memory of the lanes' computation; `V` must be at least the number of the area's vertices.
-pub struct Workspace<const V: usize> {
+pub struct LaneWorkspace<const V: usize> {
     /// First the convex hull, then the area's vertices in the lane frame.
     pub(super) vertices: Vec<Flat, V>,
     pub(super) sets: Sets<V>,
@@ -33,7 +33,7 @@ pub(super) struct Sets<const V: usize> {
     free: Intervals<V>,
 }
 
-impl<const V: usize> Workspace<V> {
+impl<const V: usize> LaneWorkspace<V> {
     /// Creates an empty workspace.
     pub const fn new() -> Self {
         let sets = Sets {
@@ -46,7 +46,7 @@ impl<const V: usize> Workspace<V> {
     }
 }
 
-impl<const V: usize> Default for Workspace<V> {
+impl<const V: usize> Default for LaneWorkspace<V> {
     fn default() -> Self {
         Self::new()
     }
@@ -176,7 +176,7 @@ impl<'a> Strips<'a> {
             for pair in ws.crossings.chunks_exact(2) {
                 ws.barred.add([pair[0], pair[1]])?;
             }
-            for span in edges_of(ring).filter_map(|edge| near_edge(edge, v)) {
+            for span in edges_of(ring).filter_map(|edge| range_near_edge(edge, v)) {
                 ws.barred.add(span)?;
             }
         }
@@ -337,7 +337,7 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
 
 /// Range of `u` on the line `v` that is nearer than [`ZONE_CLEARANCE_M`] to an edge: within the
 /// circles around its ends and the lines beside it. `None` if there is none.
-fn near_edge((a, b): (Flat, Flat), v: f32) -> Option<Span> {
+fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Span> {
     const CLEAR_M: f32 = ZONE_CLEARANCE_M;
     if fmaxf(a.y, b.y) < v - CLEAR_M || fminf(a.y, b.y) > v + CLEAR_M {
         return None;

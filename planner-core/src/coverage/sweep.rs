@@ -38,7 +38,7 @@ impl LaneDirection {
 ///
 /// # Errors
 /// [`AreaError::AreaFull`] if `hull` is too small.
-pub fn least_width<const V: usize>(
+pub fn direction_of_least_width<const V: usize>(
     area: &Area<'_>,
     hull: &mut Vec<Flat, V>,
 ) -> Result<LaneDirection, CoverageError> {

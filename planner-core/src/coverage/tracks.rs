@@ -15,21 +15,21 @@ use super::cells;
 use super::order;
 use super::patches;
 use super::strips::{LaneFrame, Strips};
-use super::sweep::{LaneDirection, least_width};
+use super::sweep::{LaneDirection, direction_of_least_width};
 use super::transit::Transit;
 
 pub use super::lanes::{Lane, LanePattern, Tracks};
-pub use super::strips::Workspace;
+pub use super::strips::LaneWorkspace;
 
 /// Computes the lanes over an area, in the order in which one vehicle would fly them.
 ///
 /// # Errors
 /// Settings out of range, memory too small, [`CoverageError::NothingToCover`].
-pub fn build<const L: usize, const V: usize, const N: usize>(
+pub fn build_lanes<const L: usize, const V: usize, const N: usize>(
     area: &Area<'_>,
     pattern: &LanePattern,
     transit: &Transit<'_, N>,
-    ws: &mut Workspace<V>,
+    ws: &mut LaneWorkspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     pattern.spacing.check()?;
@@ -39,11 +39,11 @@ pub fn build<const L: usize, const V: usize, const N: usize>(
     if area.vertices().len() > V {
         return Err(AreaError::AreaFull.into());
     }
-    let Workspace { vertices, sets } = ws;
+    let LaneWorkspace { vertices, sets } = ws;
     let direction = match pattern.angle_deg {
         Some(angle) if angle.is_finite() => LaneDirection::at_deg(angle),
         Some(_) => return Err(CoverageError::Setting("angle_deg")),
-        None => least_width(area, vertices)?,
+        None => direction_of_least_width(area, vertices)?,
     };
     out.lanes.clear();
     out.along = direction.along;

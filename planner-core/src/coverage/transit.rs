@@ -11,7 +11,7 @@ use crate::Length;
 use heapless::Vec;
 use libm::fminf;
 
-use super::area::{Area, RingKind, doubled_signed_area};
+use super::area::{Area, RingKind, signed_area_m2};
 use super::{CoverageError, Flat};
 
 /// Distance that lanes keep from no-fly zones, and that transits keep from corners at which they
@@ -44,7 +44,7 @@ impl<'a, const N: usize> Transit<'a, N> {
         self.area = area;
         self.corners.clear();
         for (_, ring) in area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly) {
-            let left = doubled_signed_area(ring) > 0.0;
+            let left = signed_area_m2(ring) > 0.0;
             for (i, corner) in ring.iter().enumerate() {
                 let (before, after) =
                     (ring[(i + ring.len() - 1) % ring.len()], ring[(i + 1) % ring.len()]);

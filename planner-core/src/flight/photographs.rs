@@ -4,7 +4,7 @@ use super::{Path, PathError, Waypoint, WaypointRange};
 use crate::Length;
 
 /// Tolerance of arc lengths: a picture this far ahead of the vehicle counts as reached, metres.
-const SAME_PLACE_M: f32 = 1e-2;
+const REACHED_TOLERANCE_M: f32 = 1e-2;
 
 /// Heading of a vehicle along its path while it photographs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,7 +147,7 @@ pub struct PicturePlan {
     pub trigger: Trigger,
     /// Whether the path holds only the first lanes of the vehicle's route: at its end the fleet
     /// divides all remaining lanes again.
-    pub goes_on: bool,
+    pub is_first_part: bool,
 }
 
 impl PicturePlan {
@@ -171,18 +171,18 @@ impl PicturePlan {
             spacing_m,
             heading_mode: look,
             trigger,
-            goes_on: false,
+            is_first_part: false,
         }
     }
 
-    /// The same plan for an area of `area` waypoints, whose numbers rise along the path, or fall if
-    /// `backward`.
+    /// The same plan for an area of `area_waypoint_count` waypoints, whose numbers rise along the
+    /// path, or fall if `backward`.
     pub const fn with_area(self, area: u32, backward: bool) -> Self {
         Self { area, backward, ..self }
     }
 
     /// Number of waypoints of the whole area; 0 where they have no numbers.
-    pub fn area(&self) -> u32 {
+    pub fn area_waypoint_count(&self) -> u32 {
         self.area
     }
 
@@ -241,7 +241,7 @@ impl PicturePlan {
 
     /// Number of pictures taken once the vehicle is at arc length `along_m`.
     pub fn taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
-        let reached_m = along_m + SAME_PLACE_M;
+        let reached_m = along_m + REACHED_TOLERANCE_M;
         self.corners_and_counts(path)
             .map(|(corners, count)| PictureStretch::taken_count(corners, count, reached_m))
             .fold(0, u32::saturating_add)
@@ -249,7 +249,7 @@ impl PicturePlan {
 
     /// Number of pictures certainly taken at arc length `along_m`: those up to one spacing before
     /// it. A later one may still be missing.
-    pub fn passed_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
+    pub fn certainly_taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         self.taken_count(path, along_m - self.spacing_m)
     }
 
@@ -278,7 +278,7 @@ impl PicturePlan {
 
     /// The waypoints of the area that correspond to the path's pictures with these numbers, which
     /// count along the path from 0.
-    pub fn shown_waypoints<const W: usize>(
+    pub fn waypoints_of_pictures<const W: usize>(
         &self,
         path: &Path<W>,
         pictures: WaypointRange,
@@ -385,7 +385,7 @@ mod tests {
             let shown = |first, end| -> std::vec::Vec<_> {
                 let pictures = WaypointRange { first, end };
                 photographs
-                    .shown_waypoints(&path, pictures)
+                    .waypoints_of_pictures(&path, pictures)
                     .map(|range| (range.first, range.end))
                     .collect()
             };

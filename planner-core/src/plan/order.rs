@@ -35,7 +35,8 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         let mut nodes: Vec<u16, W> = Vec::new();
         let length = match flight.task.goal() {
             Some(goal) => {
-                let parked = ParkedVehicles::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
+                let parked =
+                    ParkedVehicles::<V>::new(view, AvoidedParking::Nothing, &out.flights, &[], i);
                 let ends = PathEnds::new(request, i, goal);
                 find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?
             }
@@ -157,10 +158,10 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
         let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
         let turn =
             SchedulingTurn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
-        let waits = wait_on_pad(view, request, &turn, ws, out);
+        let waits = plan_with_pad_wait(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,
-            None => wait_on_path(view, request, &turn, ws, out)
+            None => plan_with_path_waits(view, request, &turn, ws, out)
                 .map_err(|error| (place, PlanError::Schedule(out.flights[index].id, error)))?,
         };
         out.flights[index] = flight;
@@ -170,7 +171,7 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
 
 /// The vehicle's flight on a shortest path after the shortest wait on its pad that avoids
 /// conflicts; `None` if no wait is long enough.
-fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     turn: &SchedulingTurn<'_>,
@@ -181,14 +182,14 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     let flight = &out.flights[index];
     let Some(goal) = flight.task.goal() else { return Ok(None) };
     let ends = PathEnds::new(request, index, goal);
-    for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
+    for avoid in [AvoidedParking::WaitingPads, AvoidedParking::AllPlaces, AvoidedParking::Nothing] {
         let parked = ParkedVehicles::<V>::new(view, avoid, &out.flights, waiting, index);
         let mut nodes: Vec<u16, W> = Vec::new();
         if find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
             continue;
         }
         let mut path = path_from_nodes(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
-        path.label_times(
+        path.set_times_at_speed(
             flight.climb_m / request.schedule.vertical_mps,
             request.schedule.cruise_mps,
         );
@@ -210,7 +211,7 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
 /// of waiting vehicles. The flight that arrives earliest may take off only to wait long in the air.
 /// Then later take-offs are tried, until no wait is longer than [`LONG_WAIT_S`], with at most
 /// [`MAX_DEPARTURES`] searches; the flight whose longest wait is shortest is returned.
-fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     turn: &SchedulingTurn<'_>,
@@ -222,7 +223,7 @@ fn wait_on_path<const N: usize, const V: usize, const W: usize, const P: usize>(
     let Some(goal) = flight.task.goal() else { return Ok(flight) };
     let PathEnds { from, to, vehicle } = PathEnds::new(request, index, goal);
     let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, vehicle.required_clearance_m);
-    for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
+    for avoid in [AvoidedParking::WaitingPads, AvoidedParking::Nothing] {
         let parked = ParkedVehicles::<V>::new(view, avoid, &out.flights, waiting, index);
         let cfg = &request.schedule;
         let mut route =
@@ -271,7 +272,7 @@ fn wait_durations_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
 
 /// Parked vehicles that a path keeps clear of.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Avoid {
+enum AvoidedParking {
     /// The pads of vehicles that stay, or that are not scheduled yet and so may still be there.
     WaitingPads,
     /// The pads and landing places of all other vehicles: then waiting on the pad is always enough.
@@ -289,7 +290,7 @@ struct ParkedVehicles<const V: usize> {
 impl<const V: usize> ParkedVehicles<V> {
     fn new<const W: usize>(
         view: &RoadmapView<'_>,
-        avoid: Avoid,
+        avoid: AvoidedParking,
         flights: &[Flight<W>],
         waiting: &[u16],
         index: usize,
@@ -297,17 +298,19 @@ impl<const V: usize> ParkedVehicles<V> {
         let mut parked = Self { before_flight: Vec::new(), after_flight: Vec::new() };
         let below =
             |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
-        for (j, flight) in
-            flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
+        for (j, flight) in flights
+            .iter()
+            .enumerate()
+            .filter(|&(j, _)| j != index && avoid != AvoidedParking::Nothing)
         {
             // Cannot overflow: at most one entry of each kind per flight.
-            if avoid == Avoid::AllPlaces
+            if avoid == AvoidedParking::AllPlaces
                 || !flight.task.leaves_pad()
                 || waiting.contains(&(j as u16))
             {
                 let _ = parked.before_flight.push(below(j, flight.climb_m));
             }
-            if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.task.goal()) {
+            if let (AvoidedParking::AllPlaces, Some(goal)) = (avoid, flight.task.goal()) {
                 let _ = parked
                     .after_flight
                     .push(below(flights.len() + usize::from(goal), flight.descent_m));

@@ -17,7 +17,7 @@ pub enum Objective {
 
 /// Whether goals are given to vehicles or assigned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
+pub enum GoalMode {
     /// The request names the goal of each vehicle.
     Labelled,
     /// Any vehicle may get any goal; the planner assigns them by this objective.
@@ -46,7 +46,7 @@ pub struct PlanRequest<'a> {
     /// roadmap.
     pub descents_m: &'a [f32],
     /// Whether goals are given to vehicles or assigned.
-    pub mode: Mode,
+    pub mode: GoalMode,
     /// Separations and nominal speeds.
     pub schedule: ScheduleConfig,
     /// Most gates that a vehicle may have: the least capacity `G` with which
@@ -68,7 +68,7 @@ impl PlanRequest<'_> {
             if before.iter().any(|other| other.id == vehicle.id) {
                 return Err(PlanError::SameId(vehicle.id));
             }
-            let labelled = self.mode == Mode::Labelled && vehicle.goal.is_some();
+            let labelled = self.mode == GoalMode::Labelled && vehicle.goal.is_some();
             if labelled && before.iter().any(|other| other.goal == vehicle.goal) {
                 return Err(PlanError::SameGoal(vehicle.id));
             }

@@ -68,7 +68,7 @@ fn plan(
     bytes: &[u8],
     vehicles: &[VehicleTask],
     goals: usize,
-    mode: Mode,
+    mode: GoalMode,
 ) -> Result<SwarmPlan<16, 64>, PlanError> {
     let view = RoadmapView::parse(bytes).unwrap();
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 2048>::new());
@@ -120,7 +120,11 @@ proptest! {
         let connected = connected(&view);
         prop_assume!((0..20).all(|terminal| connected.contains(&terminal)));
         let mode =
-            if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
+            if labelled {
+                GoalMode::Labelled
+            } else {
+                GoalMode::Unlabelled(Objective::TotalDistance)
+            };
         let plan = plan(&bytes, &tasks(10, labelled), 10, mode).unwrap();
         prop_assert!(plan.flights.iter().all(|f| f.task.leaves_pad()));
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
@@ -173,7 +177,7 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
         [8.0, 14.0, 16.0, 22.0].into_iter().flat_map(|at| depths.map(|depth| (at, depth)))
     {
         let bytes = corridor(30.0, side_at_m, depth_m);
-        let plan = plan(&bytes, &tasks(2, true), 2, Mode::Labelled).unwrap();
+        let plan = plan(&bytes, &tasks(2, true), 2, GoalMode::Labelled).unwrap();
         let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
         assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
         let waits =
@@ -199,7 +203,7 @@ fn antipodal_swaps_over_a_circle_are_planned() {
         (0..10).map(place).chain((0..10).map(|i| place(i + 5))).collect();
     for seed in 0..4 {
         let bytes = open_roadmap(&terminals, 10, 400, seed);
-        let plan = plan(&bytes, &tasks(10, true), 10, Mode::Labelled).unwrap();
+        let plan = plan(&bytes, &tasks(10, true), 10, GoalMode::Labelled).unwrap();
         let apart = checker::fly(&SCHEDULE, &plan.flights, &[1.5; 10], 40_000);
         assert!(
             apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3),
@@ -214,11 +218,12 @@ fn unlabelled_is_no_longer_than_labelled_and_makespan_no_later() {
         let bytes = open_roadmap(&spread(16, seed), 8, 300, seed);
         let longest =
             |p: &SwarmPlan<16, 64>| p.flights.iter().map(|f| f.path.length_m()).fold(0.0, f32::max);
-        let labelled = plan(&bytes, &tasks(8, true), 8, Mode::Labelled).unwrap();
+        let labelled = plan(&bytes, &tasks(8, true), 8, GoalMode::Labelled).unwrap();
         let total =
-            plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
+            plan(&bytes, &tasks(8, false), 8, GoalMode::Unlabelled(Objective::TotalDistance))
+                .unwrap();
         let makespan =
-            plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::Makespan)).unwrap();
+            plan(&bytes, &tasks(8, false), 8, GoalMode::Unlabelled(Objective::Makespan)).unwrap();
         // Detours around pads and landing places may lengthen a path a little.
         assert!(total.total_m() <= labelled.total_m() * 1.05, "seed {seed}");
         assert!(longest(&makespan) <= longest(&total) * 1.05, "seed {seed}");
@@ -231,7 +236,7 @@ fn a_vehicle_without_a_goal_stays_and_a_goal_without_a_way_is_left() {
     terminals.push(Point::new(500.0, 500.0, HEIGHT_M)); // out of reach
     let bytes = open_roadmap(&terminals, 4, 300, 3);
     let plan =
-        plan(&bytes, &tasks(4, false), 2, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
+        plan(&bytes, &tasks(4, false), 2, GoalMode::Unlabelled(Objective::TotalDistance)).unwrap();
     let flying: StdVec<_> = plan.flights.iter().filter_map(|f| f.task.goal()).collect();
     assert_eq!(flying, [0], "one goal in reach, one vehicle flies to it");
     checker::fly(&SCHEDULE, &plan.flights, &[1.0; 4], 10_000).unwrap();
@@ -241,7 +246,7 @@ fn a_vehicle_without_a_goal_stays_and_a_goal_without_a_way_is_left() {
 fn the_same_request_gives_the_same_plan_and_another_gives_another_crc() {
     let terminals = spread(8, 5);
     let bytes = open_roadmap(&terminals, 4, 200, 5);
-    let mode = Mode::Unlabelled(Objective::TotalDistance);
+    let mode = GoalMode::Unlabelled(Objective::TotalDistance);
     let first = plan(&bytes, &tasks(4, false), 4, mode).unwrap();
     assert_eq!(first, plan(&bytes, &tasks(4, false), 4, mode).unwrap());
     let other = plan(&open_roadmap(&terminals, 4, 200, 6), &tasks(4, false), 4, mode).unwrap();
@@ -251,14 +256,14 @@ fn the_same_request_gives_the_same_plan_and_another_gives_another_crc() {
 #[test]
 fn wrong_requests_are_refused_by_name() {
     let bytes = open_roadmap(&spread(4, 7), 2, 50, 7);
-    let unlabelled = Mode::Unlabelled(Objective::TotalDistance);
+    let unlabelled = GoalMode::Unlabelled(Objective::TotalDistance);
     assert_eq!(plan(&bytes, &tasks(3, false), 2, unlabelled).unwrap_err(), PlanError::Terminals);
     let mut twice = tasks(2, false);
     twice[1].id = 1;
     assert_eq!(plan(&bytes, &twice, 2, unlabelled).unwrap_err(), PlanError::SameId(1));
     let mut labelled = tasks(2, true);
     labelled[1].goal = Some(9);
-    assert_eq!(plan(&bytes, &labelled, 2, Mode::Labelled).unwrap_err(), PlanError::BadGoal(2));
+    assert_eq!(plan(&bytes, &labelled, 2, GoalMode::Labelled).unwrap_err(), PlanError::BadGoal(2));
 }
 
 /// A corridor along x that vehicles cross one behind the other, starts on its left and goals on its
@@ -311,7 +316,7 @@ fn fits<const G: usize>(bytes: &[u8], vehicles: &[VehicleTask]) -> (bool, Result
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 4096>::new());
     let mut out = SwarmPlan::<16, 64>::new();
     let descents = std::vec![HEIGHT_M; vehicles.len()];
-    let mode = Mode::Labelled;
+    let mode = GoalMode::Labelled;
     let request =
         PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: G };
     let planned = plan_swarm(&view, &request, &mut ws, &mut out);
@@ -338,7 +343,7 @@ fn eight_through_a_corridor_fit_the_gates_of_a_board_or_are_refused() {
 #[test]
 fn flights_of_four_kilometres_are_scheduled_and_flown() {
     let (bytes, vehicles) = queue(4000.0, 3, 99.0, 1);
-    let plan = plan(&bytes, &vehicles, 3, Mode::Labelled).unwrap();
+    let plan = plan(&bytes, &vehicles, 3, GoalMode::Labelled).unwrap();
     for flight in &plan.flights {
         assert!(
             flight.path.length_m() > 4000.0 && flight.segment_m > schedule::MAX_TIMED_SEGMENT_M

@@ -9,10 +9,10 @@
 //! other segments go to the exact check.
 
 use super::config::Config;
-use super::neighbours::Workspace;
+use super::neighbours::NodeIndex;
 use crate::Point;
 use crate::segment::{
-    MIN_MISSED_CELLS, Snapped, is_farther_than, lane_mask, segment_is_clear, snap,
+    Snapped, TOUCH_CHECK_BELOW_CELLS, is_farther_than, lane_mask, segment_is_clear, snap,
     snapped_rest_touches,
 };
 use crate::voxel::VoxelGrid;
@@ -88,7 +88,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     }
 
     /// Sets the node to check from, and finds the free box around it.
-    pub(super) fn move_to(&mut self, here: [f32; 3]) {
+    pub(super) fn set_node(&mut self, here: [f32; 3]) {
         let shape = self.grid.shape();
         self.here = here;
         self.snapped = snap(shape, &Point::from(here));
@@ -137,7 +137,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     #[inline(always)]
     pub(super) fn for_each_visible<E, const NODES: usize, const CUBES: usize>(
         &self,
-        workspace: &Workspace<NODES, CUBES>,
+        workspace: &NodeIndex<NODES, CUBES>,
         places: &[u16],
         hint: impl Fn(usize) -> Option<bool>,
         mut found: impl FnMut(usize, f32) -> Result<(), E>,
@@ -171,7 +171,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else {
             return false;
         };
-        if self.clearance_cells >= MIN_MISSED_CELLS {
+        if self.clearance_cells >= TOUCH_CHECK_BELOW_CELLS {
             return is_farther_than(
                 self.grid,
                 &Point::from(self.here),

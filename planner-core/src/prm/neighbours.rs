@@ -14,7 +14,7 @@ const CANDIDATE_LANES: usize = 16;
 
 /// The index of up to `NODES` nodes in fewer than `CUBES` cubes: 14 bytes per node, 2 per cube. The
 /// default board has 4096 of each.
-pub struct Workspace<const NODES: usize, const CUBES: usize> {
+pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
     /// Coordinates of the nodes in sorted order.
     x: [f32; NODES],
     y: [f32; NODES],
@@ -29,13 +29,13 @@ pub struct Workspace<const NODES: usize, const CUBES: usize> {
     dims: [usize; 3],
 }
 
-impl<const NODES: usize, const CUBES: usize> Default for Workspace<NODES, CUBES> {
+impl<const NODES: usize, const CUBES: usize> Default for NodeIndex<NODES, CUBES> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
+impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
     /// Creates an empty index, all zero: a static of it takes no flash.
     pub const fn new() -> Self {
         const { assert!(NODES <= u16::MAX as usize && CUBES >= 2) };

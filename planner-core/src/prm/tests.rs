@@ -23,7 +23,7 @@ fn config(seed: u64) -> Config {
 fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
     let dims = [12.0, 10.0, 6.0].map(|m: f32| (m / resolution_m) as u32);
     let shape = GridShape { dims, min: Point::new(-3.0, 1.0, 0.5), resolution_m };
-    let mut words = vec![0; shape.brick_count()];
+    let mut words = vec![0; shape.word_count()];
     let walls: Vec<(usize, u32, [u32; 3])> = (0..4)
         .map(|i| {
             let axis = i % 3;
@@ -41,7 +41,7 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
                     cell[*axis] == *at && !open
                 });
                 if wall || rng.next_u32().is_multiple_of(500) {
-                    let (word, mask) = shape.address(cell);
+                    let (word, mask) = shape.word_and_mask(cell);
                     words[word] |= mask;
                 }
             }
@@ -52,7 +52,7 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
 
 /// The one checker of edges: the same set as all pairs give, none twice.
 fn check_edges(grid: &VoxelGrid<'_>, nodes: &[Point], config: &Config) -> usize {
-    let mut workspace = Workspace::<400, 600>::new();
+    let mut workspace = NodeIndex::<400, 600>::new();
     let mut edges = vec![Edge::default(); 50_000];
     let count = connect(grid, nodes, config, &mut workspace, &mut edges).unwrap();
     let mut split = Vec::new();
@@ -109,13 +109,13 @@ fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
         let shape =
             GridShape { dims: [40, 36, 32], min: Point::new(-1.0, 2.0, 0.5), resolution_m: 0.25 };
         let wall = shape.dims[axis] / 2;
-        let mut words = vec![0; shape.brick_count()];
+        let mut words = vec![0; shape.word_count()];
         for i in 0..shape.dims[0] {
             for j in 0..shape.dims[1] {
                 for k in 0..shape.dims[2] {
                     let in_wall = [i, j, k][axis] == wall && !rng.next_u32().is_multiple_of(3);
                     if in_wall || rng.next_u32().is_multiple_of(2000) {
-                        let (word, mask) = shape.address([i, j, k]);
+                        let (word, mask) = shape.word_and_mask([i, j, k]);
                         words[word] |= mask;
                     }
                 }
@@ -177,12 +177,12 @@ fn bridges_lie_in_doors() {
     for seed in 0..10 {
         let shape =
             GridShape { dims: [60, 40, 20], min: Point::new(-2.0, 1.0, 0.0), resolution_m: 0.1 };
-        let mut words = vec![0; shape.brick_count()];
+        let mut words = vec![0; shape.word_count()];
         let door = 5 + seed as u32 * 2..13 + seed as u32 * 2;
         for (j, k) in
             (0..40).flat_map(|j| (0..20).map(move |k| (j, k))).filter(|(j, _)| !door.contains(j))
         {
-            let (word, mask) = shape.address([30, j, k]);
+            let (word, mask) = shape.word_and_mask([30, j, k]);
             words[word] |= mask;
         }
         let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
@@ -251,7 +251,7 @@ fn refusals_are_named() {
     ] {
         assert_eq!(sample_nodes(&empty, None, &[], &bad, &mut nodes), Err(PrmError::Config(name)));
     }
-    let mut workspace = Workspace::<20, 8>::new();
+    let mut workspace = NodeIndex::<20, 8>::new();
     let count = sample_nodes(&empty, None, &[inside], &few, &mut nodes).unwrap();
     let mut edges = [Edge::default(); 5];
     assert_eq!(
@@ -273,7 +273,7 @@ fn refusals_are_named() {
 #[test]
 fn an_edge_knows_its_clearance() {
     let shape = GridShape { dims: [16, 16, 16], min: Point::zeros(), resolution_m: 0.5 };
-    let words = vec![0; shape.brick_count()];
+    let words = vec![0; shape.word_count()];
     let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
     let nodes = [Point::new(1.0, 2.0, 3.0), Point::new(4.0, 2.0, 3.0)];
     assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 1 }, 4.0), Some(1.0));

@@ -1,7 +1,9 @@
 //! The checks of a roadmap file's content: rows in order, each edge stored from both ends within
 //! the header's limits, and distances to landmarks that are those of shortest paths.
 
-use super::{LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapView, in_range};
+use super::{
+    LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapView, has_valid_coordinates,
+};
 
 impl RoadmapView<'_> {
     /// Checks row offsets, coordinates, targets, opposite half-edges, clearances and lengths.
@@ -21,7 +23,7 @@ impl RoadmapView<'_> {
             return Err(RoadmapError::Offset(self.nodes.len() as u16));
         }
         for node in 0..self.nodes.len() as u16 {
-            if !in_range(&self.node(node)) {
+            if !has_valid_coordinates(&self.node(node)) {
                 return Err(RoadmapError::Node(node));
             }
             let mut previous = None;
@@ -33,7 +35,7 @@ impl RoadmapView<'_> {
                 previous = Some(edge.target);
             }
         }
-        let (least_m, most_m) = self.header.clearances();
+        let (least_m, most_m) = self.header.clearance_limits_m();
         for node in 0..self.nodes.len() as u16 {
             let here = self.node(node);
             for edge in self.half_edges(node) {

@@ -4,7 +4,7 @@
 use super::{
     HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M, MAX_NODES,
     NODE_LEN, RoadmapError, RoadmapHeader, RoadmapView, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN,
-    in_range, millimetres_down, target_of,
+    decode_target, has_valid_coordinates, millimetres_down,
 };
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -153,11 +153,11 @@ fn check_edges(
     edges: &[Edge],
 ) -> Result<(), RoadmapError> {
     for (i, node) in nodes.iter().enumerate() {
-        if !in_range(node) {
+        if !has_valid_coordinates(node) {
             return Err(RoadmapError::Node(i as u16));
         }
     }
-    let (least_m, _) = header.clearances();
+    let (least_m, _) = header.clearance_limits_m();
     for (i, edge) in edges.iter().enumerate() {
         let (Some(a), Some(b)) = (nodes.get(usize::from(edge.a)), nodes.get(usize::from(edge.b)))
         else {
@@ -250,9 +250,11 @@ fn write_rows(
     offsets[0] = [0; WORD_LEN];
     for node in 0..last as u16 {
         let row = &mut half_edges[get(offsets, node) as usize..get(offsets, node + 1) as usize];
-        row.sort_unstable_by_key(target_of);
-        if let Some(pair) = row.windows(2).find(|pair| target_of(&pair[0]) == target_of(&pair[1])) {
-            return Err(RoadmapError::Duplicate(node, target_of(&pair[0])));
+        row.sort_unstable_by_key(decode_target);
+        if let Some(pair) =
+            row.windows(2).find(|pair| decode_target(&pair[0]) == decode_target(&pair[1]))
+        {
+            return Err(RoadmapError::Duplicate(node, decode_target(&pair[0])));
         }
     }
     Ok(())

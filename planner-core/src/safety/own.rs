@@ -81,8 +81,8 @@ impl<'a> OwnSet<'a> {
         for (from, to) in set.segments().skip(usize::from(double)) {
             // Cannot overflow: there are at most as many legs as points.
             let _ = legs.push(Leg::new(from, to));
-            low = merge_coordinates(&low, to, |a, b| a < b);
-            high = merge_coordinates(&high, to, |a, b| a > b);
+            low = select_per_axis(&low, to, |a, b| a < b);
+            high = select_per_axis(&high, to, |a, b| a > b);
         }
         Self { set, legs, middle: (low + high) * 0.5, half: (high - low) * 0.5 }
     }
@@ -90,7 +90,7 @@ impl<'a> OwnSet<'a> {
     /// Distances from the set's bounding box to a point along each axis, metres; 0 on an axis along
     /// which the point is within the box.
     #[inline]
-    pub fn away_from_box(&self, place: &Point) -> Point {
+    pub fn distance_from_box(&self, place: &Point) -> Point {
         let axis = |axis: usize| {
             let away = (place[axis] - self.middle[axis]).abs() - self.half[axis];
             if away > 0.0 { away } else { 0.0 }
@@ -181,7 +181,7 @@ impl<'a> OwnSet<'a> {
 /// For each coordinate that of `b` if it is `more` than that of `a`, else that of `a`. Not `min`:
 /// its handling of NaN takes a board three times as long.
 #[inline]
-fn merge_coordinates(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
+fn select_per_axis(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
     let of = |a: f32, b: f32| if more(b, a) { b } else { a };
     Point::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
 }

@@ -131,7 +131,7 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
         assert!(other.reach_m() <= heard.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
         let from_line_m = least_sq(&ReachableSet::at(position), &set, f32::INFINITY).sqrt();
         assert!(
-            own.away_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001,
+            own.distance_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001,
             "{seed}: {set:?}"
         );
         let apart_m = uniform(rng, 0.5, 3.0);

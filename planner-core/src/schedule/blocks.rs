@@ -10,14 +10,14 @@ use heapless::Vec;
 use libm::fmaxf;
 
 use super::config::ScheduleConfig;
-use super::pieces::{MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, line_of_part, straight_part};
+use super::pieces::{MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, part_leg_ends, straight_part};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
 /// Timed segments per block. More make capsules wide at corners, fewer make more capsules.
 pub(super) const SEGMENTS_PER_BLOCK: usize = 8;
-/// Most blocks of a flight; each is a bit of [`Bits`].
+/// Most blocks of a flight; each is a bit of [`BlockSet`].
 pub(super) const MAX_BLOCKS: usize = MAX_TIMED_SEGMENTS / SEGMENTS_PER_BLOCK;
 /// Blocks per group.
 const BLOCKS_PER_GROUP: usize = 8;
@@ -33,16 +33,16 @@ const LENGTH_ROUNDING_M: f32 = 0.01;
 const LENGTH_ROUNDING: f32 = 2e-6;
 
 /// A set of blocks of a flight: bit `i` is block `i`.
-pub(super) type Bits = u64;
+pub(super) type BlockSet = u64;
 
 const _: () = assert!(
-    MAX_BLOCKS <= Bits::BITS as usize && MAX_TIMED_SEGMENTS.is_multiple_of(SEGMENTS_PER_BLOCK),
+    MAX_BLOCKS <= BlockSet::BITS as usize && MAX_TIMED_SEGMENTS.is_multiple_of(SEGMENTS_PER_BLOCK),
     "a bit for each block"
 );
 
 /// Bounding box and capsule of consecutive timed segments.
 #[derive(Clone, Copy, Debug)]
-struct Block {
+struct SegmentBlock {
     bounding_box: BoundingBox,
     /// Axis of the capsule: from the beginning of the first segment to the end of the last.
     line: (Point, Point),
@@ -50,7 +50,7 @@ struct Block {
     lateral_extent_m: f32,
 }
 
-impl Block {
+impl SegmentBlock {
     /// The block around consecutive segments. A curve of their length between the same ends
     /// deviates from the straight line by at most half the minor axis of the ellipse with foci at
     /// both ends; that is the radius.
@@ -73,7 +73,7 @@ impl Block {
     }
 
     /// The block of all that is in a box: its radius is infinite, so only the box rules out pairs.
-    fn filling(bounding_box: BoundingBox) -> Self {
+    fn from_box(bounding_box: BoundingBox) -> Self {
         Self {
             bounding_box,
             line: (bounding_box.0, bounding_box.1),
@@ -81,7 +81,7 @@ impl Block {
         }
     }
 
-    fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
+    fn capsules_come_near(&self, other: &Self, reach_m: f32) -> bool {
         let apart_m = reach_m + self.lateral_extent_m + other.lateral_extent_m;
         let (own, theirs) = (&self.line, &other.line);
         // Between lines of 10^15 m the distance is not a number.
@@ -124,7 +124,7 @@ impl BoundingBox {
 
     /// Whether a line lies entirely beyond one face of the box. False does not mean that they meet.
     #[inline(never)]
-    fn is_beside_line(&self, from: &Point, to: &Point) -> bool {
+    fn is_line_beyond_face(&self, from: &Point, to: &Point) -> bool {
         (0..3).any(|axis| {
             let (low, high) = (self.0[axis], self.1[axis]);
             (from[axis] > high && to[axis] > high) || (from[axis] < low && to[axis] < low)
@@ -136,7 +136,7 @@ impl BoundingBox {
 /// by `reach_m`, so that a line outside one is in no conflict with its segments.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
-    blocks: Vec<Block, MAX_BLOCKS>,
+    blocks: Vec<SegmentBlock, MAX_BLOCKS>,
     groups: Vec<BoundingBox, MAX_GROUPS>,
     whole: BoundingBox,
     /// Distance from which on two segments are not in conflict, metres.
@@ -154,7 +154,7 @@ impl Blocks {
         self.reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M;
         self.blocks.clear();
         for some in pieces.chunks(SEGMENTS_PER_BLOCK) {
-            let mut block = Block::around_segments(some);
+            let mut block = SegmentBlock::around_segments(some);
             block.bounding_box.widen(self.reach_m);
             // Cannot overflow: there are no more segments than all blocks have room for.
             let _ = self.blocks.push(block);
@@ -178,18 +178,19 @@ impl Blocks {
         &'f self,
         cfg: &'f ScheduleConfig,
         flight: &'f Flight<W>,
-    ) -> impl Iterator<Item = (StraightPart, Bits)> + use<'f, W> {
+    ) -> impl Iterator<Item = (StraightPart, BlockSet)> + use<'f, W> {
         let (mut next, mut checked_to) = (0, 1);
         core::iter::from_fn(move || {
             loop {
                 if next >= checked_to {
-                    let (legs, around) = level_run(flight.path.waypoints().get(next - 1..)?)?;
+                    let (legs, around) =
+                        leading_level_legs(flight.path.waypoints().get(next - 1..)?)?;
                     checked_to = next + legs.max(1);
-                    if legs > 1 && self.blocks_near_block(&Block::filling(around)) == 0 {
+                    if legs > 1 && self.blocks_near_block(&SegmentBlock::from_box(around)) == 0 {
                         next = checked_to;
                     }
                 }
-                let (from, to) = line_of_part(flight, next)?;
+                let (from, to) = part_leg_ends(flight, next)?;
                 let near = self.blocks_near_line(from, to);
                 next += 1;
                 if near != 0 {
@@ -201,22 +202,26 @@ impl Blocks {
 
     /// The blocks that may be in conflict with another flight on the straight line between two
     /// points.
-    pub(super) fn blocks_near_line(&self, from: Point, to: Point) -> Bits {
-        if self.whole.is_beside_line(&from, &to) {
+    pub(super) fn blocks_near_line(&self, from: Point, to: Point) -> BlockSet {
+        if self.whole.is_line_beyond_face(&from, &to) {
             return 0;
         }
-        self.blocks_near_block(&Block::around_line(from, to))
+        self.blocks_near_block(&SegmentBlock::around_line(from, to))
     }
 
     /// The blocks that may be in conflict with these at most [`SEGMENTS_PER_BLOCK`] consecutive
     /// segments of another flight.
-    pub(super) fn blocks_near(&self, pieces: &[TimedSegment]) -> Bits {
-        if pieces.is_empty() { 0 } else { self.blocks_near_block(&Block::around_segments(pieces)) }
+    pub(super) fn blocks_near(&self, pieces: &[TimedSegment]) -> BlockSet {
+        if pieces.is_empty() {
+            0
+        } else {
+            self.blocks_near_block(&SegmentBlock::around_segments(pieces))
+        }
     }
 
     /// The blocks that may be in conflict with a block of another flight.
     #[inline(never)]
-    fn blocks_near_block(&self, other: &Block) -> Bits {
+    fn blocks_near_block(&self, other: &SegmentBlock) -> BlockSet {
         let mut near = 0;
         for (group, (around, blocks)) in
             self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
@@ -226,7 +231,7 @@ impl Blocks {
             }
             for (bit, own) in blocks.iter().enumerate() {
                 if own.bounding_box.overlaps(&other.bounding_box)
-                    && own.lines_meet(other, self.reach_m)
+                    && own.capsules_come_near(other, self.reach_m)
                 {
                     near |= 1 << (group * BLOCKS_PER_GROUP + bit);
                 }
@@ -239,7 +244,7 @@ impl Blocks {
     /// another flight on a straight line to `out`, in ascending order.
     pub(super) fn segments_near_line(
         &self,
-        near: Bits,
+        near: BlockSet,
         pieces: &[TimedSegment],
         (from, to): (Point, Point),
         out: &mut Vec<u16, MAX_TIMED_SEGMENTS>,
@@ -252,7 +257,7 @@ impl Blocks {
             let first = block * SEGMENTS_PER_BLOCK;
             let end = (first + SEGMENTS_PER_BLOCK).min(pieces.len());
             for (index, piece) in (first..).zip(pieces.get(first..end).unwrap_or_default()) {
-                if !line.is_beside_line(&piece.from, &piece.to) {
+                if !line.is_line_beyond_face(&piece.from, &piece.to) {
                     // Cannot overflow: `out` has room for all segments.
                     let _ = out.push(index as u16);
                 }
@@ -263,7 +268,7 @@ impl Blocks {
 
 /// Number of legs from the first waypoint on that stay at its height, and their bounding box, by
 /// which all of them can be ruled out at once.
-fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
+fn leading_level_legs(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
     let (first, rest) = waypoints.split_first()?;
     let (mut low, mut high) = (first.position, first.position);
     let mut legs = 0;
@@ -282,17 +287,17 @@ fn level_run(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
 }
 
 /// Indices of the set bits, in ascending order.
-pub(super) fn set_bit_indices(mut bits: Bits) -> impl Iterator<Item = usize> {
+pub(super) fn set_bit_indices(mut bits: BlockSet) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
-        (bit < Bits::BITS as usize).then_some(bit)
+        (bit < BlockSet::BITS as usize).then_some(bit)
     })
 }
 
 /// The segments of the blocks `near` with their indices, in ascending order.
 pub(super) fn segments_in_blocks(
-    near: Bits,
+    near: BlockSet,
     pieces: &[TimedSegment],
 ) -> impl Iterator<Item = (usize, &TimedSegment)> {
     set_bit_indices(near).flat_map(|block| {
@@ -386,7 +391,7 @@ mod tests {
     fn whole(points: &[(f32, f32, f32)], descent_m: f32) -> Flight<8> {
         let mut path = Path::new();
         points.iter().for_each(|(x, y, z)| path.push(Point::new(*x, *y, *z), 1.0).unwrap());
-        path.label_times(1.5, CFG.cruise_mps);
+        path.set_times_at_speed(1.5, CFG.cruise_mps);
         let mut flight = Flight {
             id: 1,
             task: Task::Goto(0),

@@ -34,7 +34,7 @@ pub enum ScheduleError {
     /// A flight has more timed segments than [`MAX_TIMED_SEGMENTS`](super::MAX_TIMED_SEGMENTS), or
     /// all flights more than the workspace holds; or the roadmap has more nodes, or the path more
     /// waypoints, than there is room for.
-    PiecesFull,
+    SegmentsFull,
     /// A vehicle has more than `G` gates, even merged.
     GatesFull,
     /// At no take-off time is this vehicle without conflict with those already scheduled.

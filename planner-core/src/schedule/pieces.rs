@@ -18,7 +18,7 @@ pub const MAX_TIMED_SEGMENTS: usize = 320;
 const MAX_SEGMENT_DOUBLINGS: usize = 10;
 /// Least time after take-off for which the pad is held, seconds: a vehicle that stands on its pad
 /// has not left it.
-pub(super) const OFF_PAD_S: f32 = 0.05;
+pub(super) const MIN_PAD_HOLD_S: f32 = 0.05;
 
 /// A timed segment: a straight part of a flight, and the interval in which it is held. Times are
 /// seconds after take-off; the pad is held from −∞, the landing place to +∞.
@@ -96,9 +96,13 @@ pub(super) struct StraightPart {
 impl StraightPart {
     /// Refuses a leg of more than `most` timed segments: enormous lengths would make billions of
     /// them.
-    pub(super) fn check_count(&self, segment_m: f32, most: usize) -> Result<(), ScheduleError> {
+    pub(super) fn check_segment_count(
+        &self,
+        segment_m: f32,
+        most: usize,
+    ) -> Result<(), ScheduleError> {
         let fits = segment_count(self.leg.length_m, segment_m) as usize <= most;
-        if fits { Ok(()) } else { Err(ScheduleError::PiecesFull) }
+        if fits { Ok(()) } else { Err(ScheduleError::SegmentsFull) }
     }
 
     /// Passes the part's timed segments, the leg's at most `segment_m` long, to `tell` in order.
@@ -132,7 +136,7 @@ pub(super) fn straight_part<const W: usize>(
         return None;
     }
     let holds = begin.leave_s > begin.arrive_s;
-    let hold = stay(begin.position, begin.along_m, begin.arrive_s, begin.leave_s);
+    let hold = hold_segment(begin.position, begin.along_m, begin.arrive_s, begin.leave_s);
     let before = holds.then_some(TimedSegment { parked: false, ..hold });
     Some(match next {
         Some(next) => StraightPart { before, ..leg_part(begin, next) },
@@ -142,7 +146,7 @@ pub(super) fn straight_part<const W: usize>(
 
 /// The ends of the leg of straight part `part`, the same as in [`straight_part`]; `None` for a
 /// larger `part`.
-pub(super) fn line_of_part<const W: usize>(
+pub(super) fn part_leg_ends<const W: usize>(
     flight: &Flight<W>,
     part: usize,
 ) -> Option<(Point, Point)> {
@@ -160,7 +164,7 @@ pub(super) fn line_of_part<const W: usize>(
 }
 
 /// Timed segment of a vehicle that stays at a point, whose arc length is `m`.
-fn stay(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
+fn hold_segment(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
     TimedSegment { from: at, to: at, from_m: m, to_m: m, from_s, to_s, parked: true }
 }
 
@@ -168,7 +172,7 @@ fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightP
     let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
     let (from_m, to_m) = (-flight.climb_m, 0.0);
     if !flight.task.leaves_pad() {
-        let before = Some(stay(pad, from_m, f32::NEG_INFINITY, f32::INFINITY));
+        let before = Some(hold_segment(pad, from_m, f32::NEG_INFINITY, f32::INFINITY));
         return StraightPart {
             before,
             leg: Leg::climb(pad, pad, 0.0),
@@ -179,7 +183,7 @@ fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightP
     }
     let leg = Leg::climb(pad, first.position, first.arrive_s);
     let (left_m, left_s) = leg.first_segment(flight.segment_m);
-    let on_pad = stay(pad, from_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
+    let on_pad = hold_segment(pad, from_m, f32::NEG_INFINITY, fmaxf(left_s, MIN_PAD_HOLD_S));
     let before = Some(TimedSegment { to_m: left_m - flight.climb_m, ..on_pad });
     StraightPart { before, leg, from_m, to_m, after: None }
 }
@@ -206,7 +210,7 @@ fn descent_part<const W: usize>(
     let landed_s = last.leave_s + flight.descent_m / vertical_mps;
     let leg =
         Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
-    let landed = stay(ground, end_m, last.leave_s, f32::INFINITY);
+    let landed = hold_segment(ground, end_m, last.leave_s, f32::INFINITY);
     let after = Some(TimedSegment { from_m: last.along_m, ..landed });
     StraightPart { before: None, leg, from_m: last.along_m, to_m: end_m, after }
 }
@@ -220,10 +224,10 @@ pub(super) fn cut_into_segments<const W: usize>(
     out.clear();
     let mut full = false;
     for part in (0..).map_while(|part| straight_part(cfg.vertical_mps, flight, part)) {
-        part.check_count(flight.segment_m, MAX_TIMED_SEGMENTS - out.len())?;
+        part.check_segment_count(flight.segment_m, MAX_TIMED_SEGMENTS - out.len())?;
         part.for_each_segment(flight.segment_m, &mut |segment| full |= out.push(segment).is_err());
     }
-    if full { Err(ScheduleError::PiecesFull) } else { Ok(()) }
+    if full { Err(ScheduleError::SegmentsFull) } else { Ok(()) }
 }
 
 /// Where on a leg a vehicle may wait for another one.

@@ -16,10 +16,10 @@ use libm::{fmaxf, fminf};
 use super::config::{ScheduleConfig, ScheduleError};
 use super::near::SegmentGrid;
 use super::pieces::{
-    Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, OFF_PAD_S, TimedSegment, WaitingPlaces,
+    Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, MIN_PAD_HOLD_S, TimedSegment, WaitingPlaces,
     cut_into_segments, is_conflict, segment_count,
 };
-use super::{Forbidden, add_forbidden_interval, first_allowed, last_allowed};
+use super::{ForbiddenIntervals, add_forbidden_interval, first_allowed, last_allowed};
 use crate::flight::{Flight, Path};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::heap::{Heap, SETTLED};
@@ -66,7 +66,7 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     first: [u16; N],
     heap: Heap<N>,
     cut: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
-    forbidden: Forbidden,
+    forbidden: ForbiddenIntervals,
     /// Time for which the route sought needs a place to have been left, seconds.
     handover_s: f32,
 }
@@ -136,7 +136,7 @@ struct StateTransition {
 }
 
 /// A straight leg that begins at time 0 and takes `duration_s`.
-fn leg_from_start(from: Point, to: Point, duration_s: f32) -> Leg {
+fn leg_at_time_zero(from: Point, to: Point, duration_s: f32) -> Leg {
     let length_m = (to - from).length();
     Leg { from, to, length_m, from_s: 0.0, to_s: duration_s, stops: WaitingPlaces::Anywhere }
 }
@@ -197,7 +197,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
             if ws.may_improve(&hop) {
                 ws.forbid_departures(
                     cfg,
-                    &leg_from_start(here, there, duration_s),
+                    &leg_at_time_zero(here, there, duration_s),
                     piece_m,
                     leave_s,
                 );
@@ -215,7 +215,7 @@ fn check_inputs<const N: usize, const W: usize>(
     flight: &Flight<W>,
 ) -> Result<(), ScheduleError> {
     if view.node_count() > N {
-        return Err(ScheduleError::PiecesFull);
+        return Err(ScheduleError::SegmentsFull);
     }
     if usize::from(route.from.max(route.to)) >= view.node_count() {
         return Err(ScheduleError::BadIndex);
@@ -224,7 +224,7 @@ fn check_inputs<const N: usize, const W: usize>(
         .map(|length_m| segment_count(length_m, flight.segment_m) as usize);
     let whole = flight.segment_m >= MAX_TIMED_SEGMENT_M && flight.segment_m.is_finite();
     if !whole || vertical[0].max(vertical[1]) > MAX_TIMED_SEGMENTS {
-        return Err(ScheduleError::PiecesFull);
+        return Err(ScheduleError::SegmentsFull);
     }
     Ok(())
 }
@@ -247,7 +247,7 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
                 to_s: q.to_s + other.depart_s + handover_s,
                 ..*q
             };
-            ws.pieces.push(absolute).map_err(|_| ScheduleError::PiecesFull)?;
+            ws.pieces.push(absolute).map_err(|_| ScheduleError::SegmentsFull)?;
         }
     }
     for &place in parked {
@@ -256,7 +256,7 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
             to_s: f32::INFINITY,
             ..stationary_segment(place, true)
         };
-        ws.pieces.push(for_ever).map_err(|_| ScheduleError::PiecesFull)?;
+        ws.pieces.push(for_ever).map_err(|_| ScheduleError::SegmentsFull)?;
     }
     ws.cells.sort_into_cells(&mut ws.pieces);
     Ok(())
@@ -325,7 +325,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         // Held from −∞, so that it is not in conflict with another vehicle's pad.
         let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..stationary_segment(pad, true) };
         // The pad is held until the vehicle has flown the first timed segment of its climb.
-        let off_pad_s = fmaxf(up.first_segment(piece_m).1, OFF_PAD_S) + self.handover_s;
+        let off_pad_s = fmaxf(up.first_segment(piece_m).1, MIN_PAD_HOLD_S) + self.handover_s;
         let needed_s =
             self.conflicting_segments(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
         needed_s - off_pad_s
@@ -364,7 +364,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             let fits = leave_s <= until_s && leave_s + duration_s <= state.until_s;
             if fits
                 && leave_s + duration_s < state.arrive_s
-                && self.heap.entry_index(index) != SETTLED
+                && self.heap.node_mark(index) != SETTLED
             {
                 return true;
             }
@@ -422,7 +422,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             let index = at - 1;
             let state = self.states[usize::from(index)];
             at = state.next;
-            if self.heap.entry_index(index) == SETTLED {
+            if self.heap.node_mark(index) == SETTLED {
                 continue;
             }
             let leave_s = first_allowed(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));
@@ -465,7 +465,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
             (climb.up, climb.leave_by_s)
         } else {
             let from = view.node(before.node);
-            (leg_from_start(from, here, (here - from).length() / cfg.cruise_mps), before.until_s)
+            (leg_at_time_zero(from, here, (here - from).length() / cfg.cruise_mps), before.until_s)
         };
         let duration_s = leg.to_s;
         let earliest_s = reached.left_parent_s;
@@ -475,7 +475,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         // for want of room may cover that time.
         let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
         way.push((reached.node, left_s + duration_s, leave_s))
-            .map_err(|_| ScheduleError::PiecesFull)?;
+            .map_err(|_| ScheduleError::SegmentsFull)?;
         leave_s = left_s;
         if first {
             break;
@@ -489,7 +489,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
     for &(node, arrive_s, leave_s) in way.iter().rev() {
         let edge = before.and_then(|before| view.edge_between(before, node));
         let clearance_m = edge.map_or(view.header().max_clearance_m, |edge| edge.clearance_m);
-        flight.path.push(view.node(node), clearance_m).map_err(|_| ScheduleError::PiecesFull)?;
+        flight.path.push(view.node(node), clearance_m).map_err(|_| ScheduleError::SegmentsFull)?;
         let at_s = if before.is_none() { climb.up.to_s } else { arrive_s - flight.depart_s };
         flight.path.set_last_times(at_s, fmaxf(leave_s - flight.depart_s, at_s));
         before = Some(node);

@@ -19,7 +19,7 @@ fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
     for &(x, y) in points {
         path.push(Point::new(x, y, 1.5), 1.0).unwrap();
     }
-    path.label_times(1.5 / CFG.vertical_mps, CFG.cruise_mps);
+    path.set_times_at_speed(1.5 / CFG.vertical_mps, CFG.cruise_mps);
     Flight {
         id,
         task: Task::Goto(0),
@@ -81,7 +81,7 @@ fn field_flight(id: u8, corners: &[(f32, f32, f32)], level: bool, climb_m: f32) 
     for &(x, y, z) in corners {
         path.push(Point::new(x, y, if level || z < 50.0 { 30.0 } else { z }), 1.0).unwrap();
     }
-    path.label_times(climb_m / CFG.vertical_mps, CFG.cruise_mps);
+    path.set_times_at_speed(climb_m / CFG.vertical_mps, CFG.cruise_mps);
     let mut flight = Flight { climb_m, descent_m: climb_m, path, ..flight(id, &[(0.0, 0.0)]) };
     flight.fit_segment_length();
     flight
@@ -105,7 +105,7 @@ proptest! {
         let other = Flight { depart_s, ..field_flight(2, &other.0, other.1, other.2) };
         let mut ws = ScheduleWorkspace::new();
         let mut most = [0; 2];
-        let departure = departure_and_conflicts(
+        let departure = departure_with_conflict_counts(
             &CFG,
             &own,
             (0.0, handover_s),

@@ -2,7 +2,7 @@
 //! always suffice.
 
 /// Value in [`Heap::places`] of a node that the search has not reached.
-const UNSEEN: u16 = 0;
+const NOT_REACHED: u16 = 0;
 /// Value in [`Heap::places`] of a node that was popped: its distance is final.
 pub(crate) const SETTLED: u16 = u16::MAX;
 
@@ -14,7 +14,7 @@ pub(crate) struct Heap<const N: usize> {
     /// Cost in the upper bits (a non-negative f32, whose bits order like its value), node in the
     /// lower sixteen: one comparison orders by cost, then by node.
     entries: [u64; N],
-    /// For each node its index in `entries` plus one, or [`UNSEEN`] or [`SETTLED`].
+    /// For each node its index in `entries` plus one, or [`NOT_REACHED`] or [`SETTLED`].
     places: [u16; N],
 }
 
@@ -44,17 +44,17 @@ fn least_of(entries: &[u64]) -> usize {
 
 impl<const N: usize> Heap<N> {
     pub(crate) const fn new() -> Self {
-        Self { len: 0, entries: [0; N], places: [UNSEEN; N] }
+        Self { len: 0, entries: [0; N], places: [NOT_REACHED; N] }
     }
 
     /// Empties the heap, and marks the nodes below `nodes` as not reached.
     pub(crate) fn clear(&mut self, nodes: usize) {
         self.len = 0;
-        self.places[..nodes].fill(UNSEEN);
+        self.places[..nodes].fill(NOT_REACHED);
     }
 
     #[inline]
-    pub(crate) fn entry_index(&self, node: u16) -> u16 {
+    pub(crate) fn node_mark(&self, node: u16) -> u16 {
         self.places[usize::from(node)]
     }
 
@@ -63,7 +63,7 @@ impl<const N: usize> Heap<N> {
     #[inline]
     pub(crate) fn push(&mut self, node: u16, cost: f32) {
         let mut at = match self.places[usize::from(node)] {
-            UNSEEN => {
+            NOT_REACHED => {
                 self.len += 1;
                 self.len - 1
             }
@@ -96,7 +96,7 @@ impl<const N: usize> Heap<N> {
 
     /// Gives every node in the heap the cost that `cost` returns, and restores the order.
     /// O(length).
-    pub(crate) fn reorder(&mut self, cost: impl Fn(u16) -> f32) {
+    pub(crate) fn recompute_costs(&mut self, cost: impl Fn(u16) -> f32) {
         for at in (0..self.len).rev() {
             let node = node_of(self.entries[at]) as u16;
             self.sift_down(at, entry_of(node, cost(node)));

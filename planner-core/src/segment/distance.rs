@@ -136,16 +136,16 @@ impl Segment {
             let (Some(v), Some(w)) = (span(axis_v), span(axis_w)) else {
                 continue;
             };
-            let mask_u = lane_mask(axis_u, lanes(first, last, brick_u));
+            let mask_u = lane_mask(axis_u, lane_bits(first, last, brick_u));
             for brick_w in w.0 >> 2..=w.1 >> 2 {
-                let mask_w = lane_mask(axis_w, lanes(w.0, w.1, brick_w)) & mask_u;
+                let mask_w = lane_mask(axis_w, lane_bits(w.0, w.1, brick_w)) & mask_u;
                 let row = brick_u as usize * strides[axis_u] + brick_w as usize * strides[axis_w];
                 for brick_v in v.0 >> 2..=v.1 >> 2 {
                     let word = grid.words()[row + brick_v as usize * strides[axis_v]] & mask_w;
                     if word == 0 {
                         continue;
                     }
-                    let word = word & lane_mask(axis_v, lanes(v.0, v.1, brick_v));
+                    let word = word & lane_mask(axis_v, lane_bits(v.0, v.1, brick_v));
                     if word == 0 {
                         continue;
                     }
@@ -181,7 +181,7 @@ fn cell_range(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
 
 /// Mask of the lanes of brick `brick` that are among the cells `first..=last`. Range and brick must
 /// overlap.
-fn lanes(first: i32, last: i32, brick: i32) -> u32 {
+fn lane_bits(first: i32, last: i32, brick: i32) -> u32 {
     let low = (first - brick * 4).max(0);
     let high = (last - brick * 4).min(3);
     (0b1111 << low) & (0b1111 >> (3 - high))
@@ -201,9 +201,9 @@ fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point>
 
 /// Whether the segment from `a` to `b` is strictly farther than `clearance_m` (positive, finite)
 /// from every obstacle. The caller has checked that the ends are finite and near the grid and, if
-/// the clearance is less than `MIN_MISSED_CELLS`, that the segment touches nothing. The first share
-/// `known` of the segment is skipped: the caller knows that it is farther, by much more than
-/// rounding.
+/// the clearance is less than `TOUCH_CHECK_BELOW_CELLS`, that the segment touches nothing. The
+/// first share `known` of the segment is skipped: the caller knows that it is farther, by much more
+/// than rounding.
 pub(crate) fn is_farther_than(
     grid: &VoxelGrid<'_>,
     a: &Point,

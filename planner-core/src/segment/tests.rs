@@ -27,12 +27,12 @@ fn shape(resolution_m: f32) -> GridShape {
 
 /// Cells set with the probability `share`.
 fn random_words(rng: &mut Pcg32, shape: &GridShape, share: f32) -> Vec<u64> {
-    let mut words = vec![0; shape.brick_count()];
+    let mut words = vec![0; shape.word_count()];
     for i in 0..shape.dims[0] {
         for j in 0..shape.dims[1] {
             for k in 0..shape.dims[2] {
                 if unit(rng) < share {
-                    let (word, mask) = shape.address([i, j, k]);
+                    let (word, mask) = shape.word_and_mask([i, j, k]);
                     words[word] |= mask;
                 }
             }
@@ -285,8 +285,8 @@ fn clearances_agree_with_brute_force() {
 #[test]
 fn touching_at_the_clearance_is_blocked() {
     let shape = GridShape { dims: [20, 20, 20], min: Point::zeros(), resolution_m: 0.25 };
-    let mut words = vec![0; shape.brick_count()];
-    let (word, mask) = shape.address([10, 10, 10]);
+    let mut words = vec![0; shape.word_count()];
+    let (word, mask) = shape.word_and_mask([10, 10, 10]);
     words[word] = mask;
     let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
     // The cell spans 2.5 to 2.75 m; the segments pass below it along y.
@@ -310,7 +310,7 @@ fn touching_at_the_clearance_is_blocked() {
 #[test]
 fn what_is_not_a_number_is_blocked() {
     let shape = shape(0.25);
-    let words = vec![0; shape.brick_count()];
+    let words = vec![0; shape.word_count()];
     let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
     let good = Point::new(0.0, 3.0, 0.0);
     assert!(segment_is_clear(&grid, &good, &good, 0.1));

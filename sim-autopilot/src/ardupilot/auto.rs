@@ -33,7 +33,7 @@ impl Copter {
     /// entered.
     pub(super) fn start_mission(&mut self, platform: &mut Platform) -> bool {
         let starts =
-            self.can_enter_auto(platform) && self.set_mode(Mode::Auto, &platform.sensors());
+            self.can_enter_auto(platform) && self.request_mode(Mode::Auto, &platform.sensors());
         self.auto.may_lift |= starts && self.armed;
         starts
     }

@@ -47,9 +47,9 @@ impl Copter {
             }
             // NAV_TAKEOFF's height counts from home.
             22 => accepted_or_failed(self.take_off(sensors.home.z + command.z, &sensors)),
-            21 => accepted_or_failed(self.set_mode(Mode::Land, &sensors)),
-            20 => accepted_or_failed(self.set_mode(Mode::Rtl, &sensors)),
-            17 => accepted_or_failed(self.set_mode(Mode::Loiter, &sensors)),
+            21 => accepted_or_failed(self.request_mode(Mode::Land, &sensors)),
+            20 => accepted_or_failed(self.request_mode(Mode::Rtl, &sensors)),
+            17 => accepted_or_failed(self.request_mode(Mode::Loiter, &sensors)),
             192 => self.reposition(platform, command),
             178 => {
                 self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
@@ -102,7 +102,7 @@ impl Copter {
         }
         let runs = |mode: &Mode| *mode != Mode::Auto || self.can_enter_auto(platform);
         let mode = Mode::from_number(number).filter(runs);
-        accepted_or_failed(mode.is_some_and(|mode| self.set_mode(mode, &platform.sensors())))
+        accepted_or_failed(mode.is_some_and(|mode| self.request_mode(mode, &platform.sensors())))
     }
 
     /// Executes DO_REPOSITION: flies to a point in Guided. Returns the MAV_RESULT.
@@ -111,7 +111,7 @@ impl Copter {
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let changes_mode = command.param[1] as u32 & 1 != 0;
         let guided =
-            self.mode == Mode::Guided || changes_mode && self.set_mode(Mode::Guided, &sensors);
+            self.mode == Mode::Guided || changes_mode && self.request_mode(Mode::Guided, &sensors);
         if !guided || !to.iter().all(|x| x.is_finite()) {
             return if guided { DENIED } else { FAILED };
         }

@@ -134,18 +134,18 @@ pub struct Copter {
     /// Values of the parameters that have an effect.
     pub tuning: Tuning,
     ready_us: u64,
-    reported: [bool; 2],
+    reported_origin_and_position: [bool; 2],
     runtime_us: u64,
     armed: bool,
     since: PhaseStartTimes,
     /// The position controller starts in flight in this step, so its integral is initialised.
-    starts: bool,
+    controller_starts: bool,
     landed: bool,
     mode: Mode,
     failsafe: Option<Failsafe>,
     position_ok: bool,
-    lost_us: Option<u64>,
-    gcs_us: Option<u64>,
+    position_lost_us: Option<u64>,
+    gcs_heartbeat_us: Option<u64>,
     takeoff: Option<TakeOff>,
     goal: Goal,
     goal_us: u64,
@@ -163,17 +163,17 @@ impl Copter {
             tuning: Tuning::new(&params),
             params,
             ready_us: micros_from_s(ready_s),
-            reported: [false; 2],
+            reported_origin_and_position: [false; 2],
             runtime_us: 0,
             armed: false,
             since: PhaseStartTimes::default(),
-            starts: false,
+            controller_starts: false,
             landed: true,
             mode: Mode::Stabilize,
             failsafe: None,
             position_ok: true,
-            lost_us: None,
-            gcs_us: None,
+            position_lost_us: None,
+            gcs_heartbeat_us: None,
             takeoff: None,
             goal: Goal::STOP,
             goal_us: 0,
@@ -279,7 +279,7 @@ impl Copter {
         if from.system != self.tuning.gcs_system {
             return;
         }
-        self.gcs_us = Some(platform.time_us);
+        self.gcs_heartbeat_us = Some(platform.time_us);
         if self.failsafe == Some(Failsafe::GroundStation) {
             // The vehicle stays in the mode that the failsafe chose.
             self.failsafe = None;
@@ -288,7 +288,7 @@ impl Copter {
     }
 
     /// Enters the mode. Refused (false) while armed, if it needs a position and there is none.
-    fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> bool {
+    fn request_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> bool {
         if self.armed && mode.needs_position() && !self.position_known(sensors.now_us) {
             return false;
         }
@@ -307,7 +307,7 @@ impl Copter {
             self.reference = Reference::new(sensors.position, sensors.velocity);
             self.reference.acceleration =
                 if self.landed { Point::zeros() } else { sensors.acceleration };
-            self.starts = !self.landed;
+            self.controller_starts = !self.landed;
         }
         self.mode = mode;
         self.takeoff = None;
@@ -363,7 +363,7 @@ impl Copter {
         let demand = self.demand(sensors, dt_s);
         let climbing = demand.velocity.z > 0.05;
         self.detect_landing(sensors, climbing);
-        let integral = if core::mem::take(&mut self.starts) {
+        let integral = if core::mem::take(&mut self.controller_starts) {
             IntegralAction::Match
         } else {
             IntegralAction::Keep
@@ -385,13 +385,14 @@ impl Copter {
         let now_us = sensors.now_us;
         let since = |start: u64| now_us.saturating_sub(start);
         if self.position_known(now_us) {
-            self.lost_us = None;
+            self.position_lost_us = None;
             if self.failsafe == Some(Failsafe::Estimator) {
                 self.failsafe = None;
             }
         } else if self.tuning.estimator_failsafe
             && self.mode.needs_position()
-            && since(*self.lost_us.get_or_insert(now_us)) >= micros_from_s(ESTIMATOR_REACTION_S)
+            && since(*self.position_lost_us.get_or_insert(now_us))
+                >= micros_from_s(ESTIMATOR_REACTION_S)
         {
             self.failsafe = Some(Failsafe::Estimator);
             platform.send_text(2, "EKF Failsafe: changed to LAND Mode");
@@ -402,7 +403,7 @@ impl Copter {
         }
         let silent =
             |at: u64| since(at) >= micros_from_s(self.tuning.gcs_timeout_s + GCS_REACTION_S);
-        if self.tuning.gcs_failsafe && self.gcs_us.is_some_and(silent) {
+        if self.tuning.gcs_failsafe && self.gcs_heartbeat_us.is_some_and(silent) {
             self.failsafe = Some(Failsafe::GroundStation);
             platform.send_text(4, "GCS Failsafe");
             self.force_mode(Mode::Rtl, sensors);

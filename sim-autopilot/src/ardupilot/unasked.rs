@@ -21,14 +21,14 @@ impl Copter {
     /// Sends messages once the estimator gets its origin and its position, and STAT_RUNTIME every
     /// 30 s.
     pub(super) fn send_progress_messages(&mut self, platform: &mut Platform, now_us: u64) {
-        if !self.reported[0] && self.origin_known(now_us) {
-            self.reported[0] = true;
+        if !self.reported_origin_and_position[0] && self.origin_known(now_us) {
+            self.reported_origin_and_position[0] = true;
             platform.announce_origin();
             platform.send_on_all_ports(HOME_POSITION);
             platform.send_text(6, "EKF3 IMU0 origin set");
         }
-        if !self.reported[1] && self.position_known(now_us) {
-            self.reported[1] = true;
+        if !self.reported_origin_and_position[1] && self.position_known(now_us) {
+            self.reported_origin_and_position[1] = true;
             platform.send_text(6, "EKF3 IMU0 is using GPS");
         }
         if now_us >= self.runtime_us + RUNTIME_EVERY_US {

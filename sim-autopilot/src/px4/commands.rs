@@ -62,7 +62,7 @@ impl Px4 {
                 ACCEPTED
             }
             510 => platform.report_interval(from, command.param[0], FAILED),
-            511 => platform.set_interval(from, command, &telemetry::STREAMS, FAILED),
+            511 => platform.set_interval(from, command, &telemetry::PX4_STREAMS, FAILED),
             512 => match message_id(command.param[0]) {
                 Some(id) if self.has_message(id) => {
                     platform.ports[from.port].requested_once.push(id);
@@ -90,12 +90,12 @@ impl Px4 {
 
     fn has_message(&self, id: u32) -> bool {
         matches!(id, AUTOPILOT_VERSION | PROTOCOL_VERSION)
-            || telemetry::STREAMS.iter().any(|stream| stream.0 == id)
+            || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)
     }
 
     fn change_mode(&mut self, platform: &Platform, mode: Mode) -> bool {
         let sensors = platform.sensors();
-        self.commander.set_mode(mode, &sensors, &self.tuning)
+        self.commander.request_mode(mode, &sensors, &self.tuning)
     }
 
     fn arm_or_disarm(&mut self, platform: &mut Platform, command: &Command) -> u8 {

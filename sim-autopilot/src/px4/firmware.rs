@@ -59,7 +59,7 @@ impl Px4 {
         self.commander.set_mission_ready(platform.has_mission());
         if let Some((from, mode)) = self.pending_mode.take() {
             let changed =
-                mode.is_some_and(|mode| self.commander.set_mode(mode, sensors, &self.tuning));
+                mode.is_some_and(|mode| self.commander.request_mode(mode, sensors, &self.tuning));
             platform.acknowledge(from, DO_SET_MODE, accepted_or_rejected(changed));
         }
         self.fly_mission(platform, sensors);

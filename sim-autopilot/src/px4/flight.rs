@@ -28,13 +28,13 @@ const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 impl Commander {
     /// Initialises a mode that is entered: stopping point, heading, first leg of a return.
     pub(super) fn enter_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
-        self.hold = sensors.position + glide::stopping_point(&sensors.velocity);
+        self.hold_point = sensors.position + glide::stopping_point(&sensors.velocity);
         self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
         self.hold_heading = sensors.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
         self.descent = None;
         if mode == Mode::Takeoff {
-            (self.hold.x, self.hold.y) = (sensors.position.x, sensors.position.y);
+            (self.hold_point.x, self.hold_point.y) = (sensors.position.x, sensors.position.y);
         }
     }
 
@@ -55,7 +55,7 @@ impl Commander {
     /// The demand of the mode in this step.
     pub(super) fn demand(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Demand {
         let held = Demand {
-            position: self.hold,
+            position: self.hold_point,
             heading: self.hold_heading,
             speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
             climb_max: tuning.auto_up.min(tuning.climb_max),
@@ -82,10 +82,11 @@ impl Commander {
                     self.intended_mode = Mode::Hold;
                     self.after_disarm = Mode::Hold;
                     self.takeoff_up = f32::NAN;
-                    self.hold.z = up;
-                    self.glide = SmoothedApproach::new(sensors.now_us, &self.hold, &Point::zeros());
+                    self.hold_point.z = up;
+                    self.glide =
+                        SmoothedApproach::new(sensors.now_us, &self.hold_point, &Point::zeros());
                 }
-                let position = Point::new(self.hold.x, self.hold.y, up);
+                let position = Point::new(self.hold_point.x, self.hold_point.y, up);
                 Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
             }
             Mode::Mission => self.mission_demand(sensors, tuning, held),
@@ -107,13 +108,13 @@ impl Commander {
         tuning: &Tuning,
         held: &Demand,
     ) -> Demand {
-        self.glide.advance(sensors.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
+        self.glide.advance(sensors.now_us, &self.hold_point, held.speed_max, tuning.auto_jerk);
         let SmoothedApproach { position, ramps: [east, north], .. } = self.glide;
         let up = f32::NAN;
         Demand {
             position: Point::new(position.x, position.y, held.position.z),
             velocity: Point::new(east.rate, north.rate, up),
-            acceleration: Point::new(east.change, north.change, up),
+            acceleration: Point::new(east.derivative, north.derivative, up),
             ..*held
         }
     }
@@ -128,9 +129,9 @@ impl Commander {
     ) -> Demand {
         match self.mission.leg {
             Some(MissionLeg::TakeOff { up }) => {
-                self.hold.z = up;
+                self.hold_point.z = up;
                 let climb_max = tuning.takeoff_speed.min(held.climb_max);
-                Demand { position: self.hold, climb_max, ..held }
+                Demand { position: self.hold_point, climb_max, ..held }
             }
             Some(MissionLeg::To { at, heading, .. }) => {
                 let off = at - sensors.position;
@@ -139,7 +140,7 @@ impl Commander {
                 } else if libm::hypotf(off.x, off.y) > TURN_BEYOND_M {
                     self.hold_heading = libm::atan2f(off.x, off.y);
                 }
-                self.hold = at;
+                self.hold_point = at;
                 let (up, rate) = interpolate_height(
                     &self.mission.from,
                     &at,
@@ -151,11 +152,11 @@ impl Commander {
             }
             Some(MissionLeg::Land { at }) => {
                 if let Some([east, north]) = at {
-                    (self.hold.x, self.hold.y) = (east, north);
+                    (self.hold_point.x, self.hold_point.y) = (east, north);
                     if libm::hypotf(east - sensors.position.x, north - sensors.position.y)
                         > ARRIVED_M
                     {
-                        return Demand { position: self.hold, ..held };
+                        return Demand { position: self.hold_point, ..held };
                     }
                 }
                 self.landing_demand(sensors, tuning, held)
@@ -191,15 +192,15 @@ impl Commander {
                 *ramp
             }
             begin => {
-                let ramp = JerkLimitedRate { rate: -sensors.velocity.z, change: 0.0 };
+                let ramp = JerkLimitedRate { rate: -sensors.velocity.z, derivative: 0.0 };
                 *begin = Some((sensors.now_us, ramp));
                 ramp
             }
         };
         Demand {
-            position: Point::new(self.hold.x, self.hold.y, f32::NAN),
+            position: Point::new(self.hold_point.x, self.hold_point.y, f32::NAN),
             velocity: Point::new(f32::NAN, f32::NAN, -descent.rate),
-            acceleration: Point::new(f32::NAN, f32::NAN, -descent.change),
+            acceleration: Point::new(f32::NAN, f32::NAN, -descent.derivative),
             // The rate of change of the height has less bias than the estimated velocity
             // (`z_deriv`).
             height_rate_share: (descent.rate.abs() / tuning.land_speed.max(0.01)).min(1.0),
@@ -225,12 +226,12 @@ impl Commander {
                 if sensors.position.z > up - ARRIVED_M {
                     self.leg = ReturnLeg::Cross { up };
                 }
-                Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
+                Demand { position: Point::new(self.hold_point.x, self.hold_point.y, up), ..held }
             }
             ReturnLeg::Cross { up } => {
                 if away < ARRIVED_M {
                     self.leg = ReturnLeg::Descend;
-                    (self.hold.x, self.hold.y) = (sensors.home.x, sensors.home.y);
+                    (self.hold_point.x, self.hold_point.y) = (sensors.home.x, sensors.home.y);
                 }
                 Demand { position: Point::new(sensors.home.x, sensors.home.y, up), ..held }
             }
@@ -239,7 +240,7 @@ impl Commander {
                 if sensors.position.z < up + ARRIVED_M {
                     self.leg = ReturnLeg::Land;
                 }
-                Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
+                Demand { position: Point::new(self.hold_point.x, self.hold_point.y, up), ..held }
             }
             ReturnLeg::Land => self.landing_demand(sensors, tuning, held),
         }

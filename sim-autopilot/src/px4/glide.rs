@@ -34,7 +34,7 @@ pub struct SmoothedApproach {
 impl SmoothedApproach {
     /// A setpoint that starts at `position` with `velocity`.
     pub fn new(now_us: u64, position: &Point, velocity: &Point) -> Self {
-        let ramp = |rate| JerkLimitedRate { rate, change: 0.0 };
+        let ramp = |rate| JerkLimitedRate { rate, derivative: 0.0 };
         Self { at_us: now_us, position: *position, ramps: [ramp(velocity.x), ramp(velocity.y)] }
     }
 
@@ -70,14 +70,14 @@ mod tests {
             let target = stopping_point(&velocity) + Point::new(1.0, 2.0, 0.0);
             let mut glide = SmoothedApproach::new(0, &Point::zeros(), &velocity);
             for step in 1..=5000_u64 {
-                let before = glide.ramps.map(|ramp| ramp.change);
+                let before = glide.ramps.map(|ramp| ramp.derivative);
                 glide.advance(step * 4000, &target, cruise, 4.0);
                 for (ramp, before) in glide.ramps.iter().zip(before) {
                     assert!(
-                        (ramp.change - before).abs() <= 4.0 * 0.004 + 1e-5,
+                        (ramp.derivative - before).abs() <= 4.0 * 0.004 + 1e-5,
                         "{speed}: {glide:?}"
                     );
-                    assert!(ramp.change.abs() <= 3.0 + 1e-5, "{speed}: {glide:?}");
+                    assert!(ramp.derivative.abs() <= 3.0 + 1e-5, "{speed}: {glide:?}");
                 }
             }
             assert!(

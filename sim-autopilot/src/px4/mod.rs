@@ -82,7 +82,7 @@ struct Mission {
 pub struct Commander {
     armed: bool,
     landed: bool,
-    flown: bool,
+    flown_since_arming: bool,
     intended_mode: Mode,
     after_disarm: Mode,
     failsafe: Option<Mode>,
@@ -92,8 +92,8 @@ pub struct Commander {
     touching_us: Option<u64>,
     setpoint: Option<Setpoint>,
     setpoint_us: u64,
-    hold: Point,
-    /// Smoothed path to `hold`.
+    hold_point: Point,
+    /// Smoothed path to `hold_point`.
     glide: SmoothedApproach,
     hold_heading: f32,
     takeoff_up: f32,
@@ -117,7 +117,7 @@ impl Commander {
         Self {
             armed: false,
             landed: true,
-            flown: false,
+            flown_since_arming: false,
             intended_mode: Mode::Hold,
             after_disarm: Mode::Hold,
             failsafe: None,
@@ -127,7 +127,7 @@ impl Commander {
             touching_us: None,
             setpoint: None,
             setpoint_us: 0,
-            hold: Point::zeros(),
+            hold_point: Point::zeros(),
             glide: SmoothedApproach::new(0, &Point::zeros(), &Point::zeros()),
             hold_heading: 0.0,
             takeoff_up: f32::NAN,
@@ -236,7 +236,7 @@ impl Commander {
         }
         self.armed = true;
         self.armed_us = sensors.now_us;
-        self.flown = !self.landed;
+        self.flown_since_arming = !self.landed;
         self.enter_mode(self.intended_mode, sensors);
         true
     }
@@ -271,7 +271,7 @@ impl Commander {
 
     /// Enters the mode and returns true. While armed, a mode that cannot run is refused (false).
     /// The second COMMAND_ACK of DO_SET_MODE carries the result.
-    pub fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
+    pub fn request_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
             Mode::Mission => self.mission.ready,
@@ -300,7 +300,7 @@ impl Commander {
     /// Enters Takeoff to height `up` in the mission frame, metres; NaN: `MIS_TAKEOFF_ALT` above
     /// home. False if the mode is refused.
     pub fn takeoff(&mut self, up: f32, sensors: &SensorReadings, tuning: &Tuning) -> bool {
-        let accepted = self.set_mode(Mode::Takeoff, sensors, tuning);
+        let accepted = self.request_mode(Mode::Takeoff, sensors, tuning);
         if accepted {
             self.takeoff_up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
         }
@@ -316,12 +316,12 @@ impl Commander {
         sensors: &SensorReadings,
         tuning: &Tuning,
     ) -> bool {
-        if !self.armed || !self.set_mode(Mode::Hold, sensors, tuning) {
+        if !self.armed || !self.request_mode(Mode::Hold, sensors, tuning) {
             return false;
         }
         for axis in 0..3 {
             if to[axis].is_finite() {
-                self.hold[axis] = to[axis];
+                self.hold_point[axis] = to[axis];
             }
         }
         if heading.is_finite() {
@@ -373,7 +373,7 @@ impl Commander {
                 let limit = floor + progress * (demand.climb_max - floor);
                 if self.landed && progress >= IN_AIR_SHARE {
                     self.landed = false;
-                    self.flown = true;
+                    self.flown_since_arming = true;
                 }
                 if progress >= 1.0 {
                     self.phase = FlightPhase::Flying;
@@ -432,12 +432,12 @@ impl Commander {
     fn update_timers(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
         let since = |start: u64| sensors.now_us.saturating_sub(start);
         let idle = self.landed && self.phase == FlightPhase::Ground;
-        if idle && !self.flown && tuning.disarm_preflight_s > 0.0 {
+        if idle && !self.flown_since_arming && tuning.disarm_preflight_s > 0.0 {
             if since(self.armed_us) >= micros_from_s(tuning.disarm_preflight_s) {
                 self.disarm(false);
             }
         } else if idle
-            && self.flown
+            && self.flown_since_arming
             && tuning.disarm_land_s > 0.0
             && since(self.landed_us) >= micros_from_s(tuning.disarm_land_s + DISARM_REACTION_S)
         {

@@ -139,7 +139,7 @@ impl Recording {
 
     /// How far errors of the estimate alone move a replay: RMS, metres. A replay without these
     /// errors is that far off the recording, however well the autopilot is simulated.
-    pub fn moved(&self, errors: Estimator<'_>, correction: Correction) -> f64 {
+    pub fn moved_by_errors_m(&self, errors: Estimator<'_>, correction: Correction) -> f64 {
         let [with, without] =
             [errors, Estimator::Perfect].map(|errors| self.replay(errors, correction));
         Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm())).rms
@@ -148,7 +148,7 @@ impl Recording {
     /// Correlation coefficient of the horizontal estimate errors of two flights at the same times.
     /// PX4's SIH draws its sensor noise from `rand()` without a seed: the noise repeats in another
     /// flight, unless threads draw in another order.
-    pub fn err_alike(&self, other: &Self) -> f64 {
+    pub fn error_correlation(&self, other: &Self) -> f64 {
         let (own, others) = (self.errors(), other.errors());
         let mut later = others.as_slice();
         let mut pairs = Vec::new();

@@ -7,7 +7,7 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 use super::autopilot::{Autopilot, Flown};
-use super::oracle::{Heard, Seen};
+use super::oracle::{Heard, VehicleState};
 use super::packet::{ORIGIN, Packet};
 use super::scene::{self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_M, Scene, VEHICLES, WAYPOINTS};
 use crate::setpoints::{Limits, SetpointCheck};
@@ -119,11 +119,11 @@ impl Member {
         }
     }
 
-    pub(super) fn seen(&self, now_s: f32) -> Seen {
+    pub(super) fn seen(&self, now_s: f32) -> VehicleState {
         let lately = |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_S);
         let lands = self.autopilot.flown() == Flown::Commanded
             && self.autopilot.mode == self.autopilot.kind.land_mode();
-        Seen {
+        VehicleState {
             position: self.autopilot.position,
             velocity: self.autopilot.velocity,
             airborne: self.autopilot.is_airborne(),

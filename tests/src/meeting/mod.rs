@@ -28,9 +28,9 @@ use self::forged::{forge, place_of};
 use self::member::Member;
 use self::oracle::Oracle;
 pub use self::outcome::{Outcome, Summary, line, summary};
-use self::packet::{Packet, Said};
-use self::planner::around;
-use self::scene::{Scene, What, floor_z, landing};
+use self::packet::{Packet, RadioContent};
+use self::planner::detour_in_the_open;
+use self::scene::{MeetingEvent, Scene, floor_z, landing};
 use crate::setpoints::SetpointStats;
 
 /// Time for which a meeting goes on after its last event and with all vehicles at rest, seconds.
@@ -136,31 +136,36 @@ impl<'a> World<'a> {
         }
     }
 
-    fn happens(&mut self, vehicle: usize, what: What) {
+    fn happens(&mut self, vehicle: usize, what: MeetingEvent) {
         self.say(vehicle, &format!("{what:?}"));
         let now = self.now;
         let member = &mut self.members[vehicle];
         let airborne = member.autopilot.is_airborne();
         match what {
-            What::Start => self.command(vehicle, MavCmd::MAV_CMD_MISSION_START, 0.0),
-            What::Pause => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
-            What::Resume => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
-            What::Return => self.command(vehicle, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
-            What::Land => self.command(vehicle, MavCmd::MAV_CMD_NAV_LAND, 0.0),
-            What::PilotTakes(velocity) if airborne => member.autopilot.take_over(velocity),
-            What::PilotReturns if airborne => member.autopilot.give_back(now),
-            What::PilotLands if airborne && member.autopilot.flown() == Flown::Other => {
+            MeetingEvent::Start => self.command(vehicle, MavCmd::MAV_CMD_MISSION_START, 0.0),
+            MeetingEvent::Pause => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
+            MeetingEvent::Resume => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
+            MeetingEvent::Return => {
+                self.command(vehicle, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0)
+            }
+            MeetingEvent::Land => self.command(vehicle, MavCmd::MAV_CMD_NAV_LAND, 0.0),
+            MeetingEvent::PilotTakes(velocity) if airborne => member.autopilot.take_over(velocity),
+            MeetingEvent::PilotReturns if airborne => member.autopilot.give_back(now),
+            MeetingEvent::PilotLands if airborne && member.autopilot.flown() == Flown::Other => {
                 member.autopilot.pilot_lands();
             }
             // The autopilot of a dead companion may still be in Guided (ArduCopter).
-            What::PilotLands if airborne && member.dead => member.autopilot.pilot_lands(),
-            What::Fails(how) if airborne => member.autopilot.fail(how),
-            What::PilotTakes(_) | What::PilotReturns | What::PilotLands | What::Fails(_) => {}
-            What::Dies => member.dead = true,
-            What::Cut { sends, hears } => (member.sends, member.hears) = (!sends, !hears),
-            What::Caught(how) if airborne => member.autopilot.catch(how),
-            What::Caught(_) => {}
-            What::Healed => (member.sends, member.hears) = (true, true),
+            MeetingEvent::PilotLands if airborne && member.dead => member.autopilot.pilot_lands(),
+            MeetingEvent::Fails(how) if airborne => member.autopilot.fail(how),
+            MeetingEvent::PilotTakes(_)
+            | MeetingEvent::PilotReturns
+            | MeetingEvent::PilotLands
+            | MeetingEvent::Fails(_) => {}
+            MeetingEvent::Dies => member.dead = true,
+            MeetingEvent::Cut { sends, hears } => (member.sends, member.hears) = (!sends, !hears),
+            MeetingEvent::Caught(how) if airborne => member.autopilot.catch(how),
+            MeetingEvent::Caught(_) => {}
+            MeetingEvent::Healed => (member.sends, member.hears) = (true, true),
         }
     }
 
@@ -196,7 +201,8 @@ impl<'a> World<'a> {
             member.inbox.retain_mut(|packet| {
                 let due = packet.at <= now;
                 if due {
-                    let none = Packet { at: now, from: 0, bytes: Vec::new(), said: Said::Other };
+                    let none =
+                        Packet { at: now, from: 0, bytes: Vec::new(), said: RadioContent::Other };
                     arrived.push(core::mem::replace(packet, none));
                 }
                 !due
@@ -214,13 +220,13 @@ impl<'a> World<'a> {
                 let heard = &mut member.heard[packet.from];
                 let now_s = now.as_micros() as f32 * 1e-6;
                 match packet.said {
-                    Said::Position(place, velocity, boot_ms) => {
+                    RadioContent::Position(place, velocity, boot_ms) => {
                         if heard.position.is_none_or(|(_, _, known, _)| boot_ms > known) {
                             heard.position = Some((place, velocity, boot_ms, now_s));
                         }
                     }
-                    Said::Intent(intent) => heard.intent = Some(intent),
-                    Said::Other => {}
+                    RadioContent::Intent(intent) => heard.intent = Some(intent),
+                    RadioContent::Other => {}
                 }
             }
             if member.companion.poll_timeout().is_some_and(|due| due <= now) {
@@ -279,16 +285,17 @@ impl<'a> World<'a> {
         }
         let said = if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
             let (place, velocity) = place_of(&data);
-            Said::Position(place, velocity, data.time_boot_ms)
+            RadioContent::Position(place, velocity, data.time_boot_ms)
         } else if frame.message_id == TUNNEL_DATA::ID {
-            Intent::decode(frame.padded(), frame.system).map_or(Said::Other, Said::Intent)
+            Intent::decode(frame.padded(), frame.system)
+                .map_or(RadioContent::Other, RadioContent::Intent)
         } else {
             if let Some(data) = frame.decode::<STATUSTEXT_DATA>()
                 && let Ok(text) = data.text.to_str()
             {
                 self.say(from, &format!("\"{text}\""));
             }
-            Said::Other
+            RadioContent::Other
         };
         if !self.members[from].sends {
             return;
@@ -311,7 +318,7 @@ impl<'a> World<'a> {
         let member = &mut self.members[i];
         match member.companion.detour_request(|obstacle| keep.push(obstacle)) {
             Some(request) => {
-                let answer = around(&request, &keep, own);
+                let answer = detour_in_the_open(&request, &keep, own);
                 let text = if answer.is_some() { "a way around" } else { "no way around" };
                 let answer = answer.as_ref().ok_or(PlanFailure::Unreachable);
                 member.companion.handle_plan(self.now, PlanKind::Detour, answer);

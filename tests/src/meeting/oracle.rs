@@ -44,7 +44,7 @@ pub struct Heard {
 
 /// Where a vehicle can be: segments widened by a radius.
 #[derive(Clone, Debug, Default)]
-pub struct Set {
+pub struct ReachableSet {
     segments: Vec<(Point, Point)>,
     radius_m: f32,
 }
@@ -79,20 +79,20 @@ pub fn distance(p: (Point, Point), q: (Point, Point)) -> f32 {
 }
 
 /// Where a neighbour can be, by what was received from it; `None` without a position.
-pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
+pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<ReachableSet> {
     let (position, velocity, _, at_s) = heard.position?;
     let age_s = now_s - at_s;
     if age_s > FRESH_S {
         let radius_m = CRUISE_MPS * age_s.min(GROWS_S);
-        return Some(Set { segments: vec![(position, position)], radius_m });
+        return Some(ReachableSet { segments: vec![(position, position)], radius_m });
     }
     let intent = heard.intent.as_ref();
     if intent.is_some_and(|i| i.flags & (GROUNDED | LANDED) != 0) {
-        return Some(Set { segments: vec![(position, position)], radius_m: 0.0 });
+        return Some(ReachableSet { segments: vec![(position, position)], radius_m: 0.0 });
     }
     let speed = velocity.norm();
     let mut left_m = reach(speed, age_s + 0.1);
-    let mut set = Set { segments: vec![(position, position)], radius_m: 0.0 };
+    let mut set = ReachableSet { segments: vec![(position, position)], radius_m: 0.0 };
     let next = intent.and_then(|i| i.points.iter().find(|p| (*p - position).norm() > 0.05));
     let on_points = next.is_some_and(|next| {
         speed < 0.3 || velocity.dot(&(next - position).normalize()) > 0.7 * speed
@@ -123,7 +123,7 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
 }
 
 /// Where a vehicle that begins to stop now can be.
-pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> Set {
+pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> ReachableSet {
     let speed = velocity.norm();
     let mut segments = vec![(position, position)];
     if lands {
@@ -131,10 +131,10 @@ pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> S
     } else if speed > 1e-3 {
         segments.push((position, position + velocity * (reach(speed, 0.1 + LAG_S) / speed)));
     }
-    Set { segments, radius_m: 0.0 }
+    ReachableSet { segments, radius_m: 0.0 }
 }
 
-impl Set {
+impl ReachableSet {
     /// Distance to another set, metres.
     pub fn distance(&self, other: &Self) -> f32 {
         let pairs = self.segments.iter().flat_map(|p| other.segments.iter().map(move |q| (*p, *q)));
@@ -146,7 +146,7 @@ impl Set {
 
 /// What the judge sees of a vehicle at one step.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct VehicleState {
     /// True position, ENU metres.
     pub position: Point,
     /// True velocity, ENU m/s.
@@ -193,7 +193,7 @@ struct Approach {
 #[derive(Debug)]
 pub struct Oracle {
     count: usize,
-    tracks: Vec<Vec<Seen>>,
+    tracks: Vec<Vec<VehicleState>>,
     approaches: Vec<Option<Approach>>,
     /// For each pair that is too near: when its sets came too near, the step at which it was
     /// nearest, and that distance.
@@ -243,7 +243,7 @@ impl Oracle {
     /// `judge_sets`.
     pub fn observe(
         &mut self,
-        seen: &[Seen],
+        seen: &[VehicleState],
         heard: impl Fn(usize, usize) -> Heard,
         floor_z: impl Fn(&Point) -> f32,
         judge_sets: bool,
@@ -279,7 +279,7 @@ impl Oracle {
         step: usize,
         now_s: f32,
         (a, b): (usize, usize),
-        own: &Seen,
+        own: &VehicleState,
         heard: &Heard,
         floor_z: &impl Fn(&Point) -> f32,
     ) {
@@ -303,7 +303,7 @@ impl Oracle {
         &mut self,
         step: usize,
         (a, b): (usize, usize),
-        seen: &[Seen],
+        seen: &[VehicleState],
         carried: impl Fn(usize, usize) -> bool,
     ) {
         let at = a * self.count + b;
@@ -333,7 +333,7 @@ impl Oracle {
         {
             (near.nearest, near.least_m) = (step, apart_m);
         }
-        let toward = |own: &Seen, apart: Point| {
+        let toward = |own: &VehicleState, apart: Point| {
             own.airborne && own.own && own.velocity.dot(&apart) > TOWARD_MPS * apart_m
         };
         if apart_m < TOUCH_M {

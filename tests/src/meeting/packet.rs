@@ -10,7 +10,7 @@ pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.765
 
 /// Content of a radio frame, decoded for the judge.
 #[derive(Clone, Debug)]
-pub(super) enum Said {
+pub(super) enum RadioContent {
     Position(Point, Point, u32),
     Intent(Intent),
     Other,
@@ -21,5 +21,5 @@ pub(super) struct Packet {
     pub(super) at: Instant,
     pub(super) from: usize,
     pub(super) bytes: Vec<u8>,
-    pub(super) said: Said,
+    pub(super) said: RadioContent,
 }

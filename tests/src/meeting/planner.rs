@@ -9,7 +9,11 @@ use super::scene::Plan;
 
 /// A detour in the open around the zones in `keep`: straight, or past one or two points beside and
 /// above; `None` if none is clear.
-pub(super) fn around(request: &DetourRequest, keep: &[KeepOutZone], own: &Plan) -> Option<Plan> {
+pub(super) fn detour_in_the_open(
+    request: &DetourRequest,
+    keep: &[KeepOutZone],
+    own: &Plan,
+) -> Option<Plan> {
     let last = own.path.waypoints().last()?.position;
     let ground = last - Point::new(0.0, 0.0, request.descent_m);
     let here = request.here;

@@ -13,8 +13,8 @@ use planner_core::schedule::{self, ScheduleWorkspace};
 use self::happenings::happenings;
 pub use self::passing::{PASSINGS, passing};
 pub use self::types::{
-    CLIMB_MPS, CRUISE_MPS, GATES, Happening, LIMIT_S, Lie, PLATFORM_M, Plan, SAFETY_M, SCHEDULE,
-    START_S, Scene, VEHICLES, Vehicle, WAYPOINTS, What,
+    CLIMB_MPS, CRUISE_MPS, GATES, LIMIT_S, Lie, MeetingEvent, PLATFORM_M, Plan, SAFETY_M, SCHEDULE,
+    START_S, Scene, TimedEvent, VEHICLES, Vehicle, WAYPOINTS,
 };
 use self::ways::{KINDS, Shape, fits, flight, pads, way};
 use super::autopilot::{Catch, Failsafe};
@@ -55,11 +55,11 @@ pub fn scene(seed: u64) -> Scene {
 pub fn caught(seed: u64) -> Scene {
     let mut scene = scene(seed);
     let mut dice = Dice::new(seed ^ 0xCA06);
-    scene.happenings.retain(|happening| happening.what == What::Start);
+    scene.happenings.retain(|happening| happening.what == MeetingEvent::Start);
     let vehicle = dice.below(scene.vehicles.len());
     let at_s = START_S + scene.vehicles[vehicle].plan.depart_s + dice.real(3.0, 20.0);
     let how = [Catch::Wall, Catch::Ledge, Catch::Net, Catch::Wind][dice.below(4)];
-    scene.happenings.push(Happening { at_s, vehicle, what: What::Caught(how) });
+    scene.happenings.push(TimedEvent { at_s, vehicle, what: MeetingEvent::Caught(how) });
     scene.happenings.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     // Vehicles that wait for the caught one fly around it or land, one after the other.
     scene.limit_s = CAUGHT_LIMIT_S;

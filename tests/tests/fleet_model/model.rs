@@ -250,7 +250,7 @@ impl FleetModel {
         vehicle.fleet.step(now, &own, hearing);
         if vehicle.fleet.needs_division() {
             let hash = parts(&self.whole, &vehicle.fleet, self.count).1;
-            vehicle.fleet.take_plan_crc(hash);
+            vehicle.fleet.set_hash_from_plan(hash);
         }
         if vehicle.fleet.division_count() > vehicle.division {
             vehicle.division = vehicle.fleet.division_count();

@@ -32,7 +32,7 @@ struct Distance {
 
 /// Compares docs/margins.md with the sources, or writes it where `FLOCKMATE_WRITE` is set. Returns
 /// a line for each fault.
-pub fn wrong() -> Result<Vec<String>> {
+pub fn check_margins_page() -> Result<Vec<String>> {
     let mut sources = Vec::new();
     for name in CRATES {
         for tree in Tree::of_crate(Path::new(name))? {

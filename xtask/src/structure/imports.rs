@@ -8,7 +8,7 @@ use syn::{Item, ItemMod, ItemUse, UseTree, Visibility};
 use super::sources::{Source, Tree};
 
 /// Most `pub use` items in a row that are followed to find the file that defines an item.
-const PASSED_ON: usize = 6;
+const MAX_REEXPORTS: usize = 6;
 
 /// Every cycle: a set of files that import each other, directly or not. Each is a list of its
 /// imports, `file → file`.
@@ -58,7 +58,7 @@ fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
     let mut paths = Paths { module: source.module.clone(), found: Vec::new() };
     source.items.iter().for_each(|item| paths.visit_item(item));
     let files =
-        paths.found.iter().filter_map(|(module, path)| resolve(tree, module, path, PASSED_ON));
+        paths.found.iter().filter_map(|(module, path)| resolve(tree, module, path, MAX_REEXPORTS));
     files.filter(|file| *file != at).collect()
 }
 
@@ -148,14 +148,15 @@ fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) ->
     let file = tree.modules[&whole[..length]];
     match whole.get(length) {
         Some(name) if passed_on > 0 => Some(
-            passed(tree, &tree.sources[file], &whole[..length], name, passed_on).unwrap_or(file),
+            reexported_file(tree, &tree.sources[file], &whole[..length], name, passed_on)
+                .unwrap_or(file),
         ),
         _ => Some(file),
     }
 }
 
 /// The file that defines `name`, which `source` re-exports by `pub use`; `None` if it does not.
-fn passed(
+fn reexported_file(
     tree: &Tree,
     source: &Source,
     module: &[String],

@@ -66,7 +66,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     (
         "companion/src/guidance/filter/look.rs",
-        "filter",
+        "step_filter",
         "one decision, in the order of docs/safety.md",
     ),
     (
@@ -134,7 +134,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("sim-autopilot/src/px4/mod.rs", "Commander", FIRMWARE),
     (
         "host-sim/src/coverage/check.rs",
-        "judge_coverage",
+        "count_photographed_cells",
         "one pass over the pictures, each of which changes what the next adds",
     ),
     ("host-sim/src/coverage/export.rs", "flight_items", "the items of a mission in their order"),

@@ -13,9 +13,9 @@ use planner_core::Point;
 /// A bench in the middle of its path.
 fn following() -> Bench {
     let mut bench = Bench::ardupilot(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.start();
-    bench.until(State::Follow, 20.0);
+    bench.run_until(State::Follow, 20.0);
     bench.run(2.0);
     assert_eq!(bench.state(), State::Follow);
     bench
@@ -28,7 +28,7 @@ fn numbers(bench: &Bench) -> Vec<u16> {
 #[test]
 fn flies_guided_from_silence_to_the_goal() {
     let mut bench = Bench::ardupilot(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     for stream in ardupilot::STREAMS {
         assert!(
             bench.commands.contains(&(511, f32::from(stream.0), stream.1, 0.0)),
@@ -37,16 +37,16 @@ fn flies_guided_from_silence_to_the_goal() {
         );
     }
     bench.start();
-    bench.until(State::TakeOff, 10.0);
+    bench.run_until(State::TakeOff, 10.0);
     let before = bench.setpoints.len();
     assert!(before >= 20, "a second of setpoints before Guided");
-    bench.until(State::Climb, 6.0);
+    bench.run_until(State::Climb, 6.0);
     assert_eq!(
         bench.setpoints.len(),
         before,
         "a setpoint before the lift-off would cancel the take-off"
     );
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
     assert_eq!(numbers(&bench), [176, 400, 22, 176]);
     assert!(
         bench.commands.contains(&(176, 1.0, 4.0, 0.0))
@@ -71,11 +71,11 @@ fn waits_for_the_estimator() {
         assert_eq!(bench.state(), State::WaitPosition, "EKF flags {flags:#x}");
     }
     bench.ekf_flags = 0x33F;
-    bench.until(State::Ready, 3.0);
+    bench.run_until(State::Ready, 3.0);
     // Lost in flight it is a position lost.
     let mut bench = following();
     bench.ekf_flags = 0xA7;
-    bench.until(State::PositionLost, 3.0);
+    bench.run_until(State::PositionLost, 3.0);
     bench.run(0.1);
     assert_eq!(bench.setpoints.last().unwrap().2, ardupilot::MASK_VELOCITY);
 }
@@ -83,7 +83,7 @@ fn waits_for_the_estimator() {
 #[test]
 fn asks_for_the_streams_again_after_a_reboot() {
     let mut bench = Bench::ardupilot(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.streams.clear();
     bench.run(4.0);
     assert_eq!(bench.state(), State::Ready, "back before the position counts as lost");
@@ -91,7 +91,7 @@ fn asks_for_the_streams_again_after_a_reboot() {
     // In flight too: here the pilot has it.
     let mut bench = following();
     bench.mode = ardupilot::BRAKE;
-    bench.until(State::PilotControl, 3.0);
+    bench.run_until(State::PilotControl, 3.0);
     bench.streams.clear();
     bench.run(4.0);
     assert!(ardupilot::STREAMS.iter().all(|(id, _)| bench.streams.contains(id)));
@@ -101,7 +101,7 @@ fn asks_for_the_streams_again_after_a_reboot() {
 fn a_pilot_is_never_fought_and_gets_the_current_position_back() {
     let mut bench = following();
     bench.mode = ardupilot::BRAKE;
-    bench.until(State::PilotControl, 3.0);
+    bench.run_until(State::PilotControl, 3.0);
     let asked = numbers(&bench).len();
     bench.enu += Point::new(0.0, 0.3, 0.0);
     bench.run(3.0);
@@ -113,14 +113,14 @@ fn a_pilot_is_never_fought_and_gets_the_current_position_back() {
     assert!((bench.enu - at).norm() < 0.05 && bench.state() == State::PilotReturned);
     assert_eq!(numbers(&bench).len(), asked, "and no command");
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
 }
 
 #[test]
 fn its_failsafe_gets_no_setpoints() {
     let mut bench = following();
     (bench.mode, bench.status) = (ardupilot::RTL, 5);
-    bench.until(State::Failsafe, 3.0);
+    bench.run_until(State::Failsafe, 3.0);
     let sent = bench.setpoints.len();
     bench.run(5.0);
     assert_eq!(bench.setpoints.len(), sent);
@@ -139,7 +139,7 @@ fn timesync_is_answered_and_its_answers_are_not() {
 #[test]
 fn another_autopilots_heartbeat_changes_nothing() {
     let mut bench = Bench::ardupilot(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.kind = crate::autopilot::AutopilotKind::Px4;
     bench.armed = true;
     bench.run(3.5);

@@ -34,11 +34,11 @@ fn ahead(b: &Bench, height_m: f32) -> Point {
 pub(super) fn over_a_field(px4: bool) -> Bench {
     let mut config = two_vehicles();
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
-    config.division = Some(60.0);
+    config.lost_vehicle_down_s = Some(60.0);
     let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
     bench.answer_plan = Some(Ok(field_plan()));
     bench.neighbour = FAR_AWAY;
-    bench.until(Ready, 6.0);
+    bench.run_until(Ready, 6.0);
     bench
 }
 
@@ -227,7 +227,7 @@ proptest::proptest! {
         };
         if !waits {
             b.start();
-            b.until(Follow, 30.0);
+            b.run_until(Follow, 30.0);
         }
         (0..lead).for_each(|_| watch.tick(&mut b));
         watch.other.mute = false;
@@ -279,11 +279,11 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
     for run_s in [3.0, 5.0, 7.0] {
         let mut b = over_a_field(true);
         b.start();
-        b.until(Follow, 30.0);
+        b.run_until(Follow, 30.0);
         b.run(run_s);
         b.neighbour = None;
         b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
-        b.until(Land, 40.0);
+        b.run_until(Land, 40.0);
         assert!((b.enu - START).xy().norm() < 0.5, "{run_s}: {:?} {:?}", b.enu, b.texts);
     }
 }
@@ -294,7 +294,7 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
 fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     let mut b = over_a_field(true);
     b.start();
-    b.until(Follow, 30.0);
+    b.run_until(Follow, 30.0);
     b.neighbour = None;
     b.run(15.0);
     let along_m = b.companion.guidance.along_m();
@@ -305,7 +305,7 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
         b.texts
     );
     b.neighbour = FAR_AWAY;
-    b.until(Done, 60.0);
+    b.run_until(Done, 60.0);
 }
 
 /// Beside its path it waits for none: what it comes to is not its pad. Vehicle 77 lies there.
@@ -313,13 +313,13 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
 fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
     let mut b = over_a_field(true);
     b.start();
-    b.until(Follow, 30.0);
+    b.run_until(Follow, 30.0);
     b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-    b.until(Blocked, 5.0);
+    b.run_until(Blocked, 5.0);
     b.neighbour = None;
-    b.until(Dividing, 20.0);
+    b.run_until(Dividing, 20.0);
     assert!(b.companion.detours.is_beside_plan(), "{:?}", b.texts);
-    b.until(Follow, 5.0);
+    b.run_until(Follow, 5.0);
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }
 
@@ -396,7 +396,7 @@ proptest::proptest! {
         let mut b = over_a_field(true);
         if !waits {
             b.start();
-            b.until(Follow, 30.0);
+            b.run_until(Follow, 30.0);
         }
         for (i, (lie, ticks)) in lies.iter().enumerate() {
             let before = std::boxed::Box::new(b.companion.neighbours.fleet().cloned());

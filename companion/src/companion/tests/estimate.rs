@@ -28,9 +28,9 @@ fn the_pace_follows_the_estimate() {
         };
         bench.companion.services.set_parameter_value(3, 0.26).unwrap();
         bench.companion.apply_parameters();
-        bench.until(State::Ready, 60.0);
+        bench.run_until(State::Ready, 60.0);
         bench.start();
-        bench.until(State::Aborted, 5.0);
+        bench.run_until(State::Aborted, 5.0);
         assert!(
             bench.texts.iter().any(|t| t == "Estimate worse than margin: start refused"),
             "{:?}",
@@ -44,9 +44,9 @@ fn the_pace_follows_the_estimate() {
     }
     let mut bench = Bench::new(config());
     bench.answer_plan = Some(Ok(long));
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.start();
-    bench.until(State::Follow, 20.0);
+    bench.run_until(State::Follow, 20.0);
     let full = fastest(&mut bench, 2.0);
     bench.accuracy_m = Some(0.11);
     let slower = fastest(&mut bench, 2.0);
@@ -71,18 +71,18 @@ fn the_pace_follows_the_estimate() {
         "{:?}",
         bench.texts
     );
-    bench.until(State::Land, 40.0);
+    bench.run_until(State::Land, 40.0);
 }
 
 #[test]
 fn unsound_variance_ratios_stop_an_arducopter() {
     for variance in [0.81, f32::NAN, f32::INFINITY] {
         let mut bench = Bench::ardupilot(config());
-        bench.until(State::Ready, 60.0);
+        bench.run_until(State::Ready, 60.0);
         bench.start();
-        bench.until(State::Follow, 30.0);
+        bench.run_until(State::Follow, 30.0);
         bench.pos_horiz_variance = variance;
-        bench.until(State::Land, 40.0);
+        bench.run_until(State::Land, 40.0);
         assert!(
             bench.texts.iter().any(|t| t == "Estimate worse than margin for 30 s: landing"),
             "{:?}",

@@ -66,7 +66,7 @@ proptest::proptest! {
             );
             bench.run(0.1);
         }
-        bench.until(State::Done, 60.0);
+        bench.run_until(State::Done, 60.0);
         proptest::prop_assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2);
         assert_no_gap(&bench);
     }
@@ -204,9 +204,9 @@ proptest::proptest! {
         flies in proptest::prelude::any::<bool>(),
     ) {
         use mavlink::dialects::ardupilotmega::*;
-        let mut bench = Bench::accompanied(two_vehicles());
+        let mut bench = Bench::started_with_neighbour(two_vehicles());
         if flies {
-            bench.until(State::Follow, 20.0);
+            bench.run_until(State::Follow, 20.0);
         } else {
             bench = Bench::new(two_vehicles());
             bench.neighbour = Some((
@@ -215,7 +215,7 @@ proptest::proptest! {
                 0.0,
                 5,
             ));
-            bench.until(State::Ready, 6.0);
+            bench.run_until(State::Ready, 6.0);
         }
         let mut flash = crate::testing::fake_flash::Flash::new(9);
         bench.companion.attach_store(crate::testing::fake_flash::started(&mut flash));
@@ -280,7 +280,7 @@ proptest::proptest! {
         );
         proptest::prop_assert!(bench.acks.contains(&(512, 0, 255, 190)), "{:?}", bench.acks);
         if flies {
-            bench.until(State::Done, 60.0);
+            bench.run_until(State::Done, 60.0);
             proptest::prop_assert!(
                 (bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2,
                 "{:?}",
@@ -288,7 +288,7 @@ proptest::proptest! {
             );
         } else {
             bench.start();
-            bench.until(State::Follow, 20.0);
+            bench.run_until(State::Follow, 20.0);
         }
     }
 }
@@ -347,7 +347,7 @@ fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
 #[test]
 fn a_command_is_logged_with_its_sender_and_a_foreign_one_denied() {
     let mut bench = Bench::new(config());
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.companion.handle_bytes(Link::Swarm, bench.now, &forged(0, 9, 4));
     bench.drain();
     assert_eq!((bench.state(), bench.acks.pop()), (State::Ready, Some((300, 2, 9, 190))));
@@ -362,7 +362,7 @@ fn a_command_is_logged_with_its_sender_and_a_foreign_one_denied() {
     let mut other = config();
     other.ground_stations = [9, 245, 0, 0];
     let mut bench = Bench::new(other);
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench.start();
     assert_eq!((bench.state(), bench.acks.pop()), (State::Ready, Some((300, 2, 255, 190))));
     bench.companion.handle_bytes(Link::Swarm, bench.now, &forged(0, 9, 4));
@@ -393,9 +393,9 @@ fn an_origin_that_moves_in_flight_lands_the_vehicle_where_it_is() {
         bench.origin.alt_m += up_m;
         // PX4 sends an origin that changes without a request.
         bench.send_origin();
-        bench.until(State::Land, 3.0);
+        bench.run_until(State::Land, 3.0);
         assert!(bench.texts.iter().any(|t| t == "EKF origin moved: landing"), "{:?}", bench.texts);
-        bench.until(State::Aborted, 60.0);
+        bench.run_until(State::Aborted, 60.0);
         assert!((bench.enu - place).xy().norm() < 3.0, "{:?} {place:?}", bench.enu);
     }
 }
@@ -427,7 +427,7 @@ proptest::proptest! {
             bench.drain();
             (0..ticks).for_each(|_| bench.tick());
         }
-        bench.until(State::Done, 60.0);
+        bench.run_until(State::Done, 60.0);
         // The path runs along y = 12: setpoints and vehicle stay on it.
         let wide = |(_, at, mask): &&(Instant, Point, u16)| {
             *mask != px4::MASK_VELOCITY && (at.y - 12.0).abs() > 0.05
@@ -439,12 +439,12 @@ proptest::proptest! {
 
 #[test]
 fn a_neighbour_heard_again_lets_it_go_on() {
-    let mut bench = Bench::accompanied(two_vehicles());
-    bench.until(State::Follow, 20.0);
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
+    bench.run_until(State::Follow, 20.0);
     let neighbour = bench.neighbour.take();
-    bench.until(State::Alone, 5.0);
+    bench.run_until(State::Alone, 5.0);
     bench.neighbour = neighbour;
-    bench.until(State::Done, 60.0);
+    bench.run_until(State::Done, 60.0);
     assert!(bench.texts.iter().any(|t| t == "Neighbours heard again"));
 }
 

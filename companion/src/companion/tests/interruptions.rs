@@ -52,7 +52,7 @@ fn bench(kind: AutopilotKind) -> Bench {
         AutopilotKind::ArduPilot => Bench::ardupilot(config()),
     };
     bench.spool = Duration::from_millis(2000);
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench
 }
 
@@ -62,8 +62,8 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
     use State::*;
     let mut b = match state {
         Alone | Blocked => {
-            let mut b = Bench::accompanied(two_vehicles());
-            b.until(Follow, 20.0);
+            let mut b = Bench::started_with_neighbour(two_vehicles());
+            b.run_until(Follow, 20.0);
             b.run(1.0);
             b
         }
@@ -76,37 +76,37 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
     match state {
         TakeOff if kind == AutopilotKind::Px4 => return None,
         Alone | Blocked if kind == AutopilotKind::ArduPilot => return None,
-        TakeOff => b.until(TakeOff, 20.0),
+        TakeOff => b.run_until(TakeOff, 20.0),
         Climb => {
-            b.until(Climb, 20.0);
+            b.run_until(Climb, 20.0);
             b.run(0.7);
         }
         Follow => {
-            b.until(Follow, 20.0);
+            b.run_until(Follow, 20.0);
             b.run(0.5);
         }
         Paused => {
-            b.until(paused_in?, 20.0);
+            b.run_until(paused_in?, 20.0);
             b.run(0.5);
             assert_eq!(pause(&mut b), Some(ACCEPTED));
             b.run(3.0);
         }
         Alone => {
             b.neighbour = None;
-            b.until(Alone, 5.0);
+            b.run_until(Alone, 5.0);
             b.run(2.0);
         }
         Blocked => {
             b.answer_detour = None;
             b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-            b.until(Blocked, 3.0);
+            b.run_until(Blocked, 3.0);
         }
         Land => {
-            b.until(Follow, 20.0);
+            b.run_until(Follow, 20.0);
             b.run(1.0);
             b.never_lands = true;
             assert_eq!(land(&mut b), Some(ACCEPTED));
-            b.until(Land, 8.0);
+            b.run_until(Land, 8.0);
             b.run(2.0);
         }
         _ => return None,
@@ -156,7 +156,7 @@ fn an_interruption_returns_to_the_state_that_it_interrupted() {
                 b.run(2.0);
                 assert_eq!(resume(b), Some(TEMPORARILY_REJECTED), "a resume under the pilot");
                 b.mode = b.kind.setpoint_mode();
-                b.until(State::PilotReturned, 2.0);
+                b.run_until(State::PilotReturned, 2.0);
                 b.run(3.0);
                 assert_eq!(b.state(), State::PilotReturned, "the mode alone");
                 assert_eq!(resume(b), Some(ACCEPTED));
@@ -212,7 +212,7 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
         for (paused, lost) in [(true, false), (false, true), (true, true)] {
             let mut b = bench(kind);
             b.start();
-            b.until(State::Climb, 20.0);
+            b.run_until(State::Climb, 20.0);
             b.run(0.4);
             b.stuck = lost;
             if paused {
@@ -221,7 +221,7 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
             }
             if lost {
                 b.no_position = true;
-                b.until(State::PositionLost, 3.0);
+                b.run_until(State::PositionLost, 3.0);
                 b.no_position = false;
                 b.run(2.5);
                 b.stuck = false;
@@ -234,7 +234,7 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
                 resume(&mut b);
             }
             assert_eq!(b.state(), State::Climb, "{:?}", b.texts);
-            b.until(State::Done, 60.0);
+            b.run_until(State::Done, 60.0);
         }
     }
 }
@@ -249,7 +249,7 @@ fn a_pause_holds_the_vehicle_on_its_pad_until_the_resume() {
         }
         if at != Ready {
             b.start();
-            b.until(at, 8.0);
+            b.run_until(at, 8.0);
         }
         assert_eq!(pause(&mut b), Some(ACCEPTED), "{at:?}");
         b.refused.clear();
@@ -264,7 +264,7 @@ fn a_pause_holds_the_vehicle_on_its_pad_until_the_resume() {
             b.texts
         );
         assert_eq!(resume(&mut b), Some(ACCEPTED), "{at:?}");
-        b.until(Done, 60.0);
+        b.run_until(Done, 60.0);
     }
 }
 
@@ -274,7 +274,7 @@ fn a_vehicle_that_is_landed_before_it_lifts_off_ends_on_the_ground() {
         for tenths in 0..40 {
             let mut b = bench(AutopilotKind::ArduPilot);
             b.start();
-            b.until(State::Arming, 10.0);
+            b.run_until(State::Arming, 10.0);
             b.run(tenths as f32 * 0.1);
             assert_eq!(order(&mut b, command, 0.0), Some(ACCEPTED), "{tenths}");
             b.run(25.0);
@@ -307,7 +307,7 @@ fn a_disarm_is_never_answered_by_arming() {
     // Silent meanwhile: not even once more.
     let mut b = bench(AutopilotKind::Px4);
     b.start();
-    b.until(State::Arming, 5.0);
+    b.run_until(State::Arming, 5.0);
     (b.never_arms, b.mute) = (true, true);
     let asked = b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count();
     b.run(0.2);
@@ -319,7 +319,7 @@ fn a_disarm_is_never_answered_by_arming() {
     // Seen armed, then disarmed.
     let mut b = bench(AutopilotKind::ArduPilot);
     b.start();
-    b.until(State::TakeOff, 10.0);
+    b.run_until(State::TakeOff, 10.0);
     (b.armed, b.took_off) = (false, false);
     b.run(30.0);
     assert_eq!(b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count(), 1);
@@ -330,7 +330,7 @@ fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
     let mut b = bench(AutopilotKind::Px4);
     b.refused.push(ARM);
     b.start();
-    b.until(State::Arming, 5.0);
+    b.run_until(State::Arming, 5.0);
     b.run(40.0);
     let asked = b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count();
     assert!((18..=21).contains(&asked), "{asked}");
@@ -345,10 +345,10 @@ fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
     let mut b = bench(AutopilotKind::Px4);
     b.refused.push(ARM);
     b.start();
-    b.until(State::Arming, 5.0);
+    b.run_until(State::Arming, 5.0);
     b.run(12.0);
     b.refused.clear();
-    b.until(State::Done, 60.0);
+    b.run_until(State::Done, 60.0);
 }
 
 #[test]
@@ -356,12 +356,12 @@ fn after_the_pilot_one_point_is_held_until_the_resume() {
     for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         let mut b = bench(kind);
         b.start();
-        b.until(State::Follow, 20.0);
+        b.run_until(State::Follow, 20.0);
         b.run(2.0);
         b.mode = pilot_mode(kind);
-        b.until(State::PilotControl, 3.0);
+        b.run_until(State::PilotControl, 3.0);
         b.mode = kind.setpoint_mode();
-        b.until(State::PilotReturned, 2.0);
+        b.run_until(State::PilotReturned, 2.0);
         let held = b.enu;
         let sent = b.setpoints.len();
         // The wind, or an estimate, carries it off.
@@ -378,20 +378,20 @@ fn after_the_pilot_one_point_is_held_until_the_resume() {
 fn a_battery_that_is_not_reported_holds_the_take_off_and_is_requested_again() {
     let mut b = Bench::ardupilot(config());
     b.no_battery = true;
-    b.until(State::Ready, 6.0);
+    b.run_until(State::Ready, 6.0);
     b.start();
     b.run(20.0);
     assert_eq!(b.state(), State::Scheduled);
     let asked = b.commands.iter().filter(|c| c.0 == 511 && c.1 == 1.0).count();
     assert!(asked > 5, "{asked} requests");
     b.no_battery = false;
-    b.until(State::Follow, 20.0);
+    b.run_until(State::Follow, 20.0);
     // Reported as unknown, what was known still counts.
     b.battery = 2;
     b.no_battery = true;
     b.run(8.0);
     (b.no_battery, b.battery) = (false, 2);
-    b.until(State::Land, 8.0);
+    b.run_until(State::Land, 8.0);
 }
 
 #[test]
@@ -433,11 +433,11 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
 fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavFrame};
     use planner_core::frames::enu_to_geodetic;
-    let mut b = Bench::accompanied(two_vehicles());
-    b.until(State::Follow, 20.0);
+    let mut b = Bench::started_with_neighbour(two_vehicles());
+    b.run_until(State::Follow, 20.0);
     b.answer_detour = None;
     b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-    b.until(State::Replanning, 10.0);
+    b.run_until(State::Replanning, 10.0);
     // Upon the detour that comes a second later.
     let place = enu_to_geodetic(&ORIGIN, &Point::new(13.0, 16.0, 2.0));
     let data = COMMAND_INT_DATA {

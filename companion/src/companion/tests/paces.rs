@@ -50,9 +50,9 @@ proptest::proptest! {
         let path = plan.path.clone();
         bench.answer_plan = Some(Ok(plan));
         bench.step_m = cruise_mps * 0.06;
-        bench.until(State::Ready, 6.0);
+        bench.run_until(State::Ready, 6.0);
         bench.start();
-        bench.until(State::Follow, 20.0);
+        bench.run_until(State::Follow, 20.0);
         bench.setpoints.clear();
         let order = |bench: &mut Bench, go: f32| {
             bench.command(
@@ -109,9 +109,9 @@ proptest::proptest! {
                 path.push(point, 1.2).unwrap();
             }
             bench.answer_plan = Some(Ok(VehiclePlan { path, descent_m: end_m, ..plan() }));
-            bench.until(State::Ready, 6.0);
+            bench.run_until(State::Ready, 6.0);
             bench.start();
-            bench.until(State::Follow, 30.0);
+            bench.run_until(State::Follow, 30.0);
             bench.setpoints.clear();
             while bench.state() == State::Follow {
                 bench.run(0.05);
@@ -183,12 +183,12 @@ proptest::proptest! {
                 0.0,
                 5,
             ));
-            bench.until(State::Ready, 6.0);
+            bench.run_until(State::Ready, 6.0);
             bench.start();
-            bench.until(State::Follow, 60.0);
+            bench.run_until(State::Follow, 60.0);
             bench.run(flown_s);
             bench.neighbour = None;
-            bench.until(State::Land, 40.0);
+            bench.run_until(State::Land, 40.0);
             let (from, began) = (bench.enu, bench.now);
             bench.setpoints.clear();
             let setpoint_mode = bench.mode;
@@ -231,9 +231,9 @@ proptest::proptest! {
         config.required_clearance_m = config.radius_m + margin_m;
         (config.climb_mps, config.descend_mps) = (climb_mps, descend_mps);
         let mut bench = Bench::new(config);
-        bench.until(State::Ready, 6.0);
+        bench.run_until(State::Ready, 6.0);
         bench.start();
-        bench.until(State::Follow, 60.0);
+        bench.run_until(State::Follow, 60.0);
         let mut touched = None;
         while bench.state() == State::Follow {
             bench.run(0.05);

@@ -46,7 +46,7 @@ impl Scenes {
         seconds: f32,
     ) {
         script(&mut bench);
-        bench.until(end, seconds);
+        bench.run_until(end, seconds);
         self.texts.append(&mut bench.texts);
     }
 }
@@ -150,7 +150,7 @@ fn stuck(b: &mut Bench, seconds: f32) {
 
 fn ready_with(config: Config<4>) -> Bench {
     let mut bench = Bench::new(config);
-    bench.until(State::Ready, 6.0);
+    bench.run_until(State::Ready, 6.0);
     bench
 }
 
@@ -163,7 +163,7 @@ fn ready() -> Bench {
 fn to(state: State) -> Bench {
     let mut bench = ready();
     bench.start();
-    bench.until(state, 30.0);
+    bench.run_until(state, 30.0);
     bench
 }
 
@@ -188,8 +188,8 @@ fn accompanied(state: State, seconds: f32) -> Bench {
 }
 
 fn accompanied_with(config: Config<4>, state: State, seconds: f32) -> Bench {
-    let mut bench = Bench::accompanied(config);
-    bench.until(state, 20.0);
+    let mut bench = Bench::started_with_neighbour(config);
+    bench.run_until(state, 20.0);
     bench.run(seconds);
     bench
 }

@@ -32,7 +32,7 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
             let told = bench.swarm.iter().rev().find_map(|f| Intent::decode(f.padded(), SYSTEM));
             let (told, from) = (told.expect("five a second"), bench.enu);
             bench.neighbour = None;
-            beyond += usize::from(told.first_unheard_point > 0);
+            beyond += usize::from(told.unheard_point_count > 0);
             for _ in 0..500 {
                 bench.run(0.1);
                 if !matches!(bench.state(), TakeOff | Climb | Follow) {

@@ -29,7 +29,7 @@ const STRANGER_HULL_GAP_M: f32 = 0.3;
 /// Speed by which the vehicle may exceed its setpoint's without a longer stop, m/s: sway.
 const STOPPING_SWAY_MPS: f32 = 0.3;
 /// Time for which a landing was held, after which it keeps only the hulls apart.
-const LANDING_WAITED_LONG: Duration = Duration::from_secs(40);
+const LATE_LANDING_AFTER: Duration = Duration::from_secs(40);
 
 impl Guidance {
     /// Adds to the place of the setpoint what the vehicle can no longer avoid on its path, and
@@ -134,7 +134,7 @@ impl Guidance {
             let ahead_s =
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
             let held = self.filter.landing_held_for(now);
-            if lands && met.stranger && held >= LANDING_WAITED_LONG {
+            if lands && met.stranger && held >= LATE_LANDING_AFTER {
                 // A stranger, which anybody can feign, keeps no vehicle in the air for good.
                 continue;
             }
@@ -146,7 +146,7 @@ impl Guidance {
             // above its pad.
             let at_end =
                 || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
-            let rests = lies && held >= LANDING_WAITED_LONG && (last_place || at_end());
+            let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());
             let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
@@ -168,7 +168,7 @@ impl Guidance {
                 |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
             let below = || {
                 floor_m.is_some_and(may_lie_below)
-                    || (comes_down && contact.comes_home(now, &place, safety_m))
+                    || (comes_down && contact.may_fly_home_near(now, &place, safety_m))
             };
             if silent && !hears_nobody && !met.stranger && below() {
                 return Some(FilterConflict {
@@ -179,7 +179,7 @@ impl Guidance {
                 });
             }
             let reach_m = apart_m + met.motion.reach_m(bounds, ahead_s);
-            let away = own.away_from_box(&met.motion.position);
+            let away = own.distance_from_box(&met.motion.position);
             let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
             if away.x * away.x + away.y * away.y + above_m * above_m >= reach_m * reach_m {
                 continue;
@@ -207,7 +207,7 @@ impl Guidance {
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
-        !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld)
+        !self.returning && !scene.is_on_detour && !matches!(state, State::Land | State::LandingHeld)
     }
 
     /// Whether this vehicle lets the neighbour `met` go first: a vehicle on the plan goes before

@@ -5,7 +5,7 @@ use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
 
-use super::super::limits::bounds;
+use super::super::limits::filter_bounds;
 use super::super::motion::clamp_to;
 use super::super::{Guidance, GuidanceInputs};
 use super::{
@@ -20,7 +20,7 @@ use crate::time::Instant;
 impl Guidance {
     /// Runs the filter for one step: compares the way ahead with all neighbours, and decides
     /// whether the vehicle is stopped. To be called before the reference moves.
-    pub(in crate::guidance) fn filter<const V: usize, const W: usize, const G: usize>(
+    pub(in crate::guidance) fn step_filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
@@ -85,7 +85,7 @@ impl Guidance {
         }
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_CLEAR_M } else { 0.0 };
-        let bounds = bounds(&self.track, self.fastest_mps);
+        let bounds = filter_bounds(&self.track, self.fastest_mps);
         let mut set;
         match way {
             FlightDirection::Vertical { to_m, .. } if whole_column => {
@@ -173,7 +173,7 @@ impl Guidance {
     ) -> f32 {
         let z_m = scene.telemetry.position.z;
         let mut ground_m = self.ground_m(plan).min(z_m);
-        if self.returning && scene.detours {
+        if self.returning && scene.is_on_detour {
             // The way back along a detour ends in the air where the detour began: the ground there
             // counts as no higher than the climb's height below that.
             ground_m = plan

@@ -5,7 +5,7 @@ extern crate std;
 
 use planner_core::deconflict::Advice;
 use planner_core::flight::Path;
-use planner_core::track::{self, TrackConfig, Tracker};
+use planner_core::track::{self, ReferenceState, TrackConfig};
 use proptest::prelude::*;
 
 use super::*;
@@ -42,7 +42,7 @@ proptest! {
             fenced.then(|| (first - Point::new(5.0, 5.0, 1.0), first + Point::new(5.0, 5.0, 1.0)));
         let cfg = TrackConfig::default();
         let (mut tracker, mut smoother) =
-            (Tracker::default(), SetpointSmoother::new(LIMITS, fence));
+            (ReferenceState::default(), SetpointSmoother::new(LIMITS, fence));
         smoother.begin_at(first, 0.0);
         for (step, (kind, share, steps)) in
             paces.iter().flat_map(|p| (0..p.2).map(move |_| (p.0, p.1, p.2))).enumerate()

@@ -10,7 +10,7 @@ use super::*;
 use crate::link::frame::{self, Header};
 use crate::storage::store::{ErasePermission, MAX_READ};
 use crate::testing::fake_autopilot::*;
-use crate::testing::fake_flash::{Flash, obey, started};
+use crate::testing::fake_flash::{Flash, execute, started};
 use crate::{Duration, Link, State};
 
 /// A ground station that asks for everything at once by the radio.
@@ -73,7 +73,7 @@ impl Greedy {
         let now = self.bench.now;
         let mut read = [0; MAX_READ];
         while let Some(request) = self.bench.companion.poll_flash() {
-            let outcome = obey(&mut self.flash, request, ErasePermission::Allowed, &mut read)
+            let outcome = execute(&mut self.flash, request, ErasePermission::Allowed, &mut read)
                 .expect("no power cut");
             self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
         }
@@ -119,7 +119,7 @@ const HZ: u8 = 5;
 fn the_radio_gets_no_more_whatever_is_asked() {
     let saved = MAX_SAVED_BYTES + MAX_FRAME_LEN as u32;
     let mut ground = Greedy::new(Bench::new(config()));
-    ground.bench.until(State::Ready, 6.0);
+    ground.bench.run_until(State::Ready, 6.0);
     ground.run(20);
     assert!(
         ground.most_in_a_second() <= state_bytes_per_s(HZ) + DISARMED_BYTES_PER_S + saved,
@@ -174,11 +174,11 @@ fn state_is_as_long_as_said() {
 
 #[test]
 fn what_is_owed_is_paid_back_by_time() {
-    let mut rate_limit = RateLimit::default();
+    let mut rate_limit = RadioTokenBucket::default();
     let at = |ms| Instant::ZERO + Duration::from_millis(ms);
     let mut sent = 0;
     while rate_limit.may_send(at(0), true) {
-        rate_limit.count_bytes(MAX_FRAME_LEN);
+        rate_limit.take_tokens(MAX_FRAME_LEN);
         sent += MAX_FRAME_LEN as u32;
     }
     assert!((MAX_SAVED_BYTES..=MAX_SAVED_BYTES + MAX_FRAME_LEN as u32).contains(&sent));

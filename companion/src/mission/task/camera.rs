@@ -101,7 +101,7 @@ impl CameraControl {
                 self.switch_off();
             }
             match photographs.stretches(path).nth(self.stretch) {
-                _ if beside => self.photograph_on_detour(photographs, along.progress_m),
+                _ if beside => self.photograph_whole_detour(photographs, along.progress_m),
                 Some(shots) if along.place == PathRelation::OnPath => {
                     self.update_trigger(photographs.trigger, &shots, along.progress_m);
                 }
@@ -119,7 +119,7 @@ impl CameraControl {
 
     /// On a detour beside the path pictures are taken at the path's spacing, even where the path
     /// has none.
-    fn photograph_on_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
+    fn photograph_whole_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
         let spacing_m = photographs.spacing_m;
         if photographs.trigger == Trigger::Distance {
             if !core::mem::replace(&mut self.trigger_on, true) {

@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::file::FileError;
 use planner_core::frames::Geodetic;
-use planner_core::plan::Mode;
+use planner_core::plan::GoalMode;
 use planner_core::roadmap::MAX_COORDINATE_M;
 use planner_core::schedule::ScheduleConfig;
 
@@ -19,7 +19,7 @@ pub struct MissionHeader {
     /// ground of the field.
     pub roadmap_crc: u32,
     /// Rule by which goals are assigned to vehicles.
-    pub mode: Mode,
+    pub mode: GoalMode,
     /// Method by which vehicles keep apart in flight.
     pub method: Method,
     /// Origin of the mission frame: latitude, longitude, altitude.

@@ -12,7 +12,7 @@ use super::*;
 fn header() -> MissionHeader {
     MissionHeader {
         roadmap_crc: 0x1234_5678,
-        mode: Mode::Unlabelled(Objective::Makespan),
+        mode: GoalMode::Unlabelled(Objective::Makespan),
         method: Method::Priority,
         origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
         cruise_mps: 2.0,
@@ -199,7 +199,7 @@ fn what_is_not_sound_is_refused_by_name() {
 #[test]
 fn labelled_no_two_vehicles_have_one_goal() {
     let goals = [goal(0), goal(1)];
-    let written = |mode: Mode, goal: Option<u16>| {
+    let written = |mode: GoalMode, goal: Option<u16>| {
         let vehicles = [vehicle(7, goal), vehicle(2, Some(1)), vehicle(250, goal)];
         write_mission(
             &MissionHeader { mode, ..header() },
@@ -209,10 +209,10 @@ fn labelled_no_two_vehicles_have_one_goal() {
         )
         .map(|_| ())
     };
-    assert_eq!(written(Mode::Labelled, Some(0)), Err(MissionError::SameGoal(250)));
-    assert_eq!(written(Mode::Labelled, Some(1)), Err(MissionError::SameGoal(2)));
-    assert_eq!(written(Mode::Labelled, None), Ok(()));
-    assert_eq!(written(Mode::Unlabelled(Objective::TotalDistance), Some(0)), Ok(()));
+    assert_eq!(written(GoalMode::Labelled, Some(0)), Err(MissionError::SameGoal(250)));
+    assert_eq!(written(GoalMode::Labelled, Some(1)), Err(MissionError::SameGoal(2)));
+    assert_eq!(written(GoalMode::Labelled, None), Ok(()));
+    assert_eq!(written(GoalMode::Unlabelled(Objective::TotalDistance), Some(0)), Ok(()));
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl Store {
                     if more { FlashJob::Erase { area, at } } else { FlashJob::MarkClean(area) };
             }
             (FlashJob::MarkClean(area), Ok(_)) => *self.condition_mut(area) = AreaCondition::Clean,
-            (FlashJob::MarkUsed(area), Ok(_)) => self.open_area(area),
+            (FlashJob::MarkUsed(area), Ok(_)) => self.handle_area_marked(area),
             (FlashJob::Flush(_), Ok(_)) => self.reassembly.drop_first_block(),
             (FlashJob::FlushRest { slot, done }, Ok(_)) => {
                 let done = done + MAX_PROGRAM as u32;
@@ -258,7 +258,7 @@ impl Store {
 
     /// Continues after an area was marked as used: a slot takes an upload, a half of the journal a
     /// compaction.
-    fn open_area(&mut self, area: FlashArea) {
+    fn handle_area_marked(&mut self, area: FlashArea) {
         *self.condition_mut(area) = AreaCondition::Open;
         match area {
             FlashArea::Slot(_) => {
@@ -295,7 +295,7 @@ impl Store {
     ) {
         let len = self.reassembly.file_len();
         let field = matches!(self.upload, Some((File::Field, _)));
-        if (done == 0 && !Self::declares(field, bytes, len)) || bytes.is_empty() {
+        if (done == 0 && !Self::is_file_head(field, bytes, len)) || bytes.is_empty() {
             return self.end_upload(Err(UploadError::Damaged));
         }
         // The last four bytes of the file are the CRC-32 of all others.
@@ -314,7 +314,7 @@ impl Store {
             return self.end_upload(Err(UploadError::Damaged));
         }
         let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
-        let newest = self.slots.iter().map(number).max().unwrap_or(0).max(self.forgotten);
+        let newest = self.slots.iter().map(number).max().unwrap_or(0).max(self.removed_up_to);
         self.job = FlashJob::Seal(slot, Seal { sequence: newest + 1, len, crc, field });
     }
 

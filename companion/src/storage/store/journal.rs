@@ -13,7 +13,7 @@ use crate::services::parameters::STORED_LEN;
 use core::ops::Range;
 
 /// First bytes of the head of each record.
-pub(super) const MAGIC: [u8; 4] = *b"FLKR";
+pub(super) const RECORD_MAGIC: [u8; 4] = *b"FLKR";
 
 /// State of the journal.
 #[derive(Clone, Debug)]
@@ -59,7 +59,7 @@ pub fn record_len(data: u32) -> u32 {
 /// The head of a record, one flash word.
 pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD] {
     let mut word = [0; WORD];
-    word[..4].copy_from_slice(&MAGIC);
+    word[..4].copy_from_slice(&RECORD_MAGIC);
     word[4] = kind as u8;
     word[8..12].copy_from_slice(&len.to_le_bytes());
     word[12..16].copy_from_slice(&crc.to_le_bytes());

@@ -103,7 +103,7 @@ impl Store {
     fn parameters_record(&mut self, at: u32) -> JournalRecord {
         let len = journal::PARAMETERS_LEN;
         self.buffer.fill(0xFF);
-        self.buffer[..4].copy_from_slice(&self.forgotten.to_le_bytes());
+        self.buffer[..4].copy_from_slice(&self.removed_up_to.to_le_bytes());
         self.buffer[4..len].copy_from_slice(&self.parameters.to_bytes());
         self.unsaved = false;
         self.buffer_record(RecordKind::Parameters, at, len)

@@ -29,17 +29,24 @@ impl Store {
             }
             let len = u32_at(&word, 8);
             let fits = len <= end - at && record_len(len) <= end - at;
-            if word[..4] != MAGIC || !has_valid_word_crc(&word) || !fits {
+            if word[..4] != RECORD_MAGIC || !has_valid_word_crc(&word) || !fits {
                 at = end;
                 break;
             }
-            self.take_record(word[4], at + WORD as u32, len, u32_at(&word, 12), flash);
+            self.restore_record(word[4], at + WORD as u32, len, u32_at(&word, 12), flash);
             at += record_len(len);
         }
         self.journal.end = at;
     }
 
-    fn take_record(&mut self, kind: u8, at: u32, len: u32, crc: u32, flash: &mut impl ReadFlash) {
+    fn restore_record(
+        &mut self,
+        kind: u8,
+        at: u32,
+        len: u32,
+        crc: u32,
+        flash: &mut impl ReadFlash,
+    ) {
         let mut block = [0; MAX_PROGRAM];
         let (mut sum, mut done) = (super::flash::CRC_START, 0);
         while done < len {
@@ -58,7 +65,7 @@ impl Store {
             self.journal.mission_crc = crc;
         } else if kind == RecordKind::Parameters as u8 && (4..=MAX_PROGRAM as u32).contains(&len) {
             // The block holds all of the record's data.
-            self.forgotten = u32_at(&block, 0);
+            self.removed_up_to = u32_at(&block, 0);
             let (entries, _) = block[4..len as usize].as_chunks();
             entries.iter().for_each(|entry| self.parameters.restore(entry));
         } else if kind == RecordKind::Photographed as u8 && len <= MAX_PROGRAM as u32 {

@@ -19,13 +19,13 @@ fn upload(
     file: File,
     bytes: &[u8],
     piece: usize,
-) -> Result<Result<(), UploadError>, Cut> {
+) -> Result<Result<(), UploadError>, PowerLoss> {
     if let Err(why) = store.open_upload(file, ErasePermission::Allowed) {
         return Ok(Err(why));
     }
     run(store, flash, ErasePermission::Allowed)?;
     for (i, part) in bytes.chunks(piece).enumerate() {
-        assert_eq!(store.take_piece((i * piece) as u32, part), PieceOutcome::Yes);
+        assert_eq!(store.take_piece((i * piece) as u32, part), PieceOutcome::Stored);
         run(store, flash, ErasePermission::Allowed)?;
     }
     store.finish_upload();
@@ -59,9 +59,9 @@ fn files_come_back_after_a_restart() {
             );
         }
         store = started(&mut flash);
-        assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
-        assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
-        assert!(RoadmapView::parse(held(&flash, store.roadmap()).unwrap()).is_ok());
+        assert_eq!(bytes_at(&flash, store.roadmap()), Some(road.as_slice()));
+        assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
+        assert!(RoadmapView::parse(bytes_at(&flash, store.roadmap()).unwrap()).is_ok());
     }
     store.remove_file(File::Roadmap);
     store.remove_file(File::Mission);
@@ -71,7 +71,7 @@ fn files_come_back_after_a_restart() {
     assert_eq!((store.roadmap(), store.mission()), (None, None));
     assert_eq!(upload(&mut store, &mut flash, File::Roadmap, &roadmap(20), 80).unwrap(), Ok(()));
     store = started(&mut flash);
-    assert_eq!(held(&flash, store.roadmap()), Some(roadmap(20).as_slice()));
+    assert_eq!(bytes_at(&flash, store.roadmap()), Some(roadmap(20).as_slice()));
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn a_field_takes_the_place_of_the_roadmap_and_gives_it_back() {
             (store.file_size(own), store.file_size(other)),
             (Some(bytes.len() as u32), None)
         );
-        assert_eq!(held(&flash, store.roadmap()), Some(bytes.as_slice()));
+        assert_eq!(bytes_at(&flash, store.roadmap()), Some(bytes.as_slice()));
     }
     store.remove_file(File::Field);
     assert!(store.file_size(File::Roadmap).is_some(), "the field was not there");
@@ -125,14 +125,14 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
         store = started(&mut flash);
         store.open_upload(file, ErasePermission::Allowed).unwrap();
         run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
-        assert_eq!(store.take_piece(0, &whole[..100]), PieceOutcome::Yes);
-        assert_eq!(store.take_piece(101, &whole[101..150]), PieceOutcome::Yes);
+        assert_eq!(store.take_piece(0, &whole[..100]), PieceOutcome::Stored);
+        assert_eq!(store.take_piece(101, &whole[101..150]), PieceOutcome::Stored);
         store.finish_upload();
         assert_eq!(store.upload_state(), Some(UploadState::Ended(Err(UploadError::Incomplete))));
     }
     store = started(&mut flash);
-    assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
-    assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+    assert_eq!(bytes_at(&flash, store.roadmap()), Some(road.as_slice()));
+    assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
     assert_eq!(store.open_upload(File::Mission, ErasePermission::Allowed), Ok(()));
     assert_eq!(store.take_piece(4000, &[0; 97]), PieceOutcome::TooLarge);
     assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Allowed), Ok(()));
@@ -145,8 +145,8 @@ fn run_armed(store: &mut Store, flash: &mut Flash) {
     let mut read = [0; MAX_READ];
     while let Some(request) = store.poll_request(ErasePermission::Forbidden) {
         assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
-        let outcome =
-            obey(flash, request, ErasePermission::Forbidden, &mut read).expect("the power is on");
+        let outcome = execute(flash, request, ErasePermission::Forbidden, &mut read)
+            .expect("the power is on");
         store.handle_outcome(outcome.map(|len| &read[..len]));
     }
 }
@@ -182,7 +182,7 @@ fn a_flash_that_stalls_only_reads_while_armed() {
             if i == armed_at {
                 run_armed(&mut store, &mut flash);
             }
-            assert_eq!(store.take_piece((i * 239) as u32, piece), PieceOutcome::Yes);
+            assert_eq!(store.take_piece((i * 239) as u32, piece), PieceOutcome::Stored);
             if i == armed_at {
                 run_armed(&mut store, &mut flash);
             }
@@ -220,7 +220,7 @@ fn nothing_is_erased_while_armed() {
     store.open_upload(File::Roadmap, ErasePermission::Forbidden).unwrap();
     run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     for (i, part) in road.chunks(200).enumerate() {
-        assert_eq!(store.take_piece(200 * i as u32, part), PieceOutcome::Yes);
+        assert_eq!(store.take_piece(200 * i as u32, part), PieceOutcome::Stored);
         run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     }
     store.finish_upload();
@@ -228,7 +228,7 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     let store = Store::mount(LAYOUT, &mut flash);
     assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", 3.5)));
-    assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
+    assert_eq!(bytes_at(&flash, store.roadmap()), Some(road.as_slice()));
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn parameters_outlive_many_changes_and_the_mission_with_them() {
             store = started(&mut flash);
         }
         assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", value)));
-        assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+        assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
     }
 }
 
@@ -267,7 +267,7 @@ fn a_read_goes_first_between_two_sectors() {
         if let FlashRequest::Erase { at } = request {
             erased.push(at);
         }
-        let outcome = obey(&mut flash, request, ErasePermission::Allowed, &mut read)
+        let outcome = execute(&mut flash, request, ErasePermission::Allowed, &mut read)
             .expect("the power is on");
         if let Some(answer) = store.handle_outcome(outcome.map(|len| &read[..len])) {
             assert_eq!(answer, ReadOutcome::Bytes(&road[..100]));
@@ -287,7 +287,11 @@ fn a_read_goes_first_between_two_sectors() {
 
 /// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or
 /// `after`, whole.
-fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(), Cut>, cuts: u32) {
+fn cut_anywhere(
+    seed: u64,
+    change: impl Fn(&mut Store, &mut Flash) -> Result<(), PowerLoss>,
+    cuts: u32,
+) {
     let (old_road, old_mission) = (roadmap(200), mission(30));
     let (new_road, new_mission) = (roadmap(500), mission(50));
     let mut found = [0; 2];
@@ -318,7 +322,7 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
             flash.power = None;
         }
         let mut store = started(&mut flash);
-        let (road, flown) = (held(&flash, store.roadmap()), held(&flash, store.mission()));
+        let (road, flown) = (bytes_at(&flash, store.roadmap()), bytes_at(&flash, store.mission()));
         let is_new = road == Some(new_road.as_slice());
         assert!(is_new || road == Some(old_road.as_slice()), "cut {cut}: neither roadmap is whole");
         assert!(
@@ -340,8 +344,8 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
             "cut {cut}"
         );
         store = started(&mut flash);
-        assert_eq!(held(&flash, store.roadmap()), Some(new_road.as_slice()), "cut {cut}");
-        assert_eq!(held(&flash, store.mission()), Some(new_mission.as_slice()), "cut {cut}");
+        assert_eq!(bytes_at(&flash, store.roadmap()), Some(new_road.as_slice()), "cut {cut}");
+        assert_eq!(bytes_at(&flash, store.mission()), Some(new_mission.as_slice()), "cut {cut}");
     }
     std::println!("{cuts} cuts: {} found the old roadmap, {} the new", found[0], found[1]);
 }
@@ -398,7 +402,7 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
             }
             match store.upload_state() {
                 Some(UploadState::Taking)
-                    if store.take_piece(0, &road[..200]) == PieceOutcome::Yes =>
+                    if store.take_piece(0, &road[..200]) == PieceOutcome::Stored =>
                 {
                     store.finish_upload();
                 }
@@ -422,7 +426,7 @@ fn an_upload_waits_until_it_is_known_whether_the_vehicle_is_armed() {
             run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
         }
         for (i, part) in bytes.chunks(200).enumerate() {
-            assert_eq!(store.take_piece(i as u32 * 200, part), PieceOutcome::Yes);
+            assert_eq!(store.take_piece(i as u32 * 200, part), PieceOutcome::Stored);
             run(&mut store, &mut flash, ErasePermission::NotYet).unwrap();
         }
         store.finish_upload();
@@ -452,7 +456,7 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
             }
             _ => None,
         };
-        let outcome = obey(&mut flash, request, ErasePermission::Allowed, &mut read).unwrap();
+        let outcome = execute(&mut flash, request, ErasePermission::Allowed, &mut read).unwrap();
         if let Some(at) = head {
             heads += 1;
             if heads == 1 {
@@ -464,7 +468,7 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
     assert!(heads > 1, "{heads}");
     assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     let store = started(&mut flash);
-    assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+    assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
 }
 
 fn flown_head(flown: &[u8]) -> [u8; WORD] {
@@ -489,8 +493,8 @@ fn a_roadmap_that_cannot_be_used_is_refused_or_given_up_for_the_one_before() {
     let new = roadmap(90);
     upload(&mut store, &mut flash, File::Roadmap, &new, 239).unwrap().unwrap();
     let mut store = Store::mount(LAYOUT, &mut flash);
-    assert_eq!(held(&flash, store.roadmap()), Some(new.as_slice()));
+    assert_eq!(bytes_at(&flash, store.roadmap()), Some(new.as_slice()));
     assert!(store.refuse_roadmap());
-    assert_eq!(held(&flash, store.roadmap()), Some(old.as_slice()));
+    assert_eq!(bytes_at(&flash, store.roadmap()), Some(old.as_slice()));
     assert!(!store.refuse_roadmap() && store.roadmap().is_none());
 }

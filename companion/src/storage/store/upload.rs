@@ -78,7 +78,7 @@ impl Store {
     pub fn abandon_upload(&mut self) {
         if !matches!(self.upload, Some((_, UploadState::Closing))) {
             self.drop_job();
-            self.clear_slot();
+            self.mark_open_slot_dirty();
             self.upload = None;
         }
     }
@@ -88,12 +88,12 @@ impl Store {
             self.upload = Some((file, UploadState::Ended(result)));
         }
         if result.is_err() {
-            self.clear_slot();
+            self.mark_open_slot_dirty();
         }
     }
 
     /// Marks a half-written slot for erasure.
-    fn clear_slot(&mut self) {
+    fn mark_open_slot_dirty(&mut self) {
         for slot in &mut self.slots {
             if *slot == AreaCondition::Open {
                 *slot = AreaCondition::Dirty;
@@ -114,7 +114,7 @@ impl Store {
 
     /// Whether the file's first bytes are the head of a roadmap, or with `field` of a field of
     /// heights, of length `len`.
-    pub(super) fn declares(field: bool, bytes: &[u8], len: u32) -> bool {
+    pub(super) fn is_file_head(field: bool, bytes: &[u8], len: u32) -> bool {
         let declared = match field {
             true => bytes.first_chunk().and_then(|head| field::declared_len(head).ok()),
             false => bytes.first_chunk().and_then(|head| roadmap::declared_len(head).ok()),

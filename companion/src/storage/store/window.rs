@@ -11,7 +11,7 @@ pub const WINDOW_LEN: usize = 4096;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PieceOutcome {
     /// The piece was stored, or had been received before.
-    Yes,
+    Stored,
     /// The window cannot take the piece yet: the client must send it again.
     Later,
     /// The file would be longer than its slot or the window.
@@ -70,7 +70,7 @@ impl UploadReassembly {
         for i in at..at + piece.len() {
             self.marks[i / 64] |= 1 << (i % 64);
         }
-        PieceOutcome::Yes
+        PieceOutcome::Stored
     }
 
     /// Number of bytes received without a gap from the window's first byte on, at most `most`.
@@ -125,7 +125,8 @@ mod tests {
                 let pick = usize::from(order[turn % order.len()]) % missing.len().min(5);
                 let start = missing[pick] * piece;
                 let bytes = &file[start..(start + piece).min(len)];
-                if window.insert(start as u32, bytes, 20_000) == PieceOutcome::Yes && turn % 7 != 0
+                if window.insert(start as u32, bytes, 20_000) == PieceOutcome::Stored
+                    && turn % 7 != 0
                 {
                     missing.remove(pick);
                 }
@@ -146,7 +147,7 @@ mod tests {
         assert_eq!(window.insert(4000, &[0; 100], 9000), PieceOutcome::Later);
         assert_eq!(window.insert(8990, &[0; 11], 9000), PieceOutcome::TooLarge);
         assert_eq!(window.insert(u32::MAX, &[0; 2], 9000), PieceOutcome::TooLarge);
-        assert_eq!(window.insert(300, &[1; 10], 9000), PieceOutcome::Yes);
+        assert_eq!(window.insert(300, &[1; 10], 9000), PieceOutcome::Stored);
         assert!(window.next_block().is_none() && window.last_part().is_none(), "a hole is seen");
     }
 }

@@ -69,7 +69,7 @@ impl Detours {
 
     /// Notes that a path for this purpose is requested from the shell.
     pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
-        if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Back(_)) {
+        if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Rejoin(_)) {
             self.flown = self.flown.without_return();
         }
         (self.sought, self.request_read) = (Some(purpose), false);
@@ -105,7 +105,7 @@ impl Detours {
         let behind = points.get(next.saturating_sub(1))?;
         let apart_m = view.config.safety_distance_m;
         self.obstacles.all().iter().for_each(|obstacle| tell(*obstacle));
-        match view.config.division {
+        match view.config.lost_vehicle_down_s {
             Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut tell),
             _ => {
                 // A vehicle that lies is kept off by no more than what blocks a path: a goal that
@@ -129,7 +129,7 @@ impl Detours {
                 tell,
             );
         }
-        let (goal, descent_m) = match view.config.division {
+        let (goal, descent_m) = match view.config.lost_vehicle_down_s {
             Some(_) => match sought.rejoin() {
                 Some(back) => {
                     let (over, ground_m) = (back.position, view.guidance.ground_m(plan));
@@ -169,7 +169,7 @@ impl Detours {
         let stuck = on_detour && now - progress_at > STUCK_AFTER;
         let fruitless = if stuck { self.detours_without_progress.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
-        let Self { mut home, mut field_searches, .. } = *self;
+        let Self { mut home, area_searches: mut field_searches, .. } = *self;
         home.cancel();
         field_searches.note_found();
         *self = Self {
@@ -180,7 +180,7 @@ impl Detours {
             detour_ready: true,
             detours_without_progress: fruitless,
             home,
-            field_searches,
+            area_searches: field_searches,
             ..Self::default()
         };
     }
@@ -188,7 +188,7 @@ impl Detours {
     /// Notes that there is no free place on the plan's path to come back to, so that no detour can
     /// be requested.
     pub(crate) fn note_no_rejoin_place(&mut self, now: Instant) {
-        self.field_searches.note_failure(now);
+        self.area_searches.note_failure(now);
     }
 
     /// Notes that the shell found no path from `along_m` metres along the path, and whether to
@@ -202,7 +202,7 @@ impl Detours {
                 self.no_way_aside_at = Some(now);
                 return;
             }
-            Some(DetourPurpose::Back(_)) => return self.field_searches.note_failure(now),
+            Some(DetourPurpose::Rejoin(_)) => return self.area_searches.note_failure(now),
             Some(DetourPurpose::Goal) | None => {}
         }
         if outlook == RetryOutlook::Settles {

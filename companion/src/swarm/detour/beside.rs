@@ -35,7 +35,7 @@ const MAX_SAMPLES: usize = 100;
 /// Least spacing of the places on the path that are compared with the zones, metres.
 const MIN_SAMPLE_SPACING_M: f32 = 0.5;
 /// Distance beyond [`LOOK_AHEAD_M`] up to which the start of a block is searched, metres.
-const DETOUR_BEGINS_BEFORE_M: f32 = 1.0;
+const BLOCK_SEARCH_BEYOND_M: f32 = 1.0;
 /// Distance beyond the last blocked sample at which a detour returns to the path, metres: at the
 /// very edge the same zone would block the path again.
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
@@ -43,12 +43,12 @@ const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 /// Searches of a vehicle for detours that lead back to its path over an area: when one failed, and
 /// how many succeeded.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct FieldSearches {
+pub(crate) struct AreaDetourSearches {
     missed_at: Option<Instant>,
     found: u8,
 }
 
-impl FieldSearches {
+impl AreaDetourSearches {
     /// Notes that a search found no detour.
     pub(crate) fn note_failure(&mut self, now: Instant) {
         self.missed_at = Some(now);
@@ -101,7 +101,7 @@ pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
 }
 
 /// Distance of a place from the surface of a zone, metres; negative inside.
-fn far_m(zone: &KeepOutZone, place: &Point) -> f32 {
+fn distance_to_zone_m(zone: &KeepOutZone, place: &Point) -> f32 {
     let (axis, away) = (zone.to - zone.from, place - zone.from);
     let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
     (away - axis * share).length() - zone.radius_m
@@ -113,8 +113,8 @@ pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
     known: &[KeepOutZone],
     place: &Point,
 ) -> bool {
-    let mut barred = known.iter().any(|zone| far_m(zone, place) <= 0.0);
-    zones_of_others(view, &mut |zone| barred |= far_m(&zone, place) <= 0.0);
+    let mut barred = known.iter().any(|zone| distance_to_zone_m(zone, place) <= 0.0);
+    zones_of_others(view, &mut |zone| barred |= distance_to_zone_m(&zone, place) <= 0.0);
     barred
 }
 
@@ -131,7 +131,7 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     let most_m = view.guidance.gates_open_up_to_m(&view.scene).min(home_m);
     let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
     let add = |thing: KeepOutZone, things: &mut Vec<_, MAX_ZONES>| {
-        _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
+        _ = (distance_to_zone_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     };
     known.iter().for_each(|thing| add(*thing, &mut things));
     for source in 0..source_count(view) {
@@ -144,13 +144,16 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     }
     let (mut at_m, mut met) = (from_m, false);
     for _ in 0..MAX_SAMPLES {
-        let far = !met && at_m > from_m + LOOK_AHEAD_M + DETOUR_BEGINS_BEFORE_M;
+        let far = !met && at_m > from_m + LOOK_AHEAD_M + BLOCK_SEARCH_BEYOND_M;
         if far || at_m + DETOUR_RETURNS_BEYOND_M > most_m {
             return None;
         }
         let place = plan.path.point_at(at_m)?;
         // No zone is nearer than this.
-        let free_m = things.iter().map(|thing| far_m(thing, &place)).fold(LOOK_AHEAD_M, f32::min);
+        let free_m = things
+            .iter()
+            .map(|thing| distance_to_zone_m(thing, &place))
+            .fold(LOOK_AHEAD_M, f32::min);
         if met && free_m > 0.0 {
             return Some(at_m + DETOUR_RETURNS_BEYOND_M);
         }

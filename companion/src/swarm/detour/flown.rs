@@ -37,7 +37,7 @@ pub(crate) enum DetourPurpose {
     /// Straight home over an area.
     Home,
     /// Around an obstacle over an area, back to this place on the own path.
-    Back(RejoinPlace),
+    Rejoin(RejoinPlace),
 }
 
 /// Kind of path that a vehicle flies.
@@ -64,7 +64,7 @@ impl DetourPurpose {
     /// Place where the vehicle comes back to its own path over an area; `None` if it does not.
     pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
         match self {
-            Self::Back(back) => Some(*back),
+            Self::Rejoin(back) => Some(*back),
             Self::Aside(places) => places.map(|places| places.own),
             _ => None,
         }

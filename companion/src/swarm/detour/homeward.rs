@@ -16,7 +16,7 @@ const MAX_RETURNS: u8 = 4;
 
 /// The search of a vehicle for its path home over an area.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct HomewardFlight {
+pub(crate) struct HomewardSearch {
     /// Since when the vehicle stops for its path home, and seeks it.
     seeks_since: Option<Instant>,
     /// When a search for the path home last failed.
@@ -24,7 +24,7 @@ pub(crate) struct HomewardFlight {
     attempts: u8,
 }
 
-impl HomewardFlight {
+impl HomewardSearch {
     /// Begins the search: the vehicle turns home.
     pub(crate) fn begin(&mut self, now: Instant) {
         let turns = self.attempts.saturating_add(1);
@@ -65,6 +65,6 @@ impl HomewardFlight {
     ) -> bool {
         let flies = view.mission.plan().is_some_and(|plan| plan.task.leaves_pad());
         let on_path = view.guidance.along_m() >= 0.0 && !view.guidance.returning;
-        view.config.division.is_some() && flies && on_path && self.attempts < MAX_RETURNS
+        view.config.lost_vehicle_down_s.is_some() && flies && on_path && self.attempts < MAX_RETURNS
     }
 }

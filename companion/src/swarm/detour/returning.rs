@@ -9,10 +9,10 @@ use crate::time::Duration;
 
 /// Time for which a vehicle aside waits until the place where it left its path is free, seconds:
 /// less than until it flies home.
-const BARRED_MOST_S: u64 = 60;
+const MAX_BARRED_WAIT_S: u64 = 60;
 /// Time for which a vehicle aside seeks a way to the place where it left its path, once that is
 /// free, seconds.
-const NO_WAY_MOST_S: u64 = 90;
+const MAX_REJOIN_SEARCH_S: u64 = 90;
 
 impl Detours {
     /// Whether the path that is flown is not the plan's.
@@ -48,7 +48,7 @@ impl Detours {
 
     /// Whether the detour that is flown ends on the plan's path over an area.
     pub(crate) fn leads_back(&self) -> bool {
-        matches!(self.flown, FlownPath::Detour(DetourPurpose::Back(_)))
+        matches!(self.flown, FlownPath::Detour(DetourPurpose::Rejoin(_)))
     }
 
     /// Places where the vehicle is to come back to its path over an area; `None` if it does not
@@ -75,7 +75,7 @@ impl Detours {
     ) -> Option<RejoinPlace> {
         let RejoinPlaces { own, beyond } = self.rejoin_places()?;
         let barred = own != beyond && beside::is_barred(view, self.obstacles.all(), &own.position);
-        let most_s = if barred { BARRED_MOST_S } else { NO_WAY_MOST_S };
+        let most_s = if barred { MAX_BARRED_WAIT_S } else { MAX_REJOIN_SEARCH_S };
         match self.blocked_for(view.now) >= Duration::from_secs(most_s) {
             true => Some(beyond),
             false => Some(own).filter(|_| !barred),

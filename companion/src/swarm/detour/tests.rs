@@ -23,15 +23,15 @@ fn exclude(bench: &mut Bench, command: &Command) -> u8 {
 
 #[test]
 fn a_revoked_obstacle_does_not_block_any_more() {
-    let mut bench = Bench::accompanied(two_vehicles());
-    bench.until(State::Follow, 20.0);
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
+    bench.run_until(State::Follow, 20.0);
     let at = Point::new(14.0, 12.0, 1.5);
     assert_eq!(exclude(&mut bench, &sphere(Point::new(90.0, 90.0, 1.5), 0.5)), ACCEPTED);
     assert_eq!(exclude(&mut bench, &sphere(at, 0.5)), ACCEPTED);
-    bench.until(State::Blocked, 5.0);
+    bench.run_until(State::Blocked, 5.0);
     assert_eq!(exclude(&mut bench, &sphere(at, -1.0)), ACCEPTED);
     assert_eq!(bench.companion.detours.obstacle_count(), 1);
-    bench.until(State::Follow, 3.0);
+    bench.run_until(State::Follow, 3.0);
     assert_eq!(
         exclude(&mut bench, &sphere(at, 0.0)),
         ACCEPTED,
@@ -46,19 +46,19 @@ fn a_sphere_on_the_path_is_flown_around_and_one_beside_it_is_none() {
         exclude(&mut bench, &sphere(Point::new(14.0, y, 1.5), 0.5));
         bench.run(1.0);
         assert_eq!(bench.state() == State::Blocked, blocks, "{y}");
-        bench.until(State::Done, 60.0);
+        bench.run_until(State::Done, 60.0);
         assert_eq!(bench.texts.iter().any(|text| text == "Flying around"), blocks);
     }
 }
 
 #[test]
 fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
-    let mut bench = Bench::accompanied(two_vehicles());
-    bench.until(State::Follow, 20.0);
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
+    bench.run_until(State::Follow, 20.0);
     exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
     let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
     bench.neighbour = other(BLOCKED | WAITING);
-    bench.until(State::Blocked, 3.0);
+    bench.run_until(State::Blocked, 3.0);
     while bench.companion.detours.claimed_since.is_none() {
         bench.run(0.05);
     }
@@ -71,7 +71,7 @@ fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
         "the lower system id goes on claiming"
     );
     bench.neighbour = other(BLOCKED | WAITING);
-    bench.until(State::Follow, 1.0);
+    bench.run_until(State::Follow, 1.0);
 }
 
 /// On its path, beside a vehicle with a lower system id.
@@ -79,8 +79,8 @@ fn beside_a_lower_id() -> Bench {
     let mut config = two_vehicles();
     config.roster[1].system_id = 7;
     config.roster.sort_unstable_by_key(|entry| entry.system_id);
-    let mut bench = Bench::accompanied(config);
-    bench.until(State::Follow, 20.0);
+    let mut bench = Bench::started_with_neighbour(config);
+    bench.run_until(State::Follow, 20.0);
     bench
 }
 
@@ -90,7 +90,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
     let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
     bench.neighbour = other(BLOCKED);
-    bench.until(State::Blocked, 3.0);
+    bench.run_until(State::Blocked, 3.0);
     bench.run(8.0);
     assert!(
         bench.companion.detours.is_waiting(&bench.companion.detour_view())
@@ -106,7 +106,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
             && bench.state() == State::Blocked,
         "it waits from the start again"
     );
-    bench.until(State::Follow, 5.0);
+    bench.run_until(State::Follow, 5.0);
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
     let at = Point::new(bench.enu.x + 0.3, bench.enu.y, 0.2);
     exclude(&mut bench, &sphere(at, 0.5));
     bench.neighbour = Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | BLOCKED, 0.0, 5));
-    bench.until(State::Blocked, 3.0);
+    bench.run_until(State::Blocked, 3.0);
     bench.run(8.0);
     assert!(
         bench.companion.detours.is_waiting(&bench.companion.detour_view())
@@ -129,7 +129,7 @@ fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
 
 #[test]
 fn who_died_may_have_been_flown_back_to_its_pad() {
-    let mut bench = Bench::accompanied(two_vehicles());
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
     let pad = Point::new(8.0, 40.0, 0.2);
     bench.neighbour = Some((pad, GROUNDED | ON_PLAN, 0.0, 5));
     bench.run(1.0);
@@ -147,7 +147,7 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
 
 /// What is kept clear vehicle 77 half a minute on.
 fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
-    let mut bench = Bench::accompanied(two_vehicles());
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
     let at = Point::new(8.0, 40.0, 9.0);
     bench.neighbour = Some((at, flags, 0.0, 5));
     bench.run(1.0);
@@ -177,7 +177,7 @@ fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
 #[test]
 fn the_column_of_one_that_lands_is_deeper_the_older_its_place_is() {
     let depth_m = |moves: bool| {
-        let mut bench = Bench::accompanied(two_vehicles());
+        let mut bench = Bench::started_with_neighbour(two_vehicles());
         bench.neighbour = Some((Point::new(8.0, 40.0, 9.0), FLYING, 0.0, 5));
         bench.run(1.0);
         if !moves {
@@ -204,7 +204,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
         for i in 0..MAX_OBSTACLES {
             exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }
-        bench.until(State::Ready, 8.0);
+        bench.run_until(State::Ready, 8.0);
         bench.run(0.1 * tenth as f32);
         bench.start();
         bench.run(0.25);
@@ -223,16 +223,16 @@ fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
         plan.gates.push(Gate { at_m: -1.5, id: 77, until_m: 5.0 }).unwrap();
         bench.answer_plan = Some(Ok(plan.clone()));
         bench.neighbour = Some((Point::new(30.0, 40.0, 0.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-        bench.until(State::Ready, 8.0);
+        bench.run_until(State::Ready, 8.0);
         bench.start();
-        bench.until(State::Streaming, 5.0);
+        bench.run_until(State::Streaming, 5.0);
         bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
         bench.run(0.3);
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
         bench.answer_plan = Some(Ok(plan));
         bench.run(1.0);
         bench.start();
-        bench.until(State::Ready, 8.0);
+        bench.run_until(State::Ready, 8.0);
         bench.run(0.3 + 0.1 * tenth as f32);
         bench.start();
         bench.run(0.7);
@@ -248,7 +248,7 @@ fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
     bench.run(3.0);
     bench.companion.neighbours.mark_avoided(bench.now);
     bench.no_position = false;
-    bench.until(State::Ready, 20.0);
+    bench.run_until(State::Ready, 20.0);
     bench.start();
     bench.run(0.7);
     assert!(bench.companion.detours.obstructed, "{:?}", bench.state());

@@ -41,7 +41,7 @@ pub(super) const UNHEARD_WAIT: Duration = Duration::from_secs(15);
 pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// Silence after which the column of a vehicle that left the plan in the air over an area is free
 /// again: the vehicle is down by then, whatever it flew there.
-pub(super) const COLUMN_KEPT: Duration = Duration::from_secs(600);
+pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
 /// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
 /// [`HEARD_WITHIN`] and 1 s, and stops. Over an area it flies on as long as its lease allows.
 pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
@@ -53,7 +53,7 @@ pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
 /// Silence after which a vehicle over an area may have landed further along its path than
 /// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle leaves the
 /// plan for that silence earlier.
-pub(super) const LANDS_UNHEARD: Duration = Duration::from_secs(40);
+pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 /// Maximum number of spacings of the places on the unheard stretch over an area, where it is as
@@ -77,7 +77,7 @@ pub(super) const MAX_FALL_CARRY_MPS: f32 = 20.0;
 pub(super) const MAX_FALL_M: f32 = 150.0;
 /// Depth below a vehicle of known height to which its landing column reaches, metres: further below
 /// it there is time to leave later.
-pub(super) const FAR_BELOW_M: f32 = 15.0;
+pub(super) const LANDING_COLUMN_DEPTH_M: f32 = 15.0;
 /// Greatest speed of a landing, m/s: the rate at which a landing column grows downwards while the
 /// vehicle's height is unknown.
 pub(super) const MAX_LANDING_MPS: f32 = 2.0;
@@ -87,7 +87,7 @@ pub(super) const MAX_HEIGHT_AGE_S: f32 = 1.0;
 pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
 /// Height by which a landing column begins above the vehicle that lands, metres: a vehicle as
 /// little above it may be below it in a moment.
-pub(super) const LEVEL_M: f32 = 1.0;
+pub(super) const COLUMN_TOP_ABOVE_M: f32 = 1.0;
 /// Position error of a neighbour whose own knowledge of its position is old, metres.
 pub(super) const VAGUE_POSITION_M: f32 = 0.5;
 /// Distance beside its path at which a vehicle may come down unheard, beyond the deviation allowed

@@ -20,7 +20,7 @@ pub(super) struct AreaGround {
     /// Heights of the ground, where it is not level.
     pub(super) ground: Option<Ground>,
     /// Silence after which a vehicle is on the ground.
-    pub(super) down: Duration,
+    pub(super) down_after: Duration,
     /// Distance by which two vehicles in the air may be nearer than their estimates say, metres.
     pub(super) pair_position_error_m: f32,
 }
@@ -50,7 +50,7 @@ pub(crate) struct NeighbourEntry {
     pub(super) intent_at: Option<Instant>,
     pub(super) points: Vec<Point, MAX_POINTS>,
     /// Number of the last of its points that the neighbour flies to only while unheard.
-    pub(super) first_unheard_point: u8,
+    pub(super) unheard_point_count: u8,
     /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
     /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
@@ -106,7 +106,7 @@ impl NeighbourEntry {
 
     /// The neighbour's points up to where it will stop for now.
     pub(super) fn points_for_now(&self) -> &[Point] {
-        &self.points[..self.points.len().saturating_sub(usize::from(self.first_unheard_point))]
+        &self.points[..self.points.len().saturating_sub(usize::from(self.unheard_point_count))]
     }
 
     pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
@@ -125,7 +125,7 @@ impl NeighbourEntry {
     }
 
     /// Whether the neighbour is heard, but has reported no valid position for 3 s.
-    pub(super) fn is_imprecise(&self) -> bool {
+    pub(super) fn lacks_position(&self) -> bool {
         self.heard_at
             .zip(self.position_at)
             .is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
@@ -215,7 +215,7 @@ impl NeighbourEntry {
         believed_m
     }
 
-    /// Whether the neighbour is on the ground: reported, or dead and silent for `down`.
+    /// Whether the neighbour is on the ground: reported, or dead and silent for `down_after`.
     pub(super) fn is_on_ground(&self, now: Instant, down: Duration) -> bool {
         self.reports(GROUNDED)
             || (!self.reports(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
@@ -247,8 +247,7 @@ impl NeighbourEntry {
             && self.state.velocity.length() < MAX_HOVER_MPS
     }
 
-    /// Whether the neighbour may land where it is without looking for others: it is in the air off
-    /// the plan, or unheard.
+    /// Whether the neighbour may land without looking for others: off the plan, or unheard.
     pub(super) fn may_land_unseen(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
@@ -272,13 +271,14 @@ impl NeighbourEntry {
         if !self.heard_within(now, MAY_LAND_AFTER) {
             return self.for_each_place(upto_m, &mut |place, wider_m| {
                 let radius_m = fpu::sqrtf(apart_m * apart_m + wider_m * wider_m);
-                let (from, to) = (place + up(LEVEL_M), place - up(self.column_depth_m(&place)));
+                let (from, to) =
+                    (place + up(COLUMN_TOP_ABOVE_M), place - up(self.column_depth_m(&place)));
                 tell(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
             });
         }
         let mut column = |from: Point, below_m: f32, nature: ZoneKind| {
             tell(KeepOutZone {
-                from: from + up(LEVEL_M),
+                from: from + up(COLUMN_TOP_ABOVE_M),
                 to: from - up(below_m),
                 radius_m: apart_m,
                 kind: nature,
@@ -287,16 +287,19 @@ impl NeighbourEntry {
         let age_s = self.position_at.map_or(0.0, |at| (now - at).as_secs_f32());
         let fallen_m = (MAX_LANDING_MPS * age_s).min(MAX_COLUMN_M);
         if age_s < MAX_HEIGHT_AGE_S {
-            column(here, (FAR_BELOW_M + fallen_m).min(MAX_COLUMN_M), ZoneKind::Descending);
+            column(
+                here,
+                (LANDING_COLUMN_DEPTH_M + fallen_m).min(MAX_COLUMN_M),
+                ZoneKind::Descending,
+            );
         } else {
             // By now it may be anywhere down to there, and descends from there.
             column(here, fallen_m, ZoneKind::Static);
-            column(here - up(fallen_m), FAR_BELOW_M, ZoneKind::Descending);
+            column(here - up(fallen_m), LANDING_COLUMN_DEPTH_M, ZoneKind::Descending);
         }
     }
 
-    /// Depth of the column below a place on the neighbour's path, metres: over an area to the
-    /// ground.
+    /// Depth of the column below a place on its path, metres: over an area to the ground.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN, a ground never reported, counts as none.
         if self.is_leased() {
@@ -331,11 +334,10 @@ impl NeighbourEntry {
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
     pub(super) fn is_under_way(&self) -> bool {
-        !self.reports(GROUNDED | LANDED) || self.first_unheard_point > 0
+        !self.reports(GROUNDED | LANDED) || self.unheard_point_count > 0
     }
 
-    /// Whether the neighbour is silent over an area, and may fly on as long as its lease allows, or
-    /// as its autopilot takes it.
+    /// Whether the neighbour is silent over an area, and may fly on by its lease or its autopilot.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.is_leased()
             && self.is_under_way()
@@ -366,14 +368,13 @@ impl NeighbourEntry {
 
     /// Whether the neighbour may still fly to its pad, and that is within `apart_m` of the vertical
     /// through `place`. No two pads are that near to each other.
-    pub(crate) fn comes_home(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
+    pub(crate) fn may_fly_home_near(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
         self.may_fly_on(now) && self.pad.is_some_and(near)
     }
 
     /// Calls `tell` with the neighbour's position and each leg along its points that it may have
-    /// flown unheard, `left_m` in all: both ends, and the lengths of the leg and of its flown part,
-    /// metres.
+    /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
     #[inline(never)]
     pub(super) fn for_each_leg(&self, mut left_m: f32, tell: &mut dyn FnMut([Point; 2], [f32; 2])) {
         let mut at = self.state.position;
@@ -429,8 +430,7 @@ impl NeighbourEntry {
     }
 
     /// Calls `tell` with the keep-out zones, of radius `apart_m`, of all places where the neighbour
-    /// may be from now on; unheard up to `upto_m` along its points. Over an area it lies on the
-    /// ground that it reported.
+    /// may be from now on; unheard up to `upto_m` along its points, over an area on its ground.
     pub(super) fn keep_out_zones(
         &self,
         now: Instant,
@@ -447,14 +447,14 @@ impl NeighbourEntry {
             let to = from - Point::new(0.0, 0.0, self.column_depth_m(&from));
             KeepOutZone { from, to, radius_m: apart_m + VAGUE_POSITION_M, kind: nature }
         };
-        if self.reports(GROUNDED) && self.reports(OUT_OF_PLAN) && self.is_imprecise() {
+        if self.reports(GROUNDED) && self.reports(OUT_OF_PLAN) && self.lacks_position() {
             tell(column(here, ZoneKind::Grounded));
         } else if self.reports(GROUNDED)
             && (self.reports(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
         {
             tell(place(apart_m));
         } else if self.reports(OUT_OF_PLAN)
-            && (field.is_none() || self.heard_within(now, COLUMN_KEPT))
+            && (field.is_none() || self.heard_within(now, COLUMN_KEPT_FOR))
         {
             let below = column(here, ZoneKind::Static);
             tell(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
@@ -467,7 +467,7 @@ impl NeighbourEntry {
             if let Some(pad) = self.pad {
                 tell(KeepOutZone { from: pad, to: pad, ..place(apart_m) });
             }
-            let down = !self.heard_within(now, field.map_or(DOWN_AFTER, |field| field.down));
+            let down = !self.heard_within(now, field.map_or(DOWN_AFTER, |field| field.down_after));
             if let Some(field) = field.filter(|_| down && !self.ground_m.is_nan()) {
                 // No lane or layer is as low: the zone is as thin as a vehicle that lies, and
                 // reaches down to the reported ground at corners of its path only.

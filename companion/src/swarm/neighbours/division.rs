@@ -15,11 +15,11 @@ impl<const V: usize> Neighbours<V> {
     /// estimates say.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
         (self.ground, self.pair_position_error_m) = (ground, stray_m);
-        self.down = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
+        self.down_after = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
         self.fleet = Some(Fleet::new(
             usize::from(self.own_rank),
-            self.roster + 1,
+            self.roster_count + 1,
             FleetTimeouts::of_flight(down),
         ));
     }
@@ -37,7 +37,7 @@ impl<const V: usize> Neighbours<V> {
     /// One step of the fleet, with this vehicle's report and which vehicles hear each other.
     pub(crate) fn step_fleet(&mut self, own: &OwnReport, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
-        let roster = &self.contacts[..self.roster];
+        let roster = &self.contacts[..self.roster_count];
         let lately =
             |c: &&NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
         let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.heard_bits);
@@ -60,7 +60,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
         let lately =
             |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
-        self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
+        self.contacts[..self.roster_count].iter().any(|c| c.other_plan && lately(c))
     }
 
     /// Whether another vehicle that takes part is in flight, and none of those has been silent for
@@ -68,7 +68,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
         let flies = |c: &&NeighbourEntry| heard(c) && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
-        let mut others = self.contacts[..self.roster].iter().filter(flies);
+        let mut others = self.contacts[..self.roster_count].iter().filter(flies);
         self.fleet.as_ref().is_some_and(|fleet| {
             let whole = !fleet.is_dividing() && !fleet.is_any_missing(now, missed_after);
             whole && others.any(|c| fleet.is_alive(usize::from(c.rank)))

@@ -59,15 +59,20 @@ impl NeighbourEntry {
     /// reach wherever it can be: what most of them do, seen without making a set of it. Never
     /// `None` where [`Neighbours::add_silence`] and its reach say otherwise.
     #[inline(always)]
-    fn within_reach(&self, down: Duration, now: Instant, reach: &ReachQuery<'_>) -> Option<bool> {
+    fn dead_if_within_reach(
+        &self,
+        down: Duration,
+        now: Instant,
+        reach: &ReachQuery<'_>,
+    ) -> Option<bool> {
         let placed_at = self.position_at?;
-        let away = reach.own.away_from_box(&self.state.position);
+        let away = reach.own.distance_from_box(&self.state.position);
         let across_sq = away.x * away.x + away.y * away.y;
         let age = now - placed_at;
         if age > MAX_HEIGHT_AGE {
             let lies = age >= down && !self.ground_m.is_nan();
             let dead = self.rests_silently(age, now);
-            let beyond = self.is_silent_beyond(age, (dead, lies), across_sq, now, reach);
+            let beyond = self.is_silent_out_of_reach(age, (dead, lies), across_sq, now, reach);
             return (!beyond).then_some(dead);
         }
         let heard = NeighbourMotion {
@@ -95,7 +100,7 @@ impl NeighbourEntry {
     /// as far from there as it can have flown: at full speed for as long as it may not have noticed
     /// that no vehicle hears it; in a climb to its top and a little further; once dead, along its
     /// points alone. A vehicle that lies on the ground moves no more.
-    fn is_silent_beyond(
+    fn is_silent_out_of_reach(
         &self,
         age: Duration,
         (dead, lies): (bool, bool),
@@ -128,7 +133,7 @@ impl NeighbourEntry {
         let mut away_sq = across_sq;
         let told = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| told) {
-            away_sq = away_sq.min(reach.own.away_from_box(first).xy().norm_squared());
+            away_sq = away_sq.min(reach.own.distance_from_box(first).xy().norm_squared());
             reaches(if self.is_leased() { self.unheard_distance_m() } else { self.extent_m });
         }
         most_m += reach.within_m;
@@ -257,7 +262,7 @@ impl<const V: usize> Neighbours<V> {
                 |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
             flies && beside && c.position_at.is_some_and(lately)
         };
-        self.contacts[..self.roster].iter().find(missed).map(|c| c.id)
+        self.contacts[..self.roster_count].iter().find(missed).map(|c| c.id)
     }
 
     /// The first contact from index `from` on that was placed and may be within reach: its index,
@@ -270,7 +275,7 @@ impl<const V: usize> Neighbours<V> {
     ) -> Option<(usize, &NeighbourEntry, bool)> {
         // A loop: a board takes a third longer for the chain of iterators.
         for (i, contact) in self.contacts.iter().enumerate().skip(from) {
-            if let Some(dead) = contact.within_reach(self.down, now, reach) {
+            if let Some(dead) = contact.dead_if_within_reach(self.down_after, now, reach) {
                 return Some((i, contact, dead));
             }
         }
@@ -311,7 +316,8 @@ impl<const V: usize> Neighbours<V> {
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Dead, or without a position of its own, it rests by then where a reroute keeps off; later
         // on the ground below.
-        let down = placed_for >= self.down || (contact.reports(GROUNDED) && contact.is_imprecise());
+        let down = placed_for >= self.down_after
+            || (contact.reports(GROUNDED) && contact.lacks_position());
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
         if let Some(first) = contact.points.first().filter(|_| by_intent) {
             motion.position = *first;

@@ -5,7 +5,7 @@ use planner_core::{Length, Point};
 
 use super::contact::{AreaGround, NeighbourEntry};
 use super::{
-    LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN, VAGUE_POSITION_M,
+    MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN, UNHEARD_LANDING_AFTER, VAGUE_POSITION_M,
 };
 use crate::time::Instant;
 
@@ -20,7 +20,7 @@ impl<const V: usize> Neighbours<V> {
     pub(super) fn area_ground(&self) -> Option<AreaGround> {
         self.fleet.is_some().then_some(AreaGround {
             ground: self.ground,
-            down: self.down,
+            down_after: self.down_after,
             pair_position_error_m: self.pair_position_error_m,
         })
     }
@@ -30,7 +30,7 @@ impl<const V: usize> Neighbours<V> {
     /// here.
     #[inline(never)]
     fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
-        let lands = !contact.heard_within(now, LANDS_UNHEARD);
+        let lands = !contact.heard_within(now, UNHEARD_LANDING_AFTER);
         let far = lands && contact.may_fly_on(now) && !self.hears_nobody(now);
         if far { contact.unheard_distance_m() } else { contact.unheard_stop_m() }
     }
@@ -72,7 +72,7 @@ impl<const V: usize> Neighbours<V> {
     /// rest out of the plan. `apart`: radius for one in the air, and for one that lies, which no
     /// longer deviates.
     pub fn for_each_place(&self, now: Instant, apart: [f32; 2], mut tell: impl FnMut(KeepOutZone)) {
-        (0..self.roster).for_each(|i| self.places_of(i, now, apart, &mut tell));
+        (0..self.roster_count).for_each(|i| self.places_of(i, now, apart, &mut tell));
     }
 
     /// Calls `tell` with the keep-out zones of contact `i` of the roster where it stands or rests:
@@ -84,9 +84,9 @@ impl<const V: usize> Neighbours<V> {
         [apart_m, lying_m]: [f32; 2],
         tell: &mut dyn FnMut(KeepOutZone),
     ) {
-        let rostered = self.contacts[..self.roster].get(i);
+        let rostered = self.contacts[..self.roster_count].get(i);
         if let Some(contact) = rostered.filter(|c| c.position_at.is_some()) {
-            let far_m = if contact.is_on_ground(now, self.down) { lying_m } else { apart_m };
+            let far_m = if contact.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
             let reach = [far_m, self.unheard_progress_m(contact, now)];
             contact.keep_out_zones(now, reach, self.area_ground(), tell);
         }

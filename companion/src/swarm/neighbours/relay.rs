@@ -178,7 +178,7 @@ impl<const V: usize> Neighbours<V> {
     /// message was full on.
     pub(crate) fn next_relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
-        let roster = &self.contacts[..self.roster];
+        let roster = &self.contacts[..self.roster_count];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));
         // A relay goes to all, even if one neighbour alone does not hear the vehicle.
         let missed = |c: &NeighbourEntry| {
@@ -200,7 +200,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Handles a relay, for our plan, from the vehicle `from` of the roster.
     pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
-        if self.roster_rank(from, now).is_none() {
+        if self.active_roster_index(from, now).is_none() {
             return;
         }
         for item in &relay.items {
@@ -228,7 +228,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     fn in_ranks(&self, rank: u8) -> Option<usize> {
-        self.contacts[..self.roster].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
+        self.contacts[..self.roster_count].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
     }
 }
 

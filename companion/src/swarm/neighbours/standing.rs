@@ -9,16 +9,18 @@ impl<const V: usize> Neighbours<V> {
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for
     /// so long that they lie on the ground.
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
-        self.contacts[..self.roster]
+        self.contacts[..self.roster_count]
             .iter()
-            .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
+            .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
     }
 
     /// Whether a vehicle of the roster counts as dead, but may still be coming down.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
-        let roster = &self.contacts[..self.roster];
+        let roster = &self.contacts[..self.roster_count];
         roster.iter().any(|c| {
-            !c.reports(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down)
+            !c.reports(GROUNDED | OUT_OF_PLAN)
+                && c.is_dead(now)
+                && c.heard_within(now, self.down_after)
         })
     }
 
@@ -41,12 +43,12 @@ impl<const V: usize> Neighbours<V> {
     /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand
     /// and wait.
     pub fn are_all_waiting(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.is_waiting(now))
+        self.contacts[..self.roster_count].iter().all(|c| c.is_waiting(now))
     }
 
     /// Whether every other vehicle of the roster is out of the plan, waits, or claims the turn.
     pub fn are_all_standing(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
+        self.contacts[..self.roster_count].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
     }
 
     /// Whether a vehicle with a lower system id than `id` claims the turn to fly a detour.
@@ -62,6 +64,6 @@ impl<const V: usize> Neighbours<V> {
     /// Whether every other vehicle of the roster last reported that it has landed or is out of the
     /// plan; true where there is none.
     pub fn are_all_at_rest(&self) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
+        self.contacts[..self.roster_count].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
     }
 }

@@ -351,7 +351,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let from = contact.state.position + near(rng, beside_m);
         contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
         contact.unheard_way_m = [0.0, -1.0][rng.next_u32() as usize % 2];
-        contact.first_unheard_point =
+        contact.unheard_point_count =
             (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
         let first = contact.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
@@ -407,7 +407,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);
-        let away = reach.own.away_from_box(&met.motion.position);
+        let away = reach.own.distance_from_box(&met.motion.position);
         let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
         let below = lands

@@ -3,7 +3,7 @@
 extern crate std;
 
 use super::*;
-use crate::link::commands::EXCLUDE;
+use crate::link::commands::FENCE_EXCLUSION;
 
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 const CLEARANCE_M: f32 = 0.8;
@@ -12,7 +12,7 @@ const CLEARANCE_M: f32 = 0.8;
 pub(crate) fn sphere(at: Point, radius_m: f32) -> Command {
     let place = frames::enu_to_geodetic(&ORIGIN, &at);
     Command {
-        command: EXCLUDE,
+        command: FENCE_EXCLUSION,
         param1: radius_m,
         param2: 0.0,
         place: Some((

@@ -37,8 +37,8 @@ impl Bench {
         }
         let Some(wanted) = self.plan_requests.take() else { return false };
         let plan = match wanted {
-            PlanKind::Division => self.divided(),
-            PlanKind::Detour => match self.requested() {
+            PlanKind::Division => self.division_plan(),
+            PlanKind::Detour => match self.detour_request() {
                 Some((request, obstacles)) => self.planned_detour(&request, obstacles),
                 None => Some(Err(PlanFailure::Unreachable)),
             },
@@ -55,7 +55,7 @@ impl Bench {
 
     /// The detour that the companion requests now, and the keep-out zones for it; `None` if it
     /// requests none any more.
-    fn requested(&mut self) -> Option<(DetourRequest, Vec<KeepOutZone>)> {
+    fn detour_request(&mut self) -> Option<(DetourRequest, Vec<KeepOutZone>)> {
         let mut obstacles = Vec::new();
         let request = self.companion.detour_request(|obstacle| obstacles.push(obstacle))?;
         Some((request, obstacles))
@@ -92,13 +92,13 @@ impl Bench {
 
     /// The plan after a division: the rest of the vehicle's path from where it holds. `None` for no
     /// answer.
-    fn divided(&self) -> Option<Result<Plan, PlanFailure>> {
+    fn division_plan(&self) -> Option<Result<Plan, PlanFailure>> {
         if self.undividable {
             return Some(Err(PlanFailure::Capacity));
         }
         let rank =
             usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
-        let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
+        let held_dm = self.companion.division_inputs().last().map_or(0, |lots| lots[rank].along_dm);
         // On a detour beside its path the companion's current plan is the detour.
         let beside = self.companion.detours.is_beside_plan();
         let plan = if beside { self.own_plan.as_ref() } else { self.companion.mission.plan() };

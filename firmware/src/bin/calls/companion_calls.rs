@@ -53,7 +53,7 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
     measure_framing(meter);
     measure_mission_parsing(meter);
     measure_fleet_agreement(meter);
-    values(meter);
+    measure_parameters(meter);
     let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
     let flash = RamFlash(memory::take_spare_memory().expect("it is taken once"));
     GroundedCompanion {
@@ -195,7 +195,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
         };
         meter.call("fleet::Fleet::step, 32", bytes, || fleet.step(now, &own, hearing));
         if meter.call("fleet::Fleet::needs_division", bytes, || fleet.needs_division()) {
-            meter.call("fleet::Fleet::take_plan_crc", bytes, || fleet.take_plan_crc(7));
+            meter.call("fleet::Fleet::set_hash_from_plan", bytes, || fleet.set_hash_from_plan(7));
         }
         meter.call("fleet::Fleet::division_hash", bytes, || fleet.division_hash());
         for first in [0, roster::MAX_ENTRIES] {
@@ -222,7 +222,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
 }
 
 #[inline(never)]
-fn values(meter: &mut impl Meter) {
+fn measure_parameters(meter: &mut impl Meter) {
     let mut values = Parameters::default();
     let mut config = flight::config();
     for (index, parameter) in parameters::TABLE.iter().enumerate() {
@@ -283,9 +283,12 @@ impl<M: Meter> GroundedCompanion<'_, M> {
             self.feed_frame(PARAM_SET, &set);
         }
         self.feed_frame(PARAM_REQUEST_LIST, &[1, companion::COMPANION_COMPONENT]);
-        for command in
-            [commands::START, commands::PAUSE_CONTINUE, commands::REQUEST, commands::LAND]
-        {
+        for command in [
+            commands::MISSION_START,
+            commands::PAUSE_CONTINUE,
+            commands::REQUEST_MESSAGE,
+            commands::LAND,
+        ] {
             let mut order = [0; 33];
             order[28..30].copy_from_slice(&command.to_le_bytes());
             (order[30], order[31]) = (1, companion::COMPANION_COMPONENT);

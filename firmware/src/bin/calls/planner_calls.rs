@@ -21,7 +21,7 @@ use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleWorkspace};
 use planner_core::search::{self, RoadmapWithLengths, SearchWorkspace};
 use planner_core::segment;
-use planner_core::track::{self, TrackConfig, Tracker};
+use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::voxel::{Outside, VoxelGrid};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
@@ -42,7 +42,7 @@ const SMALL_ROADMAP_NODES: usize = 300;
 /// Memory of the bench beside the workspace overlay.
 struct BenchMemory {
     plan: Plan,
-    small: prm::Workspace<SMALL_ROADMAP_NODES, 1024>,
+    small: prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>,
     nodes: [Point; SMALL_ROADMAP_NODES],
     edges: [prm::Edge; 1024],
     kept: Vec<roadmap::Edge, 1024>,
@@ -51,9 +51,9 @@ struct BenchMemory {
 }
 
 static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
-static BESIDE: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
+static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
     plan: Plan::new(),
-    small: prm::Workspace::new(),
+    small: prm::NodeIndex::new(),
     nodes: [Point::new(0.0, 0.0, 0.0); SMALL_ROADMAP_NODES],
     edges: [prm::Edge { a: 0, b: 0 }; 1024],
     kept: Vec::new(),
@@ -66,7 +66,7 @@ static BESIDE: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
 #[inline(never)]
 pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     let scratch = SCRATCH.take();
-    let beside = BESIDE.take();
+    let beside = BENCH_MEMORY.take();
     let view = meter
         .call("roadmap::RoadmapView::parse", size_of::<RoadmapView<'_>>(), || {
             RoadmapView::parse(memory::bank2())
@@ -91,7 +91,7 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     let search = &mut scratch.planner().search;
     measure_desk_calls(meter, &grid, search, beside);
     let flights = coverage_flights::measure_coverage_flights(meter, scratch, &mut beside.plan);
-    [coverage::measure_coverage_calls(meter, scratch.coverage()), flights]
+    [coverage::measure_coverage_calls(meter, scratch.coverage_bench()), flights]
 }
 
 fn random_geodetic(rng: &mut Pcg32) -> Geodetic {
@@ -255,7 +255,9 @@ fn measure_largest_swarm(
         }
         let mut path = Path::new();
         way.iter().for_each(|&node| path.push(view.node(node), 1.0).expect("as long as the nodes"));
-        meter.call("flight::Path::label_times", 0, || path.label_times(1.0, cfg.cruise_mps));
+        meter.call("flight::Path::set_times_at_speed", 0, || {
+            path.set_times_at_speed(1.0, cfg.cruise_mps)
+        });
         let id = 1 + plan.flights.len() as u8;
         let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::MAX_TIMED_SEGMENT_M);
         let flight = Flight {
@@ -352,8 +354,9 @@ fn measure_paths(meter: &mut impl Meter) {
         });
         meter.call("flight::Path::project", 0, || path.project(&near, along_m, length_m));
         let track = TrackConfig { cruise_mps: flight::CRUISE_MPS, ..TrackConfig::default() };
-        let mut tracker = Tracker { along_m, speed_mps: track.cruise_mps, ..Tracker::default() };
-        meter.call("track::advance", size_of::<Tracker>(), || {
+        let mut tracker =
+            ReferenceState { along_m, speed_mps: track.cruise_mps, ..ReferenceState::default() };
+        meter.call("track::advance", size_of::<ReferenceState>(), || {
             track::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
         });
         let obstacle = KeepOutZone { from: near, to: near, radius_m: 1.0, kind: ZoneKind::Static };
@@ -413,7 +416,7 @@ fn measure_roadmap_builds(
     grid: &VoxelGrid<'_>,
     scratch: &mut WorkspaceOverlay,
 ) {
-    let bytes = size_of::<prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>>();
+    let bytes = size_of::<prm::NodeIndex<ROADMAP_NODES, ROADMAP_CUBES>>();
     let good = "the building has room";
     let builder = scratch.builder();
     meter
@@ -422,7 +425,7 @@ fn measure_roadmap_builds(
         })
         .expect(good);
     meter
-        .call("prm::Workspace::build_index, 2300", bytes, || {
+        .call("prm::NodeIndex::build_index, 2300", bytes, || {
             builder.build_index(&cases::ROADMAP_CONFIG)
         })
         .expect(good);
@@ -453,7 +456,7 @@ fn measure_desk_calls(
     let good = "the building has room";
     prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
     let count = meter
-        .call("prm::connect, 300", size_of::<prm::Workspace<SMALL_ROADMAP_NODES, 1024>>(), || {
+        .call("prm::connect, 300", size_of::<prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>>(), || {
             prm::connect(grid, nodes, &config, small, edges)
         })
         .expect(good);

@@ -73,7 +73,9 @@ impl Flash {
             .lender
             .lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
         // SAFETY: the region makes the sectors read only, and nothing writes to them.
-        unsafe { mpu::set(super::ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32))) };
+        unsafe {
+            mpu::set_region(super::ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32)))
+        };
         Some(lent)
     }
 
@@ -82,7 +84,7 @@ impl Flash {
         // SAFETY: disables a region that only this driver uses; after the start no other code
         // maintains the cache.
         unsafe {
-            mpu::set(super::ROADMAP_REGION, None);
+            mpu::set_region(super::ROADMAP_REGION, None);
             let mut core = cortex_m::Peripherals::steal();
             core.SCB.clean_invalidate_dcache(&mut core.CPUID);
         }

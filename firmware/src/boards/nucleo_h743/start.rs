@@ -18,7 +18,7 @@ const MAX_HSE_POLLS: u32 = 200_000;
 /// Reads why the chip was reset and clears the flags; to be called once. Also switches on the
 /// clocks of domain D2's memories, and applies the AXI SRAM's workaround on old silicon.
 pub fn reset_cause() -> ResetCause {
-    pac::RCC.ahb2enr().modify(|w| w.0 |= h743::D2_SRAM);
+    pac::RCC.ahb2enr().modify(|w| w.0 |= h743::D2_SRAM_CLOCKS);
     // By the errata on peripheral clocks: after a read of the register the memory may be used.
     pac::RCC.ahb2enr().read();
     cortex_m::asm::dsb();

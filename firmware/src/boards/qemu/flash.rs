@@ -6,7 +6,7 @@
 use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
 use embassy_time::{Duration, Timer};
 
-use super::memory::Bank2;
+use super::memory::Bank2Use;
 use crate::lent::{FlashLender, LentFlash};
 
 /// Address of the memory that holds the bank's bytes.
@@ -16,7 +16,7 @@ const BANK_ADDRESS: usize = 0x6000_0000;
 const WORD_MARKS: usize = 0x6020_0000;
 /// Address of the word that holds `MAGIC` once bank and marks are initialized; QEMU's memory is
 /// zero at power-on.
-const BANK_MADE: usize = 0x6030_0000;
+const BANK_INITIALISED_ADDRESS: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
 const LEN: usize = LAYOUT.len() as usize;
 const ERASED: u8 = 0;
@@ -37,13 +37,13 @@ pub struct Flash(FlashLender);
 impl Flash {
     /// Creates the driver, once, at the start. After power-on it makes the bank erased.
     pub(super) fn new() -> Self {
-        assert!(Bank2::Programmed.claim(), "bank 2 is read as it lies, for measurements");
+        assert!(Bank2Use::Programmed.claim(), "bank 2 is read as it lies, for measurements");
         // SAFETY: memory of this board that no other code uses yet.
         unsafe {
-            if (BANK_MADE as *const u32).read_volatile() != MAGIC {
+            if (BANK_INITIALISED_ADDRESS as *const u32).read_volatile() != MAGIC {
                 (BANK_ADDRESS as *mut u8).write_bytes(0xFF, LEN);
                 (WORD_MARKS as *mut u8).write_bytes(ERASED, LEN / WORD);
-                (BANK_MADE as *mut u32).write_volatile(MAGIC);
+                (BANK_INITIALISED_ADDRESS as *mut u32).write_volatile(MAGIC);
             }
         }
         Self(FlashLender::new())

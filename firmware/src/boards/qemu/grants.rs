@@ -49,50 +49,60 @@ struct SimulationLink {
     length: usize,
     done: usize,
     /// Bytes of queued records, which are written at the grant's end.
-    sent: usize,
+    queued_len: usize,
     /// Time of the message's next record, counts since the start.
     due: u64,
     /// Gives bytes that arrive to the UART with this number.
-    take: fn(u8, &[u8]),
+    receive_on_port: fn(u8, &[u8]),
 }
 
-static DESK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
+static SIMULATION_LINK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
 
 /// Enters lock step if QEMU was started with its command line: announces the board to the host and
-/// waits for the first message. `take` is called with a UART's number and the bytes that arrive
-/// there.
+/// waits for the first message. `receive_on_port` is called with a UART's number and the bytes that
+/// arrive there.
 pub fn start(take: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];
     if sys_get_cmdline_uninit(&mut line).is_ok_and(|line| line == COMMAND_LINE.as_bytes()) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
         // The log already uses the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
-        let mut desk = SimulationLink { input, output, length: 0, done: 0, sent: 0, due: 0, take };
+        let mut desk = SimulationLink {
+            input,
+            output,
+            length: 0,
+            done: 0,
+            queued_len: 0,
+            due: 0,
+            receive_on_port: take,
+        };
         desk.queue_record(FromBoard::Started, &[]);
         desk.flush();
         desk.read_message();
         Register::new(TIMER, CONTROL).write(ONE_SHOT);
         interrupts::enable(Irq::DualTimer, interrupts::GRANTS);
-        critical_section::with(|cs| DESK.borrow_ref_mut(cs).insert(desk).run_due_work(cs));
+        critical_section::with(|cs| {
+            SIMULATION_LINK.borrow_ref_mut(cs).insert(desk).run_due_work(cs)
+        });
     }
 }
 
 /// Whether the board runs in lock step.
 pub fn is_lock_step() -> bool {
-    critical_section::with(|cs| DESK.borrow_ref(cs).is_some())
+    critical_section::with(|cs| SIMULATION_LINK.borrow_ref(cs).is_some())
 }
 
 /// Time at which the message's next record is due, counts since the start; `u64::MAX` outside lock
 /// step.
 pub fn next_due(cs: CriticalSection<'_>) -> u64 {
-    DESK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
+    SIMULATION_LINK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
 }
 
 /// Interrupt handler of the dual timer: executes the records that are due.
 pub fn on_alarm() {
     Register::new(TIMER, INTCLR).write(1);
     critical_section::with(|cs| {
-        if let Some(desk) = &mut *DESK.borrow_ref_mut(cs) {
+        if let Some(desk) = &mut *SIMULATION_LINK.borrow_ref_mut(cs) {
             desk.run_due_work(cs);
         }
     });
@@ -101,7 +111,7 @@ pub fn on_alarm() {
 /// Queues bytes that UART `port` sends, for the host. Returns false outside lock step.
 pub fn send(port: u8, bytes: &[u8]) -> bool {
     critical_section::with(|cs| {
-        let mut desk = DESK.borrow_ref_mut(cs);
+        let mut desk = SIMULATION_LINK.borrow_ref_mut(cs);
         let Some(desk) = &mut *desk else { return false };
         let at_us = CLOCK_NOW(cs) / COUNTS_PER_US;
         desk.queue_record(FromBoard::Sent { port, len: bytes.len() as u16, at_us }, bytes);
@@ -153,7 +163,7 @@ impl SimulationLink {
         self.done = from + record.payload_len();
         let bytes = &self.message_bytes()[from..self.done];
         match record {
-            ToBoard::Bytes { port, .. } => (self.take)(port, bytes),
+            ToBoard::Bytes { port, .. } => (self.receive_on_port)(port, bytes),
             ToBoard::Run { .. } => {}
             ToBoard::Peek { address, len } => {
                 // SAFETY: the host asks for existing memory.
@@ -186,21 +196,23 @@ impl SimulationLink {
     /// Queues a record with its bytes until the grant's end; if the buffer is full, writes the
     /// queued records first.
     fn queue_record(&mut self, record: FromBoard, bytes: &[u8]) {
-        if self.sent + HEAD + bytes.len() > LONGEST {
+        if self.queued_len + HEAD + bytes.len() > LONGEST {
             self.flush();
         }
         for part in [&record.to_bytes(), bytes] {
             // SAFETY: memory of this board that no other code uses, and long enough.
-            unsafe { ((SENT_ADDRESS + self.sent) as *mut u8).copy_from(part.as_ptr(), part.len()) };
-            self.sent += part.len();
+            unsafe {
+                ((SENT_ADDRESS + self.queued_len) as *mut u8).copy_from(part.as_ptr(), part.len())
+            };
+            self.queued_len += part.len();
         }
     }
 
     fn flush(&mut self) {
         // SAFETY: as in `queue_record`, which wrote it.
-        let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.sent) };
+        let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.queued_len) };
         self.output.write_all(sent).expect("the desk listens");
-        self.sent = 0;
+        self.queued_len = 0;
     }
 
     /// Waits for the next message of the host and reads it.

@@ -12,7 +12,7 @@ const MAP_HEADER_LEN: usize = 32;
 /// Address of memory that nothing else uses.
 const UNUSED_ADDRESS: usize = 0x6040_0000;
 /// Address of the emulated flash bank 2.
-const BANK2: usize = 0x6000_0000;
+const BANK2_ADDRESS: usize = 0x6000_0000;
 /// Length of bank 2, bytes.
 pub const BANK2_LEN: usize = 1 << 20;
 
@@ -20,12 +20,12 @@ pub const BANK2_LEN: usize = 1 << 20;
 /// programmed by the flash driver.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub(super) enum Bank2 {
+pub(super) enum Bank2Use {
     Read = 1,
     Programmed,
 }
 
-impl Bank2 {
+impl Bank2Use {
     /// Claims the bank for this use; false if it was claimed for the other use before.
     pub(super) fn claim(self) -> bool {
         static CLAIMED: AtomicU8 = AtomicU8::new(0);
@@ -39,9 +39,9 @@ impl Bank2 {
 /// # Panics
 /// The flash driver was created before, which may program the bank.
 pub fn bank2() -> &'static [u8] {
-    assert!(Bank2::Read.claim(), "bank 2 belongs to the flash's driver");
+    assert!(Bank2Use::Read.claim(), "bank 2 belongs to the flash's driver");
     // SAFETY: readable memory that nothing writes to: the flash driver cannot be created any more.
-    unsafe { core::slice::from_raw_parts(BANK2 as *const u8, BANK2_LEN) }
+    unsafe { core::slice::from_raw_parts(BANK2_ADDRESS as *const u8, BANK2_LEN) }
 }
 
 /// The map for measurements: its header and its words.

@@ -77,7 +77,7 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
 
 /// Settings of a coverage mission whose work is divided again when a vehicle is lost.
 pub fn area_config() -> Config<VEHICLES> {
-    Config { division: Some(LOST_VEHICLE_DOWN_S), ..config() }
+    Config { lost_vehicle_down_s: Some(LOST_VEHICLE_DOWN_S), ..config() }
 }
 
 /// A random plan of a coverage mission: every second leg is a lane with pictures.

@@ -211,13 +211,14 @@ impl Segment {
                 boxes.start[axis] = a[axis] - low[axis] - boxes.half[axis];
             }
             let (mut from, mut to) = (zero, one);
-            let (mut rate_from, mut rate_to) = (boxes.at(zero).1, boxes.at(one).1);
+            let (mut rate_from, mut rate_to) =
+                (boxes.distance_sq_and_half_slope(zero).1, boxes.distance_sq_and_half_slope(one).1);
             for axis in 0..3 {
                 for face in [zero - boxes.half[axis], boxes.half[axis]] {
                     // On an axis without motion `per_d` is infinite and the product may be NaN:
                     // `max` then returns `from`.
                     let t = ((face - boxes.start[axis]) * per_d[axis]).max(from).min(to);
-                    let (_, rate) = boxes.at(t);
+                    let (_, rate) = boxes.distance_sq_and_half_slope(t);
                     let falls = rate.is_below(zero);
                     (from, to) = (t.select(falls, from), to.select(falls, t));
                     (rate_from, rate_to) =
@@ -229,7 +230,7 @@ impl Segment {
             let between = from + (to - from) * (rate_from / (rate_from - rate_to));
             let t = between.select(rate_from.is_below(zero), from);
             let t = t.select(zero.is_below(rate_to), to);
-            boxes.at(t).0.store_part(&mut squares, part);
+            boxes.distance_sq_and_half_slope(t).0.store_part(&mut squares, part);
         }
         squares
     }
@@ -247,7 +248,7 @@ struct Boxes<S: Simd> {
 impl<S: Simd> Boxes<S> {
     /// Squared distance at the fraction `t` of the segment, and half its derivative.
     #[inline(always)]
-    fn at(&self, t: SimdLanes<S>) -> (SimdLanes<S>, SimdLanes<S>) {
+    fn distance_sq_and_half_slope(&self, t: SimdLanes<S>) -> (SimdLanes<S>, SimdLanes<S>) {
         let zero = t.zero();
         let (mut square, mut rate) = (zero, zero);
         for axis in 0..3 {

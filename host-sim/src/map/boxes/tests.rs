@@ -12,7 +12,7 @@ fn uniform(rng: &mut Pcg32, from: f32, to: f32) -> f32 {
 
 /// Random blocks and single cells.
 fn random_words(shape: &GridShape, rng: &mut Pcg32) -> Vec<u64> {
-    let mut words = vec![0; shape.brick_count()];
+    let mut words = vec![0; shape.word_count()];
     for block in 0..rng.next_u32() % 12 {
         let low = shape.dims.map(|dim| rng.next_u32() % dim);
         let largest = if block % 3 == 0 { 1 } else { 9 };
@@ -20,7 +20,7 @@ fn random_words(shape: &GridShape, rng: &mut Pcg32) -> Vec<u64> {
         for k in low[2]..high[2] {
             for j in low[1]..high[1] {
                 for i in low[0]..high[0] {
-                    let (word, mask) = shape.address([i, j, k]);
+                    let (word, mask) = shape.word_and_mask([i, j, k]);
                     words[word] |= mask;
                 }
             }

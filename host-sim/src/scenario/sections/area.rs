@@ -43,7 +43,7 @@ enum Coordinates {
 }
 
 /// Reads the scenario of a coverage mission.
-pub(in crate::scenario) fn coverage(
+pub(in crate::scenario) fn read_coverage_scenario(
     text: Text<'_>,
     root: &Table<'_>,
     folder: &Path,
@@ -178,7 +178,7 @@ fn read_coverage_mission(
         geofence,
         ground_stations,
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok(mission)
 }
 
@@ -231,7 +231,7 @@ fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFi
             ],
         )?,
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok((area, terrain))
 }
 
@@ -302,7 +302,7 @@ fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
                 let lat = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
                 let lon = table.required("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
                 table.declare_keys(&["alt_m"]);
-                table.finish()?;
+                table.refuse_unknown_keys()?;
                 [lon, lat]
             }
             false => {

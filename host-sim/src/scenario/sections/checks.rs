@@ -1,7 +1,7 @@
 //! Checks between several tables of a scenario.
 
 use planner_core::Point;
-use sim_autopilot::Estimator;
+use sim_autopilot::EstimatorErrors;
 
 use crate::margins;
 use crate::scenario::reader::{Result, Span, Table, Text};
@@ -24,7 +24,7 @@ pub(super) fn check_margins(
     simulation: &Simulation,
     vehicles: &[Vehicle],
 ) -> Result<()> {
-    if simulation.estimator != Estimator::Recorded {
+    if simulation.estimator != EstimatorErrors::Recorded {
         return Ok(());
     }
     let need = margins::required_distances(simulation, deconfliction.safety_distance_m, vehicles);

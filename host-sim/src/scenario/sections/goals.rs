@@ -162,7 +162,7 @@ fn read_mission(
         return Err(table.text.error(&span, why));
     }
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     let mission =
         Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
     Ok((mission, mode_span))

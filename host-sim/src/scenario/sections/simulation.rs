@@ -2,7 +2,7 @@
 
 use companion::config::SAFETY_DISTANCE_M;
 use planner_core::deconflict::Method;
-use sim_autopilot::Estimator;
+use sim_autopilot::EstimatorErrors;
 
 use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
@@ -22,7 +22,7 @@ pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deco
         f64::from(safety_distance_m)..=1000.0,
     )?;
     let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok(deconfliction)
 }
 
@@ -34,8 +34,8 @@ pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulat
         position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
         estimator: table.one_of(
             "estimator",
-            Estimator::Rtk,
-            &[("rtk", Estimator::Rtk), ("recorded", Estimator::Recorded)],
+            EstimatorErrors::Rtk,
+            &[("rtk", EstimatorErrors::Rtk), ("recorded", EstimatorErrors::Recorded)],
         )?,
         serial_baud: table.integer_in_range("serial_baud", 921_600, 1200..=100_000_000)? as u32,
         serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
@@ -44,7 +44,7 @@ pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulat
         radio_range_m: table.f32("radio_range_m", 500.0, 0.0..=1e6)?,
         time_limit_s: table.f32("time_limit_s", limit_s, 0.1..=1e6)?,
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok(simulation)
 }
 
@@ -72,7 +72,7 @@ pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
         position: table.get("position").map(|v| read_point(&v)).transpose()?,
         radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     if fault.kind == FAULT_OBSTACLE && (fault.position.is_none() || fault.radius_m.is_none()) {
         return Err(table
             .text

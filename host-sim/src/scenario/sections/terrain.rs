@@ -108,7 +108,7 @@ impl TerrainFile {
             Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
         let own: Vec<Vehicle> = vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
         let slope = own.iter().map(|vehicle| {
-            let [climb_mps, descend_mps] = vehicle.climbs_mps();
+            let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
             climb_mps.min(descend_mps) / mission.cruise_mps.min(vehicle.speed_max_mps)
         });
         let slope = slope.fold(f32::INFINITY, f32::min);

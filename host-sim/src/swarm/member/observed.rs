@@ -31,7 +31,7 @@ impl SimulatedVehicle {
             .board
             .as_ref()
             .map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
-        Observation { position: truth.position, phase, ordered, progress_m }
+        Observation { position: truth.position, phase, holds_by_command: ordered, progress_m }
     }
 }
 

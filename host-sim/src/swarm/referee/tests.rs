@@ -4,12 +4,12 @@ use planner_core::voxel::{GridShape, Outside};
 /// A floor at z < 1 and a wall at x > 8 in a 10 m cube of 1 m cells.
 fn with_monitor(test: impl FnOnce(Referee<'_>)) {
     let shape = GridShape { dims: [10; 3], min: Point::zeros(), resolution_m: 1.0 };
-    let mut words = vec![0; shape.brick_count()];
+    let mut words = vec![0; shape.word_count()];
     for i in 0..10 {
         for j in 0..10 {
             for k in 0..10 {
                 if k == 0 || i >= 8 {
-                    let (word, mask) = shape.address([i, j, k]);
+                    let (word, mask) = shape.word_and_mask([i, j, k]);
                     words[word] |= mask;
                 }
             }
@@ -21,7 +21,12 @@ fn with_monitor(test: impl FnOnce(Referee<'_>)) {
 }
 
 fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
-    Observation { position: Point::new(x, y, z), phase, ordered: false, progress_m: Some(x) }
+    Observation {
+        position: Point::new(x, y, z),
+        phase,
+        holds_by_command: false,
+        progress_m: Some(x),
+    }
 }
 
 #[test]
@@ -112,7 +117,7 @@ fn one_that_tells_of_no_progress_makes_some_by_flying_on() {
 #[test]
 fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
     with_monitor(|mut referee| {
-        referee.waits_end = true;
+        referee.retracts_ended_deadlocks = true;
         let on_path = |x| [at(x, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
         for step in 0..300 {
             referee.observe(f64::from(step) * 0.1, &on_path(2.0));

@@ -64,7 +64,7 @@ fn decode_cloud(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
 
 fn decode_asc(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
     let text = String::from_utf8_lossy(bytes);
-    asc::parse(&text, Crs::Unsaid)?.resampled(&Frame { metres: true, ..anywhere(&ORIGIN) })
+    asc::parse(&text, Crs::Unstated)?.resampled(&Frame { metres: true, ..anywhere(&ORIGIN) })
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn damaged_systems_are_refused_or_mean_something() {
         VERT_CS["NAVD88 (ftUS)",VERT_DATUM["North American",2005],UNIT["US survey foot",0.3048006096012192]]]"#;
     let feet = super::crs::wkt_height_unit_m(whole).unwrap();
     assert!((feet - super::crs::US_FOOT_M).abs() < 1e-12);
-    assert_eq!(super::crs::System::wkt(whole).unwrap().unit_m, Some(0.3048));
+    assert_eq!(super::crs::CoordinateSystem::wkt(whole).unwrap().unit_m, Some(0.3048));
     let mut random = Pcg32::new(56, 78);
     let mut refused = 0;
     for _ in 0..3000 {
@@ -156,7 +156,7 @@ fn damaged_systems_are_refused_or_mean_something() {
         }
         let text = String::from_utf8(bytes).unwrap();
         let _ = super::crs::wkt_height_unit_m(&text);
-        match super::crs::System::wkt(&text) {
+        match super::crs::CoordinateSystem::wkt(&text) {
             Ok(system) => drop(system.to_degrees([1_300_000.0, 500_000.0])),
             Err(error) => {
                 refused += 1;

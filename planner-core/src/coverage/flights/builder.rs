@@ -38,7 +38,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     pub(super) fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
         self.path.push(place, self.clearance_m)?;
         self.here = place;
-        self.path.last().ok_or(PathError::NotFinite)
+        self.path.last_index().ok_or(PathError::NotFinite)
     }
 
     /// Writes the corners of the path from here to `to` around no-fly zones to `corners`.
@@ -89,7 +89,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         };
         let here = self.here;
         following.corners_to(&here, to, |corner| self.add_straight_leg(corner).map(|_| ()))?;
-        self.path.last().ok_or(PathError::NotFinite)
+        self.path.last_index().ok_or(PathError::NotFinite)
     }
 
     /// As `add_picture_leg`, but around no-fly zones.

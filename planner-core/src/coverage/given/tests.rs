@@ -6,7 +6,7 @@ use rand_pcg::Pcg32;
 
 use super::super::area::{Area, Ring, RingKind};
 use super::super::footprint::Footprint;
-use super::super::tracks::{self, LanePattern, Workspace};
+use super::super::tracks::{self, LanePattern, LaneWorkspace};
 use super::*;
 
 const LANE_M: f32 = 7.0;
@@ -42,8 +42,8 @@ fn lanes_in_any_order_become_one_way_as_short_as_the_planners_own() {
         let angle_deg = (case % 2 == 0).then(|| 180.0 * unit());
         let pattern =
             LanePattern { spacing: spacing(), angle_deg, margin_m: 0.0, search_steps: 20_000 };
-        let (mut ws, mut own) = (Workspace::<16>::new(), Tracks::<256>::new());
-        tracks::build(&area, &pattern, &transit, &mut ws, &mut own).expect("lanes");
+        let (mut ws, mut own) = (LaneWorkspace::<16>::new(), Tracks::<256>::new());
+        tracks::build_lanes(&area, &pattern, &transit, &mut ws, &mut own).expect("lanes");
 
         let mut given: Vec<[Flat; 2]> =
             own.lanes().iter().map(|lane| [lane.from, lane.to]).collect();

@@ -25,7 +25,7 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{
-    Heading, Heights, PackWorkspace, Plan, TrackUnit, Vehicle, Work, binpat,
+    Heights, PackWorkspace, Plan, RouteDirection, TrackUnit, Vehicle, Work, binpat,
 };
 use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
@@ -169,7 +169,7 @@ struct Desk {
     rings: [Ring; 1],
     vehicles: Vec<Vehicle>,
     tracks: Box<Tracks<LANES>>,
-    workspace: Box<tracks::Workspace<64>>,
+    workspace: Box<tracks::LaneWorkspace<64>>,
     pack: Box<PackWorkspace<VEHICLES>>,
     plan: Plan<VEHICLES>,
     points: Vec<[f32; 3]>,
@@ -202,7 +202,7 @@ impl Desk {
         let footprint = Footprint { along_m: 10.0, across_m: 10.0 };
         let spacing = Spacing { footprint, lane_m: 10.0, waypoint_m: 10.0 };
         let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: 10_000 };
-        tracks::build(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks)
+        tracks::build_lanes(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks)
             .expect("lanes");
         let work = work(&self.tracks, &transit, &self.vehicles);
         binpat(&work, &mut self.pack, &mut self.plan).expect("routes");
@@ -227,7 +227,7 @@ fn write_out(work: &Work<'_, LANES, 8>, plan: &Plan<VEHICLES>, points: &mut Vec<
             let to = route.end.min(lane.first + lane.count) - 1 - lane.first;
             points.extend([from, to].map(|k| at(&lane.waypoint(k), mission_m)));
         }
-        if route.heading == Heading::Backward {
+        if route.heading == RouteDirection::Backward {
             points[begins..].reverse();
         }
         let [first, last] = [points[begins], points[points.len() - 1]];

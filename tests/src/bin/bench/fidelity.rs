@@ -87,9 +87,9 @@ fn print_others() {
                 "  {} {}: {:.2}; {:.2}; {:.2}",
                 other.run,
                 other.vehicle,
-                recording.err_alike(other),
+                recording.error_correlation(other),
                 recording.compare(errors, Correction::Recorded).whole.rms,
-                recording.moved(errors, Correction::Recorded)
+                recording.moved_by_errors_m(errors, Correction::Recorded)
             );
         }
         println!();
@@ -106,5 +106,5 @@ fn print(recording: &Recording, c: &Comparison) {
         let Difference { rms, max } = part;
         print!("   {rms:>4.2} / {max:>4.2}");
     }
-    println!("   {:>4.2}", recording.moved(Estimator::Recorded, Correction::Recorded));
+    println!("   {:>4.2}", recording.moved_by_errors_m(Estimator::Recorded, Correction::Recorded));
 }

@@ -29,7 +29,7 @@ use host_sim::result::Timing;
 use host_sim::scenario;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use planner_core::prm::{self, Config, Edge, Sampling, Workspace, squared_length};
+use planner_core::prm::{self, Config, Edge, NodeIndex, Sampling, squared_length};
 use planner_core::roadmap::{self, LANDMARKS, RoadmapHeader, RoadmapView};
 use planner_core::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
 use planner_core::voxel::VoxelGrid;
@@ -46,7 +46,7 @@ const VEHICLES: usize = 10;
 const ROUNDS: usize = 9;
 const REPEATS: usize = 3;
 /// Workspace with the capacities of the default board.
-type BoardWorkspace = Workspace<4096, 4096>;
+type BoardWorkspace = NodeIndex<4096, 4096>;
 
 /// The JSON line that the baseline program prints.
 #[derive(Deserialize)]
@@ -262,7 +262,7 @@ impl<'a> Ours<'a> {
         Self {
             grid,
             terminals,
-            workspace: Box::new(Workspace::new()),
+            workspace: Box::new(NodeIndex::new()),
             search: Box::new(SearchWorkspace::new()),
             nodes: Vec::new(),
             edges: Vec::new(),

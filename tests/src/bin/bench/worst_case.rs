@@ -30,7 +30,7 @@ pub fn rows() -> Result<Vec<Row>> {
     let path = workspace().join(bounds::PAGE);
     let page =
         fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let [before, _, behind] = bounds::parts(&page)?;
+    let [before, _, behind] = bounds::split_page(&page)?;
     let table = bounds::table(&calls)?;
     fs::write(&path, [before, &table, behind].concat())
         .with_context(|| format!("cannot write {}", path.display()))?;

@@ -120,8 +120,11 @@ pub fn cause(
     if !search.finds(&with(&known)) {
         return Cause::OnlyRoute;
     }
-    let may =
-        if struck.silent { may_lie(plan, flight, struck, apart_m + BESIDE_M) } else { Vec::new() };
+    let may = if struck.silent {
+        possible_rest_places(plan, flight, struck, apart_m + BESIDE_M)
+    } else {
+        Vec::new()
+    };
     if search.goal_held(&may) {
         return Cause::MayBeAtGoal;
     }
@@ -145,7 +148,7 @@ fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
 
 /// How far a silent vehicle lies beside its path, and how far along its path from where it was last
 /// heard, metres.
-pub fn lies(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2]> {
+pub fn rest_offsets_m(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2]> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
     let (_, rest) = track.last()?;
@@ -162,7 +165,12 @@ pub fn lies(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2
 
 /// Points on the ground below the path, as far as the vehicle may come unheard from where it was
 /// last heard.
-fn may_lie(plan: &SwarmPlan, flight: &Flight, struck: Struck, radius_m: f32) -> Vec<Ball> {
+fn possible_rest_places(
+    plan: &SwarmPlan,
+    flight: &Flight,
+    struck: Struck,
+    radius_m: f32,
+) -> Vec<Ball> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
     let (Some(heard), Some((_, rest))) = (place_at(track, struck.at_s), track.last()) else {

@@ -58,7 +58,7 @@ fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<W
         }
         let mut path = Path::new();
         corners.iter().for_each(|&corner| path.push(corner, required_m).expect("three points fit"));
-        path.label_times(
+        path.set_times_at_speed(
             flight.climb_m / mission.schedule().vertical_mps,
             mission.schedule().cruise_mps,
         );

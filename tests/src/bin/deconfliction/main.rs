@@ -305,7 +305,9 @@ fn explain(
     flight: &swarm::Flight,
     struck: Struck,
 ) {
-    if let Some([beside_m, along_m]) = held::lies(plan, flight, struck).filter(|_| struck.silent) {
+    if let Some([beside_m, along_m]) =
+        held::rest_offsets_m(plan, flight, struck).filter(|_| struck.silent)
+    {
         row.lies_m = [row.lies_m[0].max(beside_m), row.lies_m[1].max(along_m)];
     }
     let held = |(i, v): &(usize, &VehicleResult)| !v.reached && *i != struck.index;

@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
-use super::types::{Happening, LIMIT_S, SCHEDULE, START_S, Scene, WAYPOINTS, What};
+use super::types::{LIMIT_S, MeetingEvent, SCHEDULE, START_S, Scene, TimedEvent, WAYPOINTS};
 use super::vehicle;
 use super::ways::{Way, at_height, flight};
 use crate::meeting::dice::Dice;
@@ -61,7 +61,7 @@ pub fn passing(seed: u64) -> Scene {
     let mut workspace = Box::new(ScheduleWorkspace::new());
     let flights = scheduled([first, second], &mut workspace);
     let vehicles = (0..2).map(|i| vehicle(&flights, i, true, &mut workspace, &mut dice)).collect();
-    let start = |vehicle| Happening { at_s: START_S, vehicle, what: What::Start };
+    let start = |vehicle| TimedEvent { at_s: START_S, vehicle, what: MeetingEvent::Start };
     Scene {
         seed,
         kind,

@@ -54,7 +54,7 @@ pub struct Vehicle {
 
 /// An event in a meeting.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum What {
+pub enum MeetingEvent {
     /// The ground station sends MAV_CMD_MISSION_START.
     Start,
     /// The ground station sends MAV_CMD_DO_PAUSE_CONTINUE 0.
@@ -90,13 +90,13 @@ pub enum What {
 
 /// An event with its time and vehicle.
 #[derive(Clone, Copy, Debug)]
-pub struct Happening {
+pub struct TimedEvent {
     /// Time of the event, seconds.
     pub at_s: f32,
     /// Index of the vehicle.
     pub vehicle: usize,
     /// The event.
-    pub what: What,
+    pub what: MeetingEvent,
 }
 
 /// How a lying vehicle falsifies its reports.
@@ -128,7 +128,7 @@ pub struct Scene {
     /// Time limit, seconds after the start.
     pub limit_s: f32,
     /// Events, by rising time.
-    pub happenings: Vec<Happening>,
+    pub happenings: Vec<TimedEvent>,
     /// Least and greatest delay of a radio frame, seconds.
     pub delay_s: (f32, f32),
     /// Probability that a radio frame is lost.

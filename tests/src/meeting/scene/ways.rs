@@ -159,7 +159,7 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
     }
     let first = way.points.first()?;
     let climb_m = first.z - way.pad.z;
-    path.label_times(climb_m / SCHEDULE.vertical_mps, SCHEDULE.cruise_mps);
+    path.set_times_at_speed(climb_m / SCHEDULE.vertical_mps, SCHEDULE.cruise_mps);
     let descent_m = way.points.last()?.z - way.ground_z;
     let length_s = path.length_m() / SCHEDULE.cruise_mps + climb_m + descent_m;
     (path.length_m() > 2.0 && climb_m > 0.5 && descent_m > 0.5 && length_s < LONGEST_S).then_some(

@@ -9,7 +9,7 @@ fn hovers() -> Bench {
     bench.refused = std::vec![176, 400];
     bench.false_ground = true;
     land(&mut bench);
-    bench.until(Disarm, 6.0);
+    bench.run_until(Disarm, 6.0);
     bench
 }
 
@@ -17,7 +17,7 @@ fn hovers() -> Bench {
 fn found_in_the_air() -> Bench {
     let mut bench = Bench::new(config());
     (bench.armed, bench.mode, bench.enu.z) = (true, px4::OFFBOARD, 1.5);
-    bench.until(Failsafe, 3.0);
+    bench.run_until(Failsafe, 3.0);
     bench
 }
 
@@ -45,7 +45,7 @@ pub(super) fn takes_over(scenes: &mut Scenes) {
     // Given up in the air: somebody has to land it.
     let given_up = |b: &mut Bench| {
         b.armed = false;
-        b.until(Aborted, 2.0);
+        b.run_until(Aborted, 2.0);
         b.armed = true;
     };
     scenes.play(flying(), given_up, Land, 2.0);
@@ -66,7 +66,7 @@ pub(super) fn does_not_do_as_asked(scenes: &mut Scenes) {
     // One that takes off by command, and does not.
     let mut grounded = Bench::ardupilot(config());
     grounded.refused = std::vec![22];
-    grounded.until(Ready, 6.0);
+    grounded.run_until(Ready, 6.0);
     grounded.start();
     grounded.stays_armed = true;
     let disarms_at_last = |b: &mut Bench| {
@@ -91,8 +91,8 @@ pub(super) fn is_not_heard(scenes: &mut Scenes) {
     scenes.play(flying(), for_a_while, Done, 60.0);
     let is_to_be_landed = |b: &mut Bench| {
         b.silent = true;
-        b.until(AutopilotSilent, 5.0);
-        b.until(Land, 65.0);
+        b.run_until(AutopilotSilent, 5.0);
+        b.run_until(Land, 65.0);
     };
     scenes.play(flying(), is_to_be_landed, Aborted, 130.0);
 }

@@ -65,7 +65,7 @@ impl Faller {
     /// The planner of the vehicle below: aside, away from what comes down, at once; around in a
     /// while, over an area once that is down.
     fn plan_away(&mut self, b: &mut Bench) {
-        let over_area = b.companion.config.division.is_some();
+        let over_area = b.companion.config.lost_vehicle_down_s.is_some();
         let answered = |request: &DetourRequest| request.aside || !over_area;
         let Some(request) = b.companion.detour_request(|_| {}).filter(answered) else {
             self.asked = None;
@@ -157,7 +157,7 @@ fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
     let mut wanted = VehiclePlan { path: path(faller.real(1.0, 6.0)), descent_m: 4.0, ..plan() };
     let flown_m = faller.real(5.0, 9.0);
     if over_area {
-        config.division = Some(60.0);
+        config.lost_vehicle_down_s = Some(60.0);
         let mut out = path(6.0);
         for point in [Point::new(8.0, 18.0, 4.0), Point::new(8.0, 12.0, 4.0), START] {
             out.push(point, 1.2).unwrap();

@@ -13,7 +13,7 @@ pub(super) const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure:
 /// Another comes to lie below the path.
 fn blocked(b: &mut Bench) {
     b.neighbour = below_the_path(OUT_OF_PLAN);
-    b.until(Blocked, 3.0);
+    b.run_until(Blocked, 3.0);
 }
 
 pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
@@ -22,7 +22,7 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
     scenes.play(accompanied(Follow, 1.0), unheard, Aborted, 60.0);
     let for_a_while = |b: &mut Bench| {
         b.neighbour = None;
-        b.until(Alone, 5.0);
+        b.run_until(Alone, 5.0);
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
@@ -36,15 +36,15 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
         bench.answer_plan = Some(Ok(gated.clone()));
         bench.neighbour = Some((Point::new(8.0, 60.0, 10.0), FLYING | ON_PLAN, 5.0, 5));
         bench.neighbour_clear_m = clear_m;
-        bench.until(Ready, 6.0);
+        bench.run_until(Ready, 6.0);
         bench.start();
-        bench.until(Follow, 30.0);
+        bench.run_until(Follow, 30.0);
         bench
     };
     for (clear_m, end) in [(50.0, Done), (5.0, Aborted)] {
         let out_of_range = |b: &mut Bench| {
             b.neighbour = None;
-            b.until(Alone, 10.0);
+            b.run_until(Alone, 10.0);
         };
         scenes.play(gated_until(clear_m), out_of_range, end, 60.0);
     }
@@ -71,21 +71,21 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
     // Without a goal the detour leads home.
     let mut bench = Bench::new(two_vehicles());
     (bench.answer_plan, bench.neighbour) = (Some(Ok(field_plan())), on_pad(ON_PLAN));
-    bench.until(Ready, 6.0);
+    bench.run_until(Ready, 6.0);
     bench.start();
-    bench.until(Follow, 30.0);
+    bench.run_until(Follow, 30.0);
     bench.run(1.0);
     let flown_home = |b: &mut Bench| {
         blocked(b);
-        b.until(Done, 60.0);
+        b.run_until(Done, 60.0);
         assert!((b.enu - Point::new(START.x, START.y, 0.0)).norm() < 0.3, "{}", b.enu);
     };
     scenes.play(bench, flown_home, Done, 1.0);
     let unanswered = |b: &mut Bench| {
         b.answer_detour = None;
         blocked(b);
-        b.until(Replanning, 6.0);
-        b.until(Blocked, 6.0);
+        b.run_until(Replanning, 6.0);
+        b.run_until(Blocked, 6.0);
     };
     scenes.play(accompanied(Follow, 1.0), unanswered, Replanning, 20.0);
     let no_way = |b: &mut Bench| {
@@ -96,17 +96,17 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
     // It lies so near that there is no room to land either: back along the path there is.
     let so_near = |b: &mut Bench| {
         no_way(b);
-        b.until(Blocked, 5.0);
+        b.run_until(Blocked, 5.0);
         b.run(1.0);
         b.neighbour = stands(Point::new(b.enu.x + 1.2, b.enu.y, 0.1), OUT_OF_PLAN);
-        b.until(Follow, 120.0);
+        b.run_until(Follow, 120.0);
     };
     scenes.play(accompanied(Follow, 1.0), so_near, Aborted, 60.0);
 }
 
 pub(super) fn before_take_off(scenes: &mut Scenes) {
     let grounded = |answer| {
-        let mut bench = Bench::accompanied(two_vehicles());
+        let mut bench = Bench::started_with_neighbour(two_vehicles());
         bench.neighbour = below_the_path(OUT_OF_PLAN);
         bench.answer_detour = answer;
         bench.run(4.5);

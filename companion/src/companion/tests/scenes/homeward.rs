@@ -8,7 +8,7 @@ use super::*;
 
 /// Over its pad it came down.
 fn is_home(b: &mut Bench) {
-    b.until(Aborted, 240.0);
+    b.run_until(Aborted, 240.0);
     assert!((b.enu - START).xy().norm() < 0.3, "at its pad: {:?} {:?}", b.enu, b.texts);
 }
 
@@ -23,7 +23,7 @@ pub(super) fn is_ordered(scenes: &mut Scenes) {
                 }
                 _ => {}
             }
-            b.until(state, 5.0);
+            b.run_until(state, 5.0);
             back(b);
             is_home(b);
         };
@@ -35,14 +35,14 @@ pub(super) fn is_ordered(scenes: &mut Scenes) {
 pub(super) fn flies_around(scenes: &mut Scenes) {
     let around = |b: &mut Bench| {
         b.neighbour = below_the_path(OUT_OF_PLAN);
-        b.until(Blocked, 5.0);
-        b.until(Dividing, 30.0);
+        b.run_until(Blocked, 5.0);
+        b.run_until(Dividing, 30.0);
     };
     scenes.play(over_a_field(Follow), around, Done, 120.0);
     let is_lost = |b: &mut Bench| {
         b.neighbour = below_the_path(OUT_OF_PLAN);
         b.undividable = true;
-        b.until(Dividing, 40.0);
+        b.run_until(Dividing, 40.0);
         is_home(b);
     };
     scenes.play(over_a_field(Follow), is_lost, Aborted, 1.0);
@@ -52,7 +52,7 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
     let blocked = |b: &mut Bench| {
         b.neighbour = below_the_path(OUT_OF_PLAN);
         b.answer_detour = detours::NO_WAY;
-        b.until(Blocked, 5.0);
+        b.run_until(Blocked, 5.0);
         b.run(119.0);
         b.answer_detour = Some(Ok(()));
         is_home(b);
@@ -112,16 +112,16 @@ pub(super) fn finds_no_way(scenes: &mut Scenes) {
     let no_way = |b: &mut Bench| {
         b.answer_detour = detours::NO_WAY;
         back(b);
-        b.until(Blocked, 2.0);
-        b.until(Land, 60.0);
+        b.run_until(Blocked, 2.0);
+        b.run_until(Land, 60.0);
         assert!((b.enu - START).xy().norm() < 0.5, "over its pad: {:?}", b.enu);
     };
     scenes.play(over_a_field(Follow), no_way, Aborted, 60.0);
     let late = |b: &mut Bench| {
         b.answer_detour = None;
         back(b);
-        b.until(Replanning, 5.0);
-        b.until(Blocked, 10.0);
+        b.run_until(Replanning, 5.0);
+        b.run_until(Blocked, 10.0);
         b.answer_detour = Some(Ok(()));
         is_home(b);
     };
@@ -136,7 +136,7 @@ fn an_interrupted_way_home_is_flown_to_its_end() {
         back(&mut bench);
         bench.run(at_s);
         pause(&mut bench);
-        bench.until(Paused, 5.0);
+        bench.run_until(Paused, 5.0);
         bench.run(3.0);
         resume(&mut bench);
         is_home(&mut bench);
@@ -149,18 +149,18 @@ fn an_interrupted_way_home_is_flown_to_its_end() {
 fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
     let mut b = over_a_field(Follow);
     b.neighbour = below_the_path(OUT_OF_PLAN);
-    b.until(Blocked, 5.0);
-    b.until(Follow, 30.0);
+    b.run_until(Blocked, 5.0);
+    b.run_until(Follow, 30.0);
     b.run(0.5);
     let ahead_m = b.companion.guidance.along_m() + 2.5;
     let ahead = b.companion.mission.plan().and_then(|plan| plan.path.point_at(ahead_m));
     b.answer_detour = detours::NO_WAY;
     b.neighbour = flies(ahead.unwrap(), ON_PLAN | crate::link::intent::ON_DETOUR);
-    b.until(Blocked, 40.0);
+    b.run_until(Blocked, 40.0);
     b.neighbour = below_the_path(OUT_OF_PLAN);
     b.answer_detour = Some(Ok(()));
-    b.until(Dividing, 60.0);
-    b.until(Follow, 5.0);
+    b.run_until(Dividing, 60.0);
+    b.run_until(Follow, 5.0);
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }
 
@@ -173,7 +173,7 @@ fn a_vehicle_that_came_home_early_takes_part_again_after_a_new_start() {
     is_home(&mut b);
     b.run(2.0);
     b.start();
-    b.until(Ready, 30.0);
+    b.run_until(Ready, 30.0);
     b.start();
-    b.until(Done, 120.0);
+    b.run_until(Done, 120.0);
 }

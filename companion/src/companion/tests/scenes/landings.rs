@@ -8,7 +8,7 @@ fn held_by(b: &mut Bench, neighbour: Neighbour) {
     b.neighbour = neighbour;
     b.run(0.3);
     land(b);
-    b.until(LandingHeld, 8.0);
+    b.run_until(LandingHeld, 8.0);
 }
 
 /// In the middle of its path, to land while another is below.
@@ -26,7 +26,7 @@ fn at_the_pad() -> Neighbour {
 
 /// Where the way aside ends it lands.
 fn lands_aside(b: &mut Bench, seconds: f32) {
-    b.until(Land, seconds);
+    b.run_until(Land, seconds);
     assert!((b.enu - GOAL).xy().norm() < 0.5, "where the way aside ends: {:?}", b.enu);
 }
 
@@ -49,19 +49,19 @@ pub(super) fn at_a_limit(scenes: &mut Scenes) {
         b.run(20.0);
         assert!(b.state() == Follow && (9.8..10.05).contains(&b.enu.x), "{:?}", b.enu);
         b.neighbour = landed(Point::new(8.0, 20.0, 0.0));
-        b.until(Land, 5.0);
+        b.run_until(Land, 5.0);
     };
-    scenes.play(Bench::accompanied(narrow), waits_inside, Aborted, 60.0);
+    scenes.play(Bench::started_with_neighbour(narrow), waits_inside, Aborted, 60.0);
 }
 
 /// Another is below where it lands.
 pub(super) fn wait_for_room(scenes: &mut Scenes) {
     let nowhere_for_long = |b: &mut Bench| {
-        b.until(Follow, 25.0);
+        b.run_until(Follow, 25.0);
         // Back over its pad there is no room either, nor aside.
         b.neighbour = at_the_pad();
         b.answer_detour = Some(Err(PlanFailure::Unreachable));
-        b.until(LandingHeld, 120.0);
+        b.run_until(LandingHeld, 120.0);
         b.run(85.0);
         assert!(b.state() == LandingHeld && b.enu.z > 0.8, "{:?} {:?}", b.texts, b.enu);
         b.neighbour = flies(Point::new(8.0, 30.0, 1.5), ON_PLAN);
@@ -74,7 +74,7 @@ pub(super) fn wait_for_room(scenes: &mut Scenes) {
 pub(super) fn end_aside(scenes: &mut Scenes) {
     let on_its_way_up = |b: &mut Bench| {
         held_by(b, stands(Point::new(b.enu.x - 1.0, b.enu.y, 0.0), OUT_OF_PLAN));
-        b.until(Follow, 25.0);
+        b.run_until(Follow, 25.0);
         lands_aside(b, 60.0);
     };
     scenes.play(accompanied(Climb, 2.0), on_its_way_up, Aborted, 30.0);

@@ -16,14 +16,14 @@ pub(super) fn over_a_field(state: State) -> Bench {
 /// The same by this plan.
 pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
     let mut config = two_vehicles();
-    config.division = Some(60.0);
+    config.lost_vehicle_down_s = Some(60.0);
     let mut bench = Bench::new(config);
     bench.answer_plan = Some(Ok(plan));
     bench.neighbour = on_pad(ON_PLAN);
-    bench.until(Ready, 6.0);
+    bench.run_until(Ready, 6.0);
     if state != Ready {
         bench.start();
-        bench.until(state, 20.0);
+        bench.run_until(state, 20.0);
     }
     bench
 }
@@ -50,7 +50,7 @@ pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
 /// The other one leaves.
 pub(super) fn leaves(b: &mut Bench) {
     tells(b, MemberStatus::Alive, MemberStatus::Left);
-    b.until(Dividing, 30.0);
+    b.run_until(Dividing, 30.0);
 }
 
 pub(super) fn another_leaves(scenes: &mut Scenes) {
@@ -67,18 +67,18 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
     };
     scenes.play(over_a_field(Follow), had_finished, Done, 120.0);
     let again = |b: &mut Bench| {
-        b.until(Done, 60.0);
+        b.run_until(Done, 60.0);
         b.start();
-        b.until(Ready, 10.0);
+        b.run_until(Ready, 10.0);
         b.run(6.0);
         b.start();
-        b.until(Follow, 20.0);
+        b.run_until(Follow, 20.0);
     };
     scenes.play(over_a_field(Follow), again, Done, 120.0);
     let undividable = |b: &mut Bench| {
         b.undividable = true;
         leaves(b);
-        b.until(Follow, 5.0);
+        b.run_until(Follow, 5.0);
     };
     scenes.play(over_a_field(Follow), undividable, Done, 120.0);
     let unanswered = |b: &mut Bench| {
@@ -132,6 +132,6 @@ fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
     tells(&mut bench, MemberStatus::Lost, MemberStatus::Alive);
     bench.run(1.0);
     bench.start();
-    bench.until(Follow, 30.0);
-    bench.until(Done, 120.0);
+    bench.run_until(Follow, 30.0);
+    bench.run_until(Done, 120.0);
 }

@@ -7,7 +7,7 @@ use super::*;
 fn piloted() -> Bench {
     let mut bench = flying();
     pilot_takes(&mut bench);
-    bench.until(PilotControl, 3.0);
+    bench.run_until(PilotControl, 3.0);
     bench
 }
 
@@ -19,7 +19,7 @@ fn gives_back(b: &mut Bench) {
 fn returned() -> Bench {
     let mut bench = piloted();
     gives_back(&mut bench);
-    bench.until(PilotReturned, 2.0);
+    bench.run_until(PilotReturned, 2.0);
     bench
 }
 

@@ -39,7 +39,7 @@ pub(super) fn is_not_to_be_trusted(scenes: &mut Scenes) {
     scenes.play(flying(), origin_moves, Land, 3.0);
     let jumps = |b: &mut Bench| {
         b.enu.y += 5.0;
-        b.until(PositionLost, 0.2);
+        b.run_until(PositionLost, 0.2);
     };
     scenes.play(flying(), jumps, Aborted, 30.0);
 }

@@ -5,19 +5,24 @@ use planner_core::flight::WaypointRange;
 use super::State::*;
 use super::losses::{over_a_field, tunnels};
 use super::*;
-use crate::link::done::{self, DoneReport};
+use crate::link::done::{self, PhotographedReport};
 
 /// The other vehicle reports what it knows to be photographed.
 fn knows(b: &mut Bench, first: u32, round: u8, flies: bool) {
-    reports(b, &DoneReport { round, flies, ..report(first) });
+    reports(b, &PhotographedReport { round, flies, ..report(first) });
 }
 
-fn report(first: u32) -> DoneReport {
+fn report(first: u32) -> PhotographedReport {
     let ranges = [WaypointRange { first, end: first + 10 }].into_iter().collect();
-    DoneReport { system_id: 77, mission_crc: 0xC0FFEE, ranges, ..DoneReport::default() }
+    PhotographedReport {
+        system_id: 77,
+        mission_crc: 0xC0FFEE,
+        ranges,
+        ..PhotographedReport::default()
+    }
 }
 
-fn reports(b: &mut Bench, report: &DoneReport) {
+fn reports(b: &mut Bench, report: &PhotographedReport) {
     let mut payload = [0; done::MAX_LEN];
     let len = report.encode(&mut payload);
     tunnels(b, &payload[..len]);
@@ -52,7 +57,10 @@ fn who_comes_late_takes_the_set_of_those_that_fly() {
     let mut bench = over_a_field(Ready);
     knows(&mut bench, 40, 0, false);
     bench.run(1.0);
-    reports(&mut bench, &DoneReport { flies: true, is_left_out_by_plan: true, ..report(20) });
+    reports(
+        &mut bench,
+        &PhotographedReport { flies: true, is_left_out_by_plan: true, ..report(20) },
+    );
     bench.run(1.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
     knows(&mut bench, 60, 0, false);
@@ -76,7 +84,7 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
     // In flight nothing changes the plan.
     bench.start();
-    bench.until(Follow, 30.0);
+    bench.run_until(Follow, 30.0);
     knows(&mut bench, 80, 4, false);
     bench.run(2.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);

@@ -17,7 +17,7 @@ fn gated() -> Bench {
     gated.gates.push(Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
     let mut bench = Bench::new(two_vehicles());
     bench.answer_plan = Some(Ok(gated));
-    bench.until(Ready, 6.0);
+    bench.run_until(Ready, 6.0);
     bench.start();
     bench.run(1.0);
     assert_eq!(bench.state(), Scheduled);
@@ -28,7 +28,7 @@ fn gated() -> Bench {
 fn arming_after(script: impl FnOnce(&mut Bench)) -> Bench {
     let mut bench = to(Streaming);
     script(&mut bench);
-    bench.until(Arming, 6.0);
+    bench.run_until(Arming, 6.0);
     bench
 }
 
@@ -53,7 +53,7 @@ pub(super) fn planned(scenes: &mut Scenes) {
     };
     scenes.play(answered(None), late, Ready, 40.0);
     let start = |b: &mut Bench| {
-        b.until(Ready, 6.0);
+        b.run_until(Ready, 6.0);
         b.start();
     };
     let idle = VehiclePlan { task: Task::Stay, path: Default::default(), ..plan() };
@@ -86,7 +86,7 @@ pub(super) fn started(scenes: &mut Scenes) {
     scenes.play(ready_with(high), Bench::start, Aborted, 1.0);
     let again = |b: &mut Bench| {
         b.start();
-        b.until(Streaming, 3.0);
+        b.run_until(Streaming, 3.0);
         land(b);
         b.start();
     };
@@ -104,7 +104,7 @@ pub(super) fn scheduled(scenes: &mut Scenes) {
     scenes.play(outside, |b| drag(b, Point::x() * -0.4), Aborted, 2.0);
     let hovers_over_the_pad = |b: &mut Bench| {
         b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
-        b.until(Ready, 6.0);
+        b.run_until(Ready, 6.0);
         b.start();
         b.run(25.0);
     };
@@ -114,9 +114,9 @@ pub(super) fn scheduled(scenes: &mut Scenes) {
         let comes_over_the_pad = |b: &mut Bench| {
             b.refused.push(176);
             b.neighbour = on_pad(ON_PLAN);
-            b.until(Ready, 6.0);
+            b.run_until(Ready, 6.0);
             b.start();
-            b.until(state, 10.0);
+            b.run_until(state, 10.0);
             b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
         };
         scenes.play(Bench::new(two_vehicles()), comes_over_the_pad, Scheduled, 2.0);
@@ -162,9 +162,9 @@ pub(super) fn arming(scenes: &mut Scenes) {
 fn arming_held(scenes: &mut Scenes) {
     let comes_after = |b: &mut Bench, steps: u32| {
         b.neighbour = on_pad(ON_PLAN);
-        b.until(Ready, 6.0);
+        b.run_until(Ready, 6.0);
         b.start();
-        b.until(Engaging, 10.0);
+        b.run_until(Engaging, 10.0);
         b.run(0.05 * steps as f32);
         b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
     };
@@ -190,9 +190,9 @@ fn nobody_arms_where_one_beside_was_not_heard_just_now() {
     for steps in 0..50 {
         let mut b = Bench::new(two_vehicles());
         b.neighbour = flies(Point::new(13.0, 12.0, 3.0), ON_PLAN);
-        b.until(Ready, 6.0);
+        b.run_until(Ready, 6.0);
         b.start();
-        b.until(Streaming, 10.0);
+        b.run_until(Streaming, 10.0);
         b.run(0.05 * steps as f32);
         b.neighbour = None;
         let asked = |b: &Bench| b.commands.iter().any(|c| c.0 == 400);

@@ -13,7 +13,7 @@ use super::super::packet::{ACK, NAK, op};
 use super::super::*;
 use crate::link::frame::{self, Framer, Header};
 use crate::storage::store::MAX_READ;
-use crate::testing::fake_flash::{Flash, obey, started};
+use crate::testing::fake_flash::{Flash, execute, started};
 
 const US: (u8, u8) = (7, crate::COMPANION_COMPONENT);
 const LINK: usize = 1;
@@ -119,7 +119,7 @@ impl World {
             let payload = self.under_way.remove(pick);
             let mut bytes = [0; frame::MAX_FRAME_LEN];
             let header = Header { system: self.client.0, component: self.client.1, sequence: 0 };
-            let length = frame::encode_raw(header, MESSAGE, 84, &payload, &mut bytes);
+            let length = frame::encode_raw(header, MESSAGE_ID, 84, &payload, &mut bytes);
             let frame = Framer::new().next(self.now, &mut &bytes[..length]).expect("it is whole");
             self.ftp.queue_request(LINK, self.now, &frame);
         }
@@ -151,7 +151,7 @@ impl World {
                 continue;
             };
             let outcome =
-                obey(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
+                execute(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
             if let Some(answer) = self.store.handle_outcome(outcome.map(|len| &read[..len])) {
                 self.ftp.handle_read_outcome(answer);
             }

@@ -10,7 +10,7 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::field::{self, FieldShape, FieldView};
 use planner_core::frames::Geodetic;
-use planner_core::plan::{Mode, SwarmPlan, VehicleTask};
+use planner_core::plan::{GoalMode, SwarmPlan, VehicleTask};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 use proptest::prelude::*;
 
@@ -26,7 +26,7 @@ const BEFORE: usize = mission_file::HEADER_LEN + 2 * mission_file::VEHICLE_LEN;
 fn mission() -> MissionHeader {
     MissionHeader {
         roadmap_crc: 0,
-        mode: Mode::Labelled,
+        mode: GoalMode::Labelled,
         method: Method::Priority,
         origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
         cruise_mps: 5.0,

@@ -34,7 +34,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         let beyond = (rng.next_u32() % count) as u8;
         let told = Intent {
             points: points.clone(),
-            first_unheard_point: beyond,
+            unheard_point_count: beyond,
             ground_m: 0.0,
             ..intent(0, 1, 2)
         };

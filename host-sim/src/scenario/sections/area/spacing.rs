@@ -29,7 +29,7 @@ pub(super) fn read_camera(value: &Value<'_>) -> Result<Camera> {
             Camera::Diagonal { fov_deg, aspect: table.f32("aspect", 1.5, 0.05..=20.0)? }
         }
     };
-    table.finish()?;
+    table.refuse_unknown_keys()?;
     Ok(camera)
 }
 
