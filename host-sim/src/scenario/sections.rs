@@ -2,6 +2,7 @@
 
 pub(super) mod area;
 mod checks;
+mod obstacles;
 mod simulation;
 mod terrain;
 mod values;
@@ -91,13 +92,10 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
     let mission_table = mission_table.unwrap_or_else(|| empty_table(text, "mission"));
     let (mission, mode_span) = read_mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
     let faults = read_faults(root, &vehicles)?;
-    if let Some(area) = root.get("area") {
-        unsupported.push(unsupported_error(text, &area.span, "[area] beside [map]"));
-    }
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
     match (mission.mode, &mode_span) {
-        (Mode::Coverage, Some(span)) if root.get("area").is_none() => {
-            let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
+        (Mode::Coverage, Some(span)) => {
+            let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
             return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
         }
         (Mode::Formation, Some(span)) => {
