@@ -119,7 +119,7 @@ fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Op
         if zones.iter().any(|zone| crossed(&zone)) {
             all += 1.0;
             let near = |block: &&Block| distance_m([x, y, block[0][2]], block) < 2.0;
-            free += f64::from(u8::from(!tall.iter().any(|block| near(block))));
+            free += f64::from(u8::from(!tall.iter().any(near)));
         }
     }
     (free > 0.5 * all).then(|| format!("{free} of {all} m² of the zones are free"))

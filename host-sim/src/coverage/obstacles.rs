@@ -15,7 +15,6 @@ use planner_core::coverage::Flat;
 use planner_core::voxel::Outside;
 
 use self::polygon::{Polygon, bounding_box, contains, convex_hull, moved_out, with_fewer_corners};
-use super::MAX_CORNERS;
 use crate::capacity::BOARD_CORNERS;
 use crate::map::{ClearanceField, OccupancyMap, Unknown, VoxelMap};
 
@@ -108,12 +107,13 @@ impl Obstacles {
     /// `own` is the number of corners that other no-fly zones have.
     ///
     /// # Errors
-    /// All zones together have more corners than the desk plans around.
+    /// All zones together have more than `most` corners.
     pub fn zones(
         &self,
         floor_m: impl Fn(&Flat) -> f32,
         places: &[Flat],
         own: usize,
+        most: usize,
     ) -> Result<Vec<Vec<Flat>>, TooManyCorners> {
         let columns = Columns::new(&self.map, f64::from(self.clearance_m), floor_m);
         let parts = columns.parts();
@@ -123,8 +123,8 @@ impl Obstacles {
         });
         let corners = |zones: &[Vec<Flat>]| own + zones.iter().map(Vec::len).sum::<usize>();
         let counts = drawn.each_ref().map(|zones| corners(zones));
-        let fits = |most: usize| counts.iter().position(|count| *count <= most);
-        match fits(BOARD_CORNERS).or_else(|| fits(MAX_CORNERS)) {
+        let fits = |limit: usize| counts.iter().position(|count| *count <= limit);
+        match fits(BOARD_CORNERS).or_else(|| fits(most)) {
             Some(index) => Ok(drawn.into_iter().nth(index).unwrap_or_default()),
             None => Err(TooManyCorners(counts[OUTLINES.len() - 1])),
         }

@@ -64,8 +64,9 @@ impl MapBesideArea {
         };
         let Geodetic { lat_deg, lon_deg, alt_m } = origin;
         let hint = format!(
-            "the map is in the area's frame: `origin = {{ lat_deg = {lat_deg}, lon_deg = {lon_deg}, alt_m = {alt_m} }}` \
-             in [map] says so; without area.origin, map.origin is that of both"
+            "the map is in the area's frame: `origin = {{ lat_deg = {lat_deg}, \
+             lon_deg = {lon_deg}, \
+             alt_m = {alt_m} }}` in [map] says so; without area.origin, map.origin is that of both"
         );
         Err(text.with_hint(&self.span, why, hint))
     }
@@ -88,12 +89,13 @@ impl MapBesideArea {
         let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
         let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
         let own = area.rings_of(RingKind::NoFly).map(<[_]>::len).sum();
-        let zones = obstacles.zones(floor_m, &places, own).map_err(|TooManyCorners(corners)| {
+        let zones = obstacles.zones(floor_m, &places, own, MAX_CORNERS);
+        let zones = zones.map_err(|TooManyCorners(corners)| {
             let why = format!(
-                "map.file: no-fly zones have {corners} corners with those around the map's obstacles; at most \
-                 {MAX_CORNERS} can be used"
+                "map.file: no-fly zones have {corners} corners with those around the map's \
+                 obstacles; at most {MAX_CORNERS} can be used"
             );
-            let hint = "a larger map.resolution_m, or a greater area.height_m, makes fewer of them";
+            let hint = "a larger map.resolution_m or a greater area.height_m makes fewer";
             text.with_hint(&self.span, why, hint)
         })?;
         for zone in zones {
@@ -137,7 +139,8 @@ impl Flown<'_> {
             hull.z += vehicle.radius_m;
             let Some(near_m) = obstacles.distance_beside_climb(&hull) else { continue };
             let why = format!(
-                "vehicle {} starts {near_m:.2} m from an obstacle of the map; its climb needs {:.2} m",
+                "vehicle {} starts {near_m:.2} m from an obstacle of the map; \
+                 its climb needs {:.2} m",
                 vehicle.id, obstacles.clearance_m
             );
             let hint =
