@@ -66,7 +66,7 @@ impl DeskFlash {
             }
             FlashRequest::Erase { at } => {
                 self.modify_range(at, DESK_FLASH_LAYOUT.sector_len as usize, |part| {
-                    part.fill(0xFF)
+                    part.fill(0xFF);
                 })?;
             }
             FlashRequest::Program { at, bytes } => self.modify_range(at, bytes.len(), |part| {

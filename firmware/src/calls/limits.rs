@@ -441,11 +441,8 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
         let bounds = MotionBounds { braking, speed_max_mps: p.y, silent_s: p.z };
         let checked = to.call("safety::MotionBounds::check", || bounds.check());
         assert!(checked.is_err() || (stop_m >= 0.0 && hard > 0.0));
-        let sane = MotionBounds {
-            braking: Braking { accel_mps2: 1.5, jerk_mps3: 4.0 },
-            speed_max_mps: 2.0,
-            silent_s: 45.0,
-        };
+        let braking = Braking { accel_mps2: 1.5, jerk_mps3: 4.0 };
+        let sane = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 45.0 };
         let ahead: Vec<Point, 12> =
             extreme_points().chain(extreme_points()).skip(i).take(12).collect();
         let own = [
@@ -455,6 +452,10 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             }),
             to.call("safety::ReachableSet::vertical", || ReachableSet::vertical(p, hard)),
         ];
+        let mut further = own[0].clone();
+        to.call("safety::ReachableSet::extend_along", || {
+            further.extend_along(ahead.iter().copied(), hard);
+        });
         for bounds in [bounds, sane] {
             let heard = NeighbourMotion {
                 position: p,

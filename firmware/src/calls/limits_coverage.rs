@@ -9,7 +9,7 @@ use planner_core::coverage::pack::{
 use planner_core::coverage::powell::{self, powell};
 use planner_core::coverage::tracks::{self, Lane, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
-use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
+use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, given, sweep};
 use planner_core::flight::{WaypointRange, WaypointSet};
 
 use super::limits_cameras::{SPACING, call_cameras};
@@ -227,6 +227,7 @@ fn call_lanes(
             }
         }
     }
+    call_given_lanes(to, transit, tracks);
     let many = LanePattern { spacing: Spacing { lane_m: 1.0, ..SPACING }, ..PATTERN };
     assert_eq!(
         tracks::build_lanes(area, &many, transit, build, tracks),
@@ -234,6 +235,25 @@ fn call_lanes(
     );
     assert_eq!(tracks::build_lanes(area, &PATTERN, transit, build, tracks), Ok(()));
     call_waypoint_numbers(to, tracks);
+}
+
+/// Calls with lanes of another tool: none, parallel ones, and ones with extreme ends.
+fn call_given_lanes(
+    to: &mut Results<'_, impl Listener>,
+    transit: &ZoneTransit<'_>,
+    tracks: &mut Lanes,
+) {
+    let lane = |x: f32, y: f32| [Flat::new(0.0, y), Flat::new(x, y)];
+    for hard in HARD_NUMBERS {
+        let lanes = [lane(30.0, 0.0), lane(30.0, 8.0), lane(hard, 16.0), lane(9.0, hard)];
+        for count in [0, 2, 3, 4] {
+            let ordered = to.call("given::order_given_lanes", || {
+                given::order_given_lanes(&lanes[..count], &SPACING, 100, transit, tracks)
+            });
+            to.add_bool(ordered.is_ok());
+            assert!(count > 2 || ordered.is_ok() == (count == 2));
+        }
+    }
 }
 
 /// Calls with waypoint numbers that exist and that do not.

@@ -129,7 +129,7 @@ pub fn flight_items(
         let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
         match (stop.action, planned.area_settings.trigger) {
             (StopAction::Pad, _) => {
-                items.push(MissionItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]))
+                items.push(MissionItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]));
             }
             (StopAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));

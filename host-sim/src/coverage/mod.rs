@@ -9,6 +9,7 @@ pub mod flight;
 pub mod flown;
 pub mod heights;
 pub mod kept;
+pub mod obstacles;
 pub mod page;
 pub mod parts;
 mod planned;
@@ -450,6 +451,10 @@ fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize)
             format!(
                 "no-fly zones have more than {MAX_CORNERS} outward corners\nhint: draw them with fewer"
             )
+        }
+        CoverageError::NothingToCover if wanted.obstacles.is_some() => {
+            "no-fly zones hold the whole area: the map's obstacles are as high as the pictures\nhint: a greater height_m"
+                .to_owned()
         }
         CoverageError::NothingToCover => "no-fly zones hold the whole area".to_owned(),
         CoverageError::InsideNoFly(index) => format!("vehicle {index} starts inside a no-fly zone"),

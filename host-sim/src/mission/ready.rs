@@ -128,11 +128,13 @@ impl Mission {
 
     /// Height of the ground on which a vehicle that sinks vertically from `place` would come to
     /// stand, metres ENU; `None` where the map has no ground below. Over terrain it is the
-    /// terrain's.
+    /// terrain's, and beside an area's map the top of an obstacle.
     pub fn ground_below(&self, place: &Point) -> Option<f32> {
         let below_m = self.map.ground_below(place)?;
-        let terrain = self.scenario.area.as_ref().and_then(|area| area.terrain.as_ref());
-        Some(terrain.and_then(|terrain| terrain.grid.height_at(&place.xy())).unwrap_or(below_m))
+        let Some(area) = &self.scenario.area else { return Some(below_m) };
+        let terrain_m = area.terrain.as_ref().and_then(|t| t.grid.height_at(&place.xy()));
+        let top_m = area.obstacles.as_ref().and_then(|o| o.map.ground_below(place));
+        Some(terrain_m.unwrap_or(below_m).max(top_m.unwrap_or(f32::NEG_INFINITY)))
     }
 
     /// Numbers of nodes and edges, and bytes, of the roadmap.

@@ -12,6 +12,7 @@ use planner_core::file::FileError;
 pub use planner_core::flight::Trigger;
 use planner_core::frames::Geodetic;
 
+use crate::coverage::obstacles::Obstacles;
 use crate::terrain::HeightGrid;
 
 /// Hint of an error about a vehicle whose start is not on the ground.
@@ -42,6 +43,8 @@ pub struct Area {
     pub heights: Heights,
     /// Heights of the ground; `None` over level ground.
     pub terrain: Option<Terrain>,
+    /// Obstacles of `[map]`, around which `rings` has no-fly zones; `None` without a map.
+    pub obstacles: Option<Arc<Obstacles>>,
     /// Direction of the lanes, degrees counter-clockwise from east; `None`: the plan chooses it.
     pub angle_deg: Option<f32>,
     /// How far beyond the area's edge lanes begin and end, metres.
@@ -85,6 +88,13 @@ impl Area {
     /// map.
     pub fn ground_m(&self, place: &Flat) -> f32 {
         self.terrain.as_ref().and_then(|terrain| terrain.grid.height_at(place)).unwrap_or(0.0)
+    }
+
+    /// The lowest ground within about `around_m` of a place, metres above the origin.
+    pub fn lowest_ground_m(&self, place: &Flat, around_m: f32) -> f32 {
+        let steps = [-around_m, -around_m / 2.0, 0.0, around_m / 2.0, around_m];
+        let near = steps.into_iter().flat_map(|x| steps.map(|y| place + Flat::new(x, y)));
+        near.map(|near| self.ground_m(&near)).fold(f32::INFINITY, f32::min)
     }
 
     /// Vertices of the rings of one kind.

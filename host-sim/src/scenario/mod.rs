@@ -53,12 +53,11 @@ pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
     read(text, name, Path::new(""))
 }
 
-/// Reads a scenario's text: a coverage mission if it has `[area]` and no `[map]`, else one with
-/// goals.
+/// Reads a scenario's text: a coverage mission if it has `[area]`, else one with goals.
 fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
     let text = reader::Text { file, text };
-    sections::read_root(text, |root| match (root.get("map"), root.get("area")) {
-        (None, Some(_)) => sections::area::read_coverage_scenario(text, root, folder),
-        _ => sections::goals::goals_mission(text, root, folder),
+    sections::read_root(text, |root| match root.get("area") {
+        Some(_) => sections::area::read_coverage_scenario(text, root, folder),
+        None => sections::goals::goals_mission(text, root, folder),
     })
 }

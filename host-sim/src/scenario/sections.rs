@@ -3,6 +3,7 @@
 pub(super) mod area;
 mod checks;
 pub(super) mod goals;
+mod obstacles;
 mod simulation;
 mod terrain;
 mod values;

@@ -261,7 +261,6 @@ fn what_is_missing_altogether_is_said() {
 #[test]
 fn what_is_not_built_yet_is_refused_by_name() {
     let cases = [
-        ("[mission]", "[area]\nheight_m = 20\n[mission]", "not available yet: [area] beside [map]"),
         ("[mission]", "[formation]\npure = true\n[mission]", "not available yet: [formation]"),
         ("[mission]", "[mission]\nmode = \"formation\"", "not available yet: this mission.mode"),
         ("id = 2", "id = 2\nendurance_s = 900", "not available yet: endurance_s"),

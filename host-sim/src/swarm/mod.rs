@@ -217,6 +217,7 @@ impl<'a> SimulationRun<'a> {
         );
         referee.terrain =
             scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
+        referee.walls = scenario.area.as_ref().and_then(|area| area.obstacles.as_deref());
         // Lanes of two vehicles may lie side by side, and one vehicle waits for as long as the
         // other one is on its lanes: that is no deadlock.
         referee.retracts_ended_deadlocks = !scenario.faults.is_empty() || scenario.area.is_some();

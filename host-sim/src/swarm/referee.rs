@@ -10,6 +10,7 @@ use planner_core::Point;
 use planner_core::segment::point_clearance;
 use planner_core::voxel::VoxelGrid;
 
+use crate::coverage::obstacles::Obstacles;
 use crate::map::edt::ClearanceField;
 use crate::terrain::HeightGrid;
 
@@ -88,6 +89,8 @@ pub struct Referee<'a> {
     field: &'a ClearanceField,
     /// Height of uneven ground, which the grid does not hold; `None` over level ground.
     pub terrain: Option<&'a HeightGrid>,
+    /// Obstacles of the map beside an area, which the grid does not hold; `None` without one.
+    pub walls: Option<&'a Obstacles>,
     safety_distance_m: f32,
     vehicles: Vec<WatchedVehicle>,
     too_near: Vec<bool>,
@@ -140,6 +143,7 @@ impl<'a> Referee<'a> {
             grid,
             field,
             terrain: None,
+            walls: None,
             safety_distance_m,
             vehicles: vehicles.iter().map(watched).collect(),
             too_near: vec![false; vehicles.len() * vehicles.len()],
@@ -216,9 +220,9 @@ impl<'a> Referee<'a> {
             }
             None => (0.0, f32::INFINITY),
         };
-        let touches = if at_least_m < wanted && self.field.lower_bound_m(&now.position) < wanted {
+        let touches = if at_least_m < wanted && self.lower_bound_m(&now.position) < wanted {
             let reach = wanted.min(MAX_MEASURED_CLEARANCE_M);
-            let clearance_m = point_clearance(&self.grid, &now.position, reach.min(at_most_m));
+            let clearance_m = self.measure_m(&now.position, reach.min(at_most_m));
             if clearance_m < reach {
                 self.vehicles[i].measured = Some((now.position, clearance_m));
             }
@@ -248,31 +252,25 @@ impl<'a> Referee<'a> {
         }
     }
 
+    /// Lower bound of the distance to the nearest obstacle, metres.
+    fn lower_bound_m(&self, place: &Point) -> f32 {
+        let walls_m = self.walls.map(|walls| walls.clearance_field().lower_bound_m(place));
+        walls_m.unwrap_or(f32::INFINITY).min(self.field.lower_bound_m(place))
+    }
+
+    /// Distance to the nearest obstacle, metres; `reach` if none is nearer.
+    fn measure_m(&self, place: &Point, reach: f32) -> f32 {
+        let nearest_m = point_clearance(&self.grid, place, reach);
+        self.walls.map_or(nearest_m, |walls| {
+            nearest_m.min(point_clearance(&walls.map.grid(), place, reach))
+        })
+    }
+
     /// Whether a body on or near the floor touches an obstacle cell whose top is above its centre.
     fn touches_beside(&self, position: &Point, radius_m: f32) -> bool {
-        let shape = self.grid.shape();
-        let reach = Point::repeat(radius_m);
-        let cell = |p: Point| {
-            [0, 1, 2].map(|a| ((p[a] - shape.min[a]) / shape.resolution_m).floor() as i64)
-        };
-        let (low, high) = (cell(position - reach), cell(position + reach));
-        let dims = shape.dims.map(i64::from);
-        let inside = |c: [i64; 3]| (0..3).all(|a| c[a] >= 0 && c[a] < dims[a]);
-        (low[2]..=high[2]).any(|k| {
-            (low[1]..=high[1]).any(|j| {
-                (low[0]..=high[0]).any(|i| {
-                    if !inside([i, j, k]) || !self.grid.is_occupied([i, j, k].map(|c| c as u32)) {
-                        return false;
-                    }
-                    let corner =
-                        shape.min + Point::new(i as f32, j as f32, k as f32) * shape.resolution_m;
-                    let top = corner.z + shape.resolution_m;
-                    let nearest =
-                        position.sup(&corner).inf(&(corner + Point::repeat(shape.resolution_m)));
-                    top > position.z && (nearest - position).norm() < radius_m - CONTACT_ROUNDING_M
-                })
-            })
-        })
+        let walls = self.walls.map(|walls| walls.map.grid());
+        let mut grids = walls.iter().chain([&self.grid]);
+        grids.any(|grid| touches_cell_beside(grid, position, radius_m))
     }
 
     fn watch_pairs(&mut self, t_s: f64, seen: &[Observation]) {
@@ -362,6 +360,32 @@ impl<'a> Referee<'a> {
             self.incidents.push((t_s, i, no_progress()));
         }
     }
+}
+
+/// Whether a body touches an obstacle cell of this grid whose top is above its centre.
+fn touches_cell_beside(grid: &VoxelGrid<'_>, position: &Point, radius_m: f32) -> bool {
+    let shape = grid.shape();
+    let reach = Point::repeat(radius_m);
+    let cell =
+        |p: Point| [0, 1, 2].map(|a| ((p[a] - shape.min[a]) / shape.resolution_m).floor() as i64);
+    let (low, high) = (cell(position - reach), cell(position + reach));
+    let dims = shape.dims.map(i64::from);
+    let inside = |c: [i64; 3]| (0..3).all(|a| c[a] >= 0 && c[a] < dims[a]);
+    (low[2]..=high[2]).any(|k| {
+        (low[1]..=high[1]).any(|j| {
+            (low[0]..=high[0]).any(|i| {
+                if !inside([i, j, k]) || !grid.is_occupied([i, j, k].map(|c| c as u32)) {
+                    return false;
+                }
+                let corner =
+                    shape.min + Point::new(i as f32, j as f32, k as f32) * shape.resolution_m;
+                let top = corner.z + shape.resolution_m;
+                let nearest =
+                    position.sup(&corner).inf(&(corner + Point::repeat(shape.resolution_m)));
+                top > position.z && (nearest - position).norm() < radius_m - CONTACT_ROUNDING_M
+            })
+        })
+    })
 }
 
 fn no_progress() -> String {

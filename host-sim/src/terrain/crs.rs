@@ -129,7 +129,7 @@ impl Crs {
     }
 
     /// A place in the mission frame as the file's coordinates; `None` outside the system's domain.
-    pub(super) fn from_mission(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
+    pub(super) fn at_mission_place(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
         match self {
             Self::Unstated => Some([f64::from(place.x), f64::from(place.y)]),
             Self::Stated(system) => {

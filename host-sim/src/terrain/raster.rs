@@ -89,7 +89,7 @@ impl Raster {
 
     /// The height of the file's cell at a place; `None` where it has none, and outside the file.
     pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
-        let [column, row] = self.cell_coordinates(self.crs.from_mission(origin, place)?);
+        let [column, row] = self.cell_coordinates(self.crs.at_mission_place(origin, place)?);
         let inside =
             column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         let height_m =
@@ -133,7 +133,7 @@ impl Raster {
             shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t)))
         });
         let cells = places.filter_map(|place| {
-            Some(self.cell_coordinates(self.crs.from_mission(origin, &place)?))
+            Some(self.cell_coordinates(self.crs.at_mission_place(origin, &place)?))
         });
         let [from, to] = cells.map(|cell| [cell, cell]).reduce(|a, b| {
             let pick =

@@ -146,7 +146,7 @@ impl<'a> World<'a> {
             MeetingEvent::Pause => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
             MeetingEvent::Resume => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
             MeetingEvent::Return => {
-                self.command(vehicle, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0)
+                self.command(vehicle, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0);
             }
             MeetingEvent::Land => self.command(vehicle, MavCmd::MAV_CMD_NAV_LAND, 0.0),
             MeetingEvent::PilotTakes(velocity) if airborne => member.autopilot.take_over(velocity),

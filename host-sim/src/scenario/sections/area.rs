@@ -11,6 +11,7 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 
 use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
+use super::obstacles::{Flown, MapBesideArea};
 use super::terrain::TerrainFile;
 use super::{
     Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults,
@@ -42,6 +43,12 @@ enum Coordinates {
     Metres,
 }
 
+/// The map of a mission without one: level ground.
+fn level_ground(origin: Geodetic) -> Map {
+    let file = String::new();
+    Map { file, resolution_m: LEVEL_GROUND_CELL_M, unknown: Unknown::Free, origin }
+}
+
 /// Reads the scenario of a coverage mission.
 pub(in crate::scenario) fn read_coverage_scenario(
     text: Text<'_>,
@@ -51,7 +58,9 @@ pub(in crate::scenario) fn read_coverage_scenario(
     let Common { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_STRAY_OVER_FIELDS_M, DEFAULT_AREA_TIME_LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-    let (mut area, terrain) = read_area(&root.required("area", hint)?.table()?, folder)?;
+    let map = MapBesideArea::from_root(root, folder)?;
+    let origin = map.as_ref().and_then(MapBesideArea::origin);
+    let (mut area, terrain) = read_area(&root.required("area", hint)?.table()?, folder, origin)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     let mut unsupported = Vec::new();
     let mut vehicles =
@@ -85,16 +94,16 @@ pub(in crate::scenario) fn read_coverage_scenario(
         &simulation,
         &vehicles,
     );
+    if let Some(map) = &map {
+        let (vehicles, spans) = (&vehicles[..], &spans[..]);
+        let (simulation, deconfliction, roadmap) = (&simulation, &deconfliction, &roadmap);
+        map.apply(text, &mut area, &Flown { vehicles, spans, simulation, deconfliction, roadmap })?;
+    }
     Ok(Scenario {
         path: text.file.to_owned(),
         text: text.text.to_owned(),
         seed,
-        map: Map {
-            file: String::new(),
-            resolution_m: LEVEL_GROUND_CELL_M,
-            unknown: Unknown::Free,
-            origin: area.origin,
-        },
+        map: level_ground(area.origin),
         roadmap,
         mission,
         vehicle_places,
@@ -183,9 +192,14 @@ fn read_coverage_mission(
 }
 
 /// Reads the area, and which file has the heights of the ground below it, if any.
-fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)> {
+/// `origin` is that of the map beside it, if it is given.
+fn read_area(
+    table: &Table<'_>,
+    folder: &Path,
+    origin: Option<Geodetic>,
+) -> Result<(Area, Option<TerrainFile>)> {
     let (polygons, coordinates, source) = read_polygons(table, folder)?;
-    let given = table.get("origin").map(|v| read_geodetic(&v)).transpose()?;
+    let given = table.get("origin").map(|v| read_geodetic(&v)).transpose()?.or(origin);
     let first = polygons.outers[0][0];
     let mut origin = given.unwrap_or(match coordinates {
         Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
@@ -212,6 +226,7 @@ fn read_area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFi
         height_m,
         heights: Heights { mission_m: height_m, layer_m },
         terrain: None,
+        obstacles: None,
         angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
         batteries: table.boolean("batteries")?,

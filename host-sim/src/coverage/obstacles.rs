@@ -1,0 +1,325 @@
+//! The obstacles of a map that is given beside an area, and the no-fly zones around them.
+//!
+//! Method: a column of the map is blocked if an obstacle in it reaches up to where vehicles fly.
+//! Blocked columns between which no vehicle would fit belong together. Around the columns that do,
+//! a zone is their convex hull, moved out by the required clearance. A zone of which too large a
+//! share could be flown over is split in half, again and again: a wall around a field is no field.
+//! Zones may overlap. Metres, ENU in the mission frame.
+
+mod polygon;
+
+use std::sync::OnceLock;
+
+use planner_core::Point;
+use planner_core::coverage::Flat;
+use planner_core::voxel::Outside;
+
+use self::polygon::{Polygon, bounding_box, contains, convex_hull, moved_out, with_fewer_corners};
+use crate::capacity::BOARD_CORNERS;
+use crate::map::{ClearanceField, OccupancyMap, Unknown, VoxelMap};
+
+/// Height above the ground up to which the map's cells count as ground, metres.
+const ROUGH_GROUND_M: f32 = 0.5;
+/// Added to the clearance of zones against rounding, metres.
+const ROUNDING_M: f64 = 0.01;
+/// Most corners of a zone that is not a box.
+const MAX_ZONE_CORNERS: usize = 8;
+/// Distance from area and pads within which zones are kept, metres.
+const NEAR_M: f32 = 30.0;
+/// Distance from a kept zone within which other zones are kept, metres.
+const NEAR_ZONE_M: f32 = 5.0;
+
+/// How zones are drawn: the first has the least area, the last the fewest corners.
+const OUTLINES: [Outline; 2] =
+    [Outline { boxes: false, free_share: 0.3 }, Outline { boxes: true, free_share: 0.5 }];
+
+/// How zones are drawn around blocked columns.
+#[derive(Clone, Copy)]
+struct Outline {
+    /// Boxes along the axes, in place of convex hulls.
+    boxes: bool,
+    /// Greatest share of a zone that could be flown over.
+    free_share: f64,
+}
+
+/// The zones have more corners than can be planned around: so many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyCorners(pub usize);
+
+/// The obstacles of a map above the ground.
+#[derive(Debug)]
+pub struct Obstacles {
+    /// The map, without the cells that count as ground; beyond its faces all is free.
+    pub map: VoxelMap,
+    /// Horizontal distance that paths keep from obstacles at their height, metres.
+    pub clearance_m: f32,
+    field: OnceLock<ClearanceField>,
+}
+
+impl Obstacles {
+    /// The obstacles of a map; `ground_m` is the height of the ground at a place.
+    pub fn new(
+        map: &OccupancyMap,
+        unknown: Unknown,
+        clearance_m: f32,
+        ground_m: impl Fn(&Flat) -> f32,
+    ) -> Self {
+        let mut map = VoxelMap {
+            seen_obstacle_words: None,
+            never_sample_words: None,
+            outside: Outside::Free,
+            ..map.voxel_map(unknown)
+        };
+        let shape = map.shape;
+        let is_ground = |cell: &[u32; 3]| {
+            let centre = shape.center(*cell);
+            centre.z + shape.resolution_m / 2.0 <= ground_m(&centre.xy()) + ROUGH_GROUND_M
+        };
+        let ground: Vec<_> = occupied_cells(&map).filter(is_ground).collect();
+        for cell in ground {
+            let (word, mask) = shape.word_and_mask(cell);
+            map.obstacle_words[word] &= !mask;
+        }
+        Self { map, clearance_m, field: OnceLock::new() }
+    }
+
+    /// Lower bounds of the distance to the nearest obstacle; computed at the first call.
+    pub fn clearance_field(&self) -> &ClearanceField {
+        self.field.get_or_init(|| ClearanceField::new(&self.map.grid()))
+    }
+
+    /// Horizontal distance from a vehicle that climbs from `place` to the nearest obstacle beside
+    /// or above it, metres; `None` if it has the clearance.
+    pub fn distance_beside_climb(&self, place: &Point) -> Option<f32> {
+        let shape = &self.map.shape;
+        let half = Flat::repeat(shape.resolution_m / 2.0);
+        let distance_m = |cell: [u32; 3]| {
+            let centre = shape.center(cell);
+            let beside = ((centre - place).xy().abs() - half).sup(&Flat::zeros());
+            (centre.z + half.x > place.z).then(|| beside.norm())
+        };
+        let nearest_m =
+            occupied_cells(&self.map).filter_map(distance_m).fold(f32::INFINITY, f32::min);
+        (nearest_m < self.clearance_m).then_some(nearest_m)
+    }
+
+    /// Zones around the obstacles that reach above `floor_m` of their place and are near `places`.
+    /// `own` is the number of corners that other no-fly zones have.
+    ///
+    /// # Errors
+    /// All zones together have more than `most` corners.
+    pub fn zones(
+        &self,
+        floor_m: impl Fn(&Flat) -> f32,
+        places: &[Flat],
+        own: usize,
+        most: usize,
+    ) -> Result<Vec<Vec<Flat>>, TooManyCorners> {
+        let columns = Columns::new(&self.map, f64::from(self.clearance_m), floor_m);
+        let parts = columns.parts();
+        let drawn = OUTLINES.map(|outline| {
+            let zones = parts.iter().flat_map(|part| columns.zones_around(part, &outline));
+            near_zones(zones.map(|zone| to_flat(&zone)).collect(), places)
+        });
+        let corners = |zones: &[Vec<Flat>]| own + zones.iter().map(Vec::len).sum::<usize>();
+        let counts = drawn.each_ref().map(|zones| corners(zones));
+        let fits = |limit: usize| counts.iter().position(|count| *count <= limit);
+        match fits(BOARD_CORNERS).or_else(|| fits(most)) {
+            Some(index) => Ok(drawn.into_iter().nth(index).unwrap_or_default()),
+            None => Err(TooManyCorners(counts[OUTLINES.len() - 1])),
+        }
+    }
+}
+
+/// The occupied cells of a map.
+fn occupied_cells(map: &VoxelMap) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let [bx, by, _] = map.shape.bricks();
+    let bricks = map.obstacle_words.iter().zip(0u32..).filter(|(word, _)| **word != 0);
+    bricks.flat_map(move |(&word, at)| {
+        let [i, j, k] = [at % bx, at / bx % by, at / (bx * by)].map(|brick| brick * 4);
+        let bits = (0..64).filter(move |bit| word >> bit & 1 == 1);
+        bits.map(move |bit| [i + bit % 4, j + bit / 4 % 4, k + bit / 16])
+    })
+}
+
+fn to_flat(polygon: &Polygon) -> Vec<Flat> {
+    polygon.iter().map(|[x, y]| Flat::new(*x as f32, *y as f32)).collect()
+}
+
+/// The zones that may matter to flights between `places`: those near them, and those near these.
+fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat]) -> Vec<Vec<Flat>> {
+    let extent = |points: &[Flat], around_m: f32| {
+        let start = [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)];
+        let [low, high] = points.iter().fold(start, |[low, high], p| [low.inf(p), high.sup(p)]);
+        [low - Flat::repeat(around_m), high + Flat::repeat(around_m)]
+    };
+    let mut reach = extent(places, NEAR_M);
+    let mut kept = Vec::new();
+    loop {
+        let is_near = |zone: &mut Vec<Flat>| {
+            let [low, high] = extent(zone, 0.0);
+            (0..2).all(|axis| low[axis] <= reach[1][axis] && high[axis] >= reach[0][axis])
+        };
+        let near: Vec<_> = zones.extract_if(.., is_near).collect();
+        if near.is_empty() {
+            return kept;
+        }
+        for zone in &near {
+            let [low, high] = extent(zone, NEAR_ZONE_M);
+            reach = [reach[0].inf(&low), reach[1].sup(&high)];
+        }
+        kept.extend(near);
+    }
+}
+
+/// The columns of a map, with room around it for the clearance.
+struct Columns {
+    size: [usize; 2],
+    low: [f64; 2],
+    cell_m: f64,
+    clearance_m: f64,
+    /// Columns with an obstacle that reaches up to where vehicles fly.
+    blocked: Vec<bool>,
+    /// Columns whose middle is nearer to a blocked one than the clearance.
+    grown: Vec<bool>,
+}
+
+/// Indices of a column, east and north.
+type Column = [usize; 2];
+
+impl Columns {
+    fn new(map: &VoxelMap, clearance_m: f64, floor_m: impl Fn(&Flat) -> f32) -> Self {
+        let cell_m = f64::from(map.shape.resolution_m);
+        let around = (clearance_m / cell_m).ceil() as usize + 1;
+        let size = [0, 1].map(|axis| map.shape.dims[axis] as usize + 2 * around);
+        let low = [0, 1].map(|axis| f64::from(map.shape.min[axis]) - around as f64 * cell_m);
+        let free = vec![false; size[0] * size[1]];
+        let mut columns =
+            Self { size, low, cell_m, clearance_m, blocked: free.clone(), grown: free };
+        for cell in occupied_cells(map) {
+            let at = columns.index([0, 1].map(|axis| cell[axis] as usize + around));
+            let centre = map.shape.center(cell);
+            let top_m = centre.z + map.shape.resolution_m / 2.0;
+            columns.blocked[at] = columns.blocked[at] || top_m > floor_m(&centre.xy());
+        }
+        columns.grow(around);
+        columns
+    }
+
+    fn index(&self, [i, j]: Column) -> usize {
+        j * self.size[0] + i
+    }
+
+    fn all(&self) -> impl Iterator<Item = Column> + use<> {
+        let [wide, tall] = self.size;
+        (0..tall).flat_map(move |j| (0..wide).map(move |i| [i, j]))
+    }
+
+    /// The columns around one, itself included.
+    fn around(&self, [i, j]: Column) -> impl Iterator<Item = Column> + use<> {
+        let [wide, tall] = self.size;
+        let near = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
+        near(j, tall).flat_map(move |j| near(i, wide).map(move |i| [i, j]))
+    }
+
+    /// Marks the grown columns, which lie at most `around` columns from a blocked one.
+    fn grow(&mut self, around: usize) {
+        let gap_m = |apart: isize| (apart.unsigned_abs() as f64 - 0.5).max(0.0) * self.cell_m;
+        let reach = around as isize;
+        let steps = (-reach..=reach).flat_map(|j| (-reach..=reach).map(move |i| [i, j]));
+        let near: Vec<[isize; 2]> =
+            steps.filter(|[i, j]| gap_m(*i).hypot(gap_m(*j)) <= self.clearance_m).collect();
+        self.grown.clone_from(&self.blocked);
+        for column in self.all() {
+            // Only from the columns at the edge: what is beside the others is blocked.
+            let is_blocked = |column: Column| self.blocked[self.index(column)];
+            if !is_blocked(column) || self.around(column).all(is_blocked) {
+                continue;
+            }
+            for [i, j] in &near {
+                let to = [column[0].wrapping_add_signed(*i), column[1].wrapping_add_signed(*j)];
+                let at = self.index(to);
+                self.grown[at] = true;
+            }
+        }
+    }
+
+    /// The blocked columns, in parts whose grown columns touch.
+    fn parts(&self) -> Vec<Vec<Column>> {
+        let mut left = self.grown.clone();
+        let mut parts = Vec::new();
+        for first in self.all() {
+            if !std::mem::take(&mut left[self.index(first)]) {
+                continue;
+            }
+            let (mut part, mut open) = (Vec::new(), vec![first]);
+            while let Some(column) = open.pop() {
+                if self.blocked[self.index(column)] {
+                    part.push(column);
+                }
+                for beside in self.around(column) {
+                    if std::mem::take(&mut left[self.index(beside)]) {
+                        open.push(beside);
+                    }
+                }
+            }
+            parts.push(part);
+        }
+        parts
+    }
+
+    /// Zones that together hold these columns and the clearance around them.
+    fn zones_around(&self, part: &[Column], outline: &Outline) -> Vec<Polygon> {
+        let place = |[i, j]: [usize; 2]| {
+            [self.low[0] + i as f64 * self.cell_m, self.low[1] + j as f64 * self.cell_m]
+        };
+        let corners = part
+            .iter()
+            .flat_map(|&[i, j]| [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]].map(place));
+        let hull = convex_hull(corners.collect());
+        let inner = match outline.boxes {
+            true => bounding_box(&hull),
+            false => with_fewer_corners(hull, MAX_ZONE_CORNERS),
+        };
+        let zone = moved_out(&inner, self.clearance_m + ROUNDING_M);
+        if self.free_share(&zone) <= outline.free_share {
+            return vec![zone];
+        }
+        let range = |axis: usize| {
+            let along = || part.iter().map(move |column| column[axis]);
+            (along().min().unwrap_or(0), along().max().unwrap_or(0))
+        };
+        let (east, north) = (range(0), range(1));
+        let axis = usize::from(north.1 - north.0 > east.1 - east.0);
+        let (first, last) = [east, north][axis];
+        if first == last {
+            return vec![zone];
+        }
+        let middle = (first + last).div_ceil(2);
+        let (before, after): (Vec<_>, Vec<_>) =
+            part.iter().partition(|column| column[axis] < middle);
+        [before, after].iter().flat_map(|half| self.zones_around(half, outline)).collect()
+    }
+
+    /// Share of a zone that could be flown over: its columns that are not grown.
+    fn free_share(&self, zone: &Polygon) -> f64 {
+        let box_of = bounding_box(zone);
+        let [from, to] = [box_of[0], box_of[2]].map(|corner| {
+            [0, 1].map(|axis| ((corner[axis] - self.low[axis]) / self.cell_m).floor() as isize)
+        });
+        let is_grown = |column: [isize; 2]| {
+            let inside = (0..2).all(|a| column[a] >= 0 && column[a] < self.size[a] as isize);
+            inside && self.grown[self.index(column.map(|index| index as usize))]
+        };
+        let (mut all, mut free) = (0.0, 0.0);
+        for column in (from[1]..=to[1]).flat_map(|j| (from[0]..=to[0]).map(move |i| [i, j])) {
+            let middle =
+                [0, 1].map(|axis| self.low[axis] + (column[axis] as f64 + 0.5) * self.cell_m);
+            if contains(zone, &middle) {
+                all += 1.0;
+                free += f64::from(u8::from(!is_grown(column)));
+            }
+        }
+        if all > 0.0 { free / all } else { 0.0 }
+    }
+}

@@ -1,0 +1,152 @@
+//! Reads `[map]` beside `[area]`: its obstacles become no-fly zones.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use companion::margins::TRACKING_M;
+use planner_core::coverage::area::{self, Ring, RingKind};
+use planner_core::frames::Geodetic;
+
+use super::checks::VehicleSpans;
+use super::{DEFAULT_ORIGIN, read_map};
+use crate::coverage::MAX_CORNERS;
+use crate::coverage::obstacles::{Obstacles, TooManyCorners};
+use crate::map::{self, Unknown};
+use crate::margins;
+use crate::scenario::coverage::Area;
+use crate::scenario::reader::{Result, Span, Table, Text};
+use crate::scenario::{Deconfliction, Map, Roadmap, Simulation, Vehicle};
+
+/// The map that stands beside an area, not yet read.
+pub(super) struct MapBesideArea {
+    map: Map,
+    span: Span,
+    has_origin: bool,
+}
+
+/// What the distance from obstacles depends on.
+pub(super) struct Flown<'a> {
+    pub(super) vehicles: &'a [Vehicle],
+    pub(super) spans: &'a [VehicleSpans],
+    pub(super) simulation: &'a Simulation,
+    pub(super) deconfliction: &'a Deconfliction,
+    pub(super) roadmap: &'a Roadmap,
+}
+
+impl MapBesideArea {
+    /// `[map]`, if the scenario has one. Space that the map does not know is free unless it says
+    /// otherwise.
+    pub(super) fn from_root(root: &Table<'_>, folder: &Path) -> Result<Option<Self>> {
+        let Some(value) = root.get("map") else { return Ok(None) };
+        let table = value.table()?;
+        let (mut map, has_origin) = read_map(&table, folder)?;
+        if table.get("unknown").is_none() {
+            map.unknown = Unknown::Free;
+        }
+        let span = table.get("file").map_or(value.span, |file| file.span);
+        Ok(Some(Self { map, span, has_origin }))
+    }
+
+    /// The map's origin, if it is given.
+    pub(super) fn origin(&self) -> Option<Geodetic> {
+        self.has_origin.then_some(self.map.origin)
+    }
+
+    /// Refuses a map whose frame is not that of the mission, or may be another one.
+    fn check_origin(&self, text: Text<'_>, origin: &Geodetic) -> Result<()> {
+        let same = self.map.origin == *origin;
+        let why = match (self.has_origin, same) {
+            (true, true) => return Ok(()),
+            (true, false) => "map.origin is not area.origin",
+            // Metres about the test field, like the map.
+            (false, _) if *origin == DEFAULT_ORIGIN => return Ok(()),
+            (false, _) => "map.origin is missing",
+        };
+        let Geodetic { lat_deg, lon_deg, alt_m } = origin;
+        let hint = format!(
+            "the map is in the area's frame: `origin = {{ lat_deg = {lat_deg}, \
+             lon_deg = {lon_deg}, \
+             alt_m = {alt_m} }}` in [map] says so; without area.origin, map.origin is that of both"
+        );
+        Err(text.with_hint(&self.span, why, hint))
+    }
+
+    /// Reads the map, and adds its obstacles to the area as no-fly zones.
+    pub(super) fn apply(&self, text: Text<'_>, area: &mut Area, flown: &Flown<'_>) -> Result<()> {
+        self.check_origin(text, &area.origin)?;
+        let map = map::load(&self.map.file, self.map.resolution_m)
+            .map_err(|error| text.error(&self.span, format!("map.file: {error}")))?;
+        let clearance_m = flown.clearance_m();
+        let place_ground = |place: &_| area.ground_m(place);
+        let obstacles = Obstacles::new(&map, self.map.unknown, clearance_m, place_ground);
+        drop(map);
+        flown.check_climbs(text, &obstacles)?;
+        let below_m = flown.clearance_below_m().max(clearance_m);
+        let floor_m = |place: &_| match area.terrain {
+            None => area.heights.mission_m - below_m,
+            Some(_) => area.lowest_ground_m(place, clearance_m) + area.height_m - below_m,
+        };
+        let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
+        let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
+        let own = area.rings_of(RingKind::NoFly).map(<[_]>::len).sum();
+        let zones = obstacles.zones(floor_m, &places, own, MAX_CORNERS);
+        let zones = zones.map_err(|TooManyCorners(corners)| {
+            let why = format!(
+                "map.file: no-fly zones have {corners} corners with those around the map's \
+                 obstacles; at most {MAX_CORNERS} can be used"
+            );
+            let hint = "a larger map.resolution_m or a greater area.height_m makes fewer";
+            text.with_hint(&self.span, why, hint)
+        })?;
+        for zone in zones {
+            area.vertices.extend(zone);
+            area.rings.push(Ring { end: area.vertices.len() as u16, kind: RingKind::NoFly });
+        }
+        area.obstacles = Some(Arc::new(obstacles));
+        area::Area::new(&area.vertices, &area.rings).map(drop).map_err(|error| {
+            text.error(&self.span, format!("map.file: no area with its zones: {error:?}"))
+        })
+    }
+}
+
+impl Flown<'_> {
+    /// Horizontal distance between paths and obstacles, metres: how far companions let a vehicle
+    /// stray from its path over a field, and never less than the margin to walls.
+    fn clearance_m(&self) -> f32 {
+        let Deconfliction { separation_m, safety_distance_m, .. } = *self.deconfliction;
+        let walls_m = margins::required_distances(self.simulation, 0.0, self.vehicles).margin_m;
+        let stray_m = (separation_m - safety_distance_m) / 2.0;
+        self.largest_radius_m() + stray_m.max(walls_m).max(self.roadmap.safety_margin_m)
+    }
+
+    /// Height of a path above obstacles that it leads over, metres.
+    fn clearance_below_m(&self) -> f32 {
+        let lower_m = |vehicle: &Vehicle| {
+            margins::max_height_error_m(self.simulation.estimator, vehicle.personality)
+        };
+        let lower_m = self.vehicles.iter().map(lower_m).fold(0.0, f32::max);
+        self.largest_radius_m() + TRACKING_M + lower_m
+    }
+
+    fn largest_radius_m(&self) -> f32 {
+        self.vehicles.iter().map(|vehicle| vehicle.radius_m).fold(0.0, f32::max)
+    }
+
+    /// Refuses a pad beside or below an obstacle.
+    fn check_climbs(&self, text: Text<'_>, obstacles: &Obstacles) -> Result<()> {
+        for (vehicle, spans) in self.vehicles.iter().zip(self.spans) {
+            let mut hull = vehicle.start;
+            hull.z += vehicle.radius_m;
+            let Some(near_m) = obstacles.distance_beside_climb(&hull) else { continue };
+            let why = format!(
+                "vehicle {} starts {near_m:.2} m from an obstacle of the map; \
+                 its climb needs {:.2} m",
+                vehicle.id, obstacles.clearance_m
+            );
+            let hint =
+                "a start further away; the map's ground must be at the height of the ground here";
+            return Err(text.with_hint(&spans.start, why, hint));
+        }
+        Ok(())
+    }
+}
