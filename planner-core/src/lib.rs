@@ -14,9 +14,9 @@
 //!
 //! // A room of 8 m × 4 m × 4 m in cells of 0.5 m, with a pillar in one column of cells.
 //! let shape = GridShape { dims: [16, 8, 8], min: Point::zeros(), resolution_m: 0.5 };
-//! let mut words = vec![0; shape.brick_count()];
+//! let mut words = vec![0; shape.word_count()];
 //! for k in 0..8 {
-//!     let (word, bit) = shape.address([8, 4, k]);
+//!     let (word, bit) = shape.word_and_mask([8, 4, k]);
 //!     words[word] |= bit;
 //! }
 //! let grid = VoxelGrid::new(shape, Outside::Blocked, &words)?;

@@ -217,7 +217,7 @@ fn an_area_with_towers_is_photographed_without_contact() {
     let mut mission = prepared();
     let mast = [[60.0, 0.0, 0.0], [61.0, 60.0, 45.0]];
     let map = map_of(&[&BLOCKS[..], &[mast]].concat(), 0.5);
-    let obstacles = Obstacles::new(&map, Unknown::Free, 1.5, |_| 0.0);
+    let obstacles = Obstacles::new(&map, Unknown::Free, 1.5);
     mission.scenario.area.as_mut().expect("an area").obstacles = Some(Arc::new(obstacles));
     let (result, _) = covered::fly(&mut mission).expect("it is flown");
     assert!(result.safety.wall_contacts > 0);
@@ -252,6 +252,10 @@ fn what_a_map_leaves_no_room_for_is_refused_by_name() {
     assert!(error.contains("324 corners with those around the map's obstacles"), "{error}");
     assert_eq!(beside(&[column(40.0, 20.0, 22.0), column(60.0, 20.0, 0.5)]), Ok(1), "all is low");
     assert_eq!(beside(&[column(40.0, 20.0, 24.0), column(300.0, 20.0, 30.0)]), Ok(2));
+    // Lanes that lead further beyond the border meet what lies there.
+    let longer = FIELD.replacen("[area]\n", "[area]\nangle_deg = 0.0\nmargin_m = 60.0\n", 1);
+    write(&[column(134.0, 28.0, 60.0)], 0.5, &path);
+    assert_eq!(plan(&with_map(&longer, &path, 0.5)), Ok(2));
     // Where the area is in degrees, the map has to say where it is.
     write(&[column(40.0, 20.0, 30.0)], 0.5, &path);
     let origin = "origin = { lat_deg = 40.3, lon_deg = -3.7, alt_m = 700.0 }\n";

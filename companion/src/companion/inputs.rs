@@ -259,9 +259,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
         // Slower by a parameter or by its autopilot, it is not where the others reckon it to be.
-        let paced = self.guidance.cruise_mps() >= self.neighbours.assumed_speed_mps();
+        // Over an area the lease says how far it flies on.
+        let paced = self.guidance.cruise_mps() >= self.config.slowest_mps;
         ranged
             && paced
+            && self.neighbours.fleet().is_none()
             && follows
             && !left
             && !self.guidance.returning
@@ -288,9 +290,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let (clear_m, in_s) =
                     self.guidance.unheard_reach(&scene, &self.neighbours, progress_m, self.now);
                 // Idling motors before, and the stop at the top after it, on top of a climb at 1
-                // m/s, which is slow.
+                // m/s, which is slow, or at less where the settings ask for it.
                 let climb_s = if progress_m < 0.0 {
-                    MAX_CLIMB_OVERHEAD_S + libm::ceilf(-progress_m)
+                    MAX_CLIMB_OVERHEAD_S
+                        + libm::ceilf(-progress_m / libm::fminf(self.config.climb_mps, 1.0))
                 } else {
                     0.0
                 };

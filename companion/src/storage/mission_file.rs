@@ -407,19 +407,17 @@ impl<'a> MissionView<'a> {
         let header = &self.header;
         let mut config = Config::new(system_id, own.start, header.origin);
         config.roster.clear();
+        (config.slowest_mps, config.fastest_mps) = (header.cruise_mps, 0.0);
         for vehicle in self.vehicles() {
+            let cruise_mps = libm::fminf(header.cruise_mps, vehicle.speed_max_mps);
+            config.slowest_mps = libm::fminf(config.slowest_mps, cruise_mps);
+            config.fastest_mps = libm::fmaxf(config.fastest_mps, cruise_mps);
             let entry = RosterEntry { system_id: vehicle.task.id, start: vehicle.start };
             let at = config.roster.partition_point(|other| other.system_id < entry.system_id);
             config.roster.insert(at, entry).map_err(|_| MissionError::RosterFull)?;
         }
         config.mission_crc = self.crc;
         config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
-        (config.slowest_mps, config.fastest_mps) = (header.cruise_mps, 0.0);
-        for vehicle in self.vehicles() {
-            let cruise_mps = libm::fminf(header.cruise_mps, vehicle.speed_max_mps);
-            config.slowest_mps = libm::fminf(config.slowest_mps, cruise_mps);
-            config.fastest_mps = libm::fmaxf(config.fastest_mps, cruise_mps);
-        }
         config.climb_mps = header.schedule.vertical_mps;
         config.descend_mps = header.schedule.vertical_mps;
         if let MissionKind::Coverage(view) = &self.kind

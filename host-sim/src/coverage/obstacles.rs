@@ -24,7 +24,7 @@ const ROUGH_GROUND_M: f32 = 0.5;
 const ROUNDING_M: f64 = 0.01;
 /// Most corners of a zone that is not a box.
 const MAX_ZONE_CORNERS: usize = 8;
-/// Distance from area and pads within which zones are kept, metres.
+/// Distance from lanes and pads within which zones are kept, metres: transits may lead there.
 const NEAR_M: f32 = 30.0;
 /// Distance from a kept zone within which other zones are kept, metres.
 const NEAR_ZONE_M: f32 = 5.0;
@@ -58,12 +58,7 @@ pub struct Obstacles {
 
 impl Obstacles {
     /// The obstacles of a map; `ground_m` is the height of the ground at a place.
-    pub fn new(
-        map: &OccupancyMap,
-        unknown: Unknown,
-        clearance_m: f32,
-        ground_m: impl Fn(&Flat) -> f32,
-    ) -> Self {
+    pub fn new(map: &OccupancyMap, unknown: Unknown, clearance_m: f32) -> Self {
         let mut map = VoxelMap {
             seen_obstacle_words: None,
             never_sample_words: None,
@@ -73,7 +68,7 @@ impl Obstacles {
         let shape = map.shape;
         let is_ground = |cell: &[u32; 3]| {
             let centre = shape.center(*cell);
-            centre.z + shape.resolution_m / 2.0 <= ground_m(&centre.xy()) + ROUGH_GROUND_M
+            centre.z + shape.resolution_m / 2.0 <= ROUGH_GROUND_M
         };
         let ground: Vec<_> = occupied_cells(&map).filter(is_ground).collect();
         for cell in ground {
@@ -103,15 +98,16 @@ impl Obstacles {
         (nearest_m < self.clearance_m).then_some(nearest_m)
     }
 
-    /// Zones around the obstacles that reach above `floor_m` of their place and are near `places`.
+    /// Zones around the obstacles that reach above `floor_m` and are near `places`, beyond which
+    /// lanes lead by `beyond_m`.
     /// `own` is the number of corners that other no-fly zones have.
     ///
     /// # Errors
     /// All zones together have more than `most` corners.
     pub fn zones(
         &self,
-        floor_m: impl Fn(&Flat) -> f32,
-        places: &[Flat],
+        floor_m: f32,
+        (places, beyond_m): (&[Flat], f32),
         own: usize,
         most: usize,
     ) -> Result<Vec<Vec<Flat>>, TooManyCorners> {
@@ -119,7 +115,7 @@ impl Obstacles {
         let parts = columns.parts();
         let drawn = OUTLINES.map(|outline| {
             let zones = parts.iter().flat_map(|part| columns.zones_around(part, &outline));
-            near_zones(zones.map(|zone| to_flat(&zone)).collect(), places)
+            near_zones(zones.map(|zone| to_flat(&zone)).collect(), places, beyond_m + NEAR_M)
         });
         let corners = |zones: &[Vec<Flat>]| own + zones.iter().map(Vec::len).sum::<usize>();
         let counts = drawn.each_ref().map(|zones| corners(zones));
@@ -146,14 +142,15 @@ fn to_flat(polygon: &Polygon) -> Vec<Flat> {
     polygon.iter().map(|[x, y]| Flat::new(*x as f32, *y as f32)).collect()
 }
 
-/// The zones that may matter to flights between `places`: those near them, and those near these.
-fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat]) -> Vec<Vec<Flat>> {
+/// The zones that may matter to flights between `places`: those within `near_m` of them, and those
+/// near these.
+fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Vec<Flat>> {
     let extent = |points: &[Flat], around_m: f32| {
         let start = [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)];
         let [low, high] = points.iter().fold(start, |[low, high], p| [low.inf(p), high.sup(p)]);
         [low - Flat::repeat(around_m), high + Flat::repeat(around_m)]
     };
-    let mut reach = extent(places, NEAR_M);
+    let mut reach = extent(places, near_m);
     let mut kept = Vec::new();
     loop {
         let is_near = |zone: &mut Vec<Flat>| {
@@ -188,7 +185,7 @@ struct Columns {
 type Column = [usize; 2];
 
 impl Columns {
-    fn new(map: &VoxelMap, clearance_m: f64, floor_m: impl Fn(&Flat) -> f32) -> Self {
+    fn new(map: &VoxelMap, clearance_m: f64, floor_m: f32) -> Self {
         let cell_m = f64::from(map.shape.resolution_m);
         let around = (clearance_m / cell_m).ceil() as usize + 1;
         let size = [0, 1].map(|axis| map.shape.dims[axis] as usize + 2 * around);
@@ -200,7 +197,7 @@ impl Columns {
             let at = columns.index([0, 1].map(|axis| cell[axis] as usize + around));
             let centre = map.shape.center(cell);
             let top_m = centre.z + map.shape.resolution_m / 2.0;
-            columns.blocked[at] = columns.blocked[at] || top_m > floor_m(&centre.xy());
+            columns.blocked[at] = columns.blocked[at] || top_m > floor_m;
         }
         columns.grow(around);
         columns

@@ -90,13 +90,6 @@ impl Area {
         self.terrain.as_ref().and_then(|terrain| terrain.grid.height_at(place)).unwrap_or(0.0)
     }
 
-    /// The lowest ground within about `around_m` of a place, metres above the origin.
-    pub fn lowest_ground_m(&self, place: &Flat, around_m: f32) -> f32 {
-        let steps = [-around_m, -around_m / 2.0, 0.0, around_m / 2.0, around_m];
-        let near = steps.into_iter().flat_map(|x| steps.map(|y| place + Flat::new(x, y)));
-        near.map(|near| self.ground_m(&near)).fold(f32::INFINITY, f32::min)
-    }
-
     /// Vertices of the rings of one kind.
     pub fn rings_of(&self, kind: RingKind) -> impl Iterator<Item = &[Flat]> {
         let starts = std::iter::once(0).chain(self.rings.iter().map(|ring| usize::from(ring.end)));

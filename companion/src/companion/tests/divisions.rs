@@ -32,7 +32,13 @@ fn ahead(b: &Bench, height_m: f32) -> Point {
 
 /// Three vehicles photograph an area, this one along the usual path; the first other one is heard.
 pub(super) fn over_a_field(px4: bool) -> Bench {
+    over_a_field_with(px4, |_| {})
+}
+
+/// The same with other settings.
+fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
+    set(&mut config);
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
     config.lost_vehicle_down_s = Some(60.0);
     let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
@@ -430,5 +436,28 @@ proptest::proptest! {
             b.state(),
             b.texts
         );
+    }
+}
+
+/// Its lease says how far it flies on, not the radio's range.
+#[test]
+fn a_vehicle_over_an_area_whose_lease_ends_stands_and_lands_whatever_the_radios_range() {
+    for (px4, radio_range_m) in [(true, 60.0), (false, 60.0), (true, 10_000.0)] {
+        let mut b = over_a_field_with(px4, |config| {
+            config.radio_range_m = radio_range_m;
+            (config.cruise_mps, config.slowest_mps) = (0.4, 0.4);
+        });
+        b.start();
+        b.run_until(Follow, 40.0);
+        b.neighbour = None;
+        b.run_until(Alone, 25.0);
+        let along_m = b.companion.guidance.along_m();
+        for _ in 0..15 {
+            b.run(1.0);
+            assert_eq!(b.state(), Alone, "{radio_range_m} m: {:?}", b.texts);
+        }
+        let more_m = b.companion.guidance.along_m() - along_m;
+        assert!(more_m < 1.0, "{radio_range_m} m: {more_m} m further");
+        b.run_until(Land, 10.0);
     }
 }

@@ -17,11 +17,6 @@ use crate::time::Instant;
 const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl<const V: usize> Neighbours<V> {
-    /// Speed at which every vehicle of the mission surely makes progress while unheard, m/s.
-    pub(crate) fn assumed_speed_mps(&self) -> f32 {
-        self.assumed_speed_mps
-    }
-
     /// Place along the path of the first of `gates` before which this vehicle, unheard, would wait
     /// too long, metres, ∞ if there is none; and the seconds by which the gates before that delay
     /// it, compared with a flight at the assumed speed from `progress_m`.

@@ -74,22 +74,24 @@ impl MapBesideArea {
     /// Reads the map, and adds its obstacles to the area as no-fly zones.
     pub(super) fn apply(&self, text: Text<'_>, area: &mut Area, flown: &Flown<'_>) -> Result<()> {
         self.check_origin(text, &area.origin)?;
+        if area.terrain.is_some() {
+            let hint = "leave out [map], or area.terrain where the ground is level";
+            return Err(text.with_hint(&self.span, "[map] beside area.terrain: not yet", hint));
+        }
         let map = map::load(&self.map.file, self.map.resolution_m)
             .map_err(|error| text.error(&self.span, format!("map.file: {error}")))?;
         let clearance_m = flown.clearance_m();
-        let place_ground = |place: &_| area.ground_m(place);
-        let obstacles = Obstacles::new(&map, self.map.unknown, clearance_m, place_ground);
+        let obstacles = Obstacles::new(&map, self.map.unknown, clearance_m);
         drop(map);
         flown.check_climbs(text, &obstacles)?;
         let below_m = flown.clearance_below_m().max(clearance_m);
-        let floor_m = |place: &_| match area.terrain {
-            None => area.heights.mission_m - below_m,
-            Some(_) => area.lowest_ground_m(place, clearance_m) + area.height_m - below_m,
-        };
+        let floor_m = area.heights.mission_m - below_m;
+        // Lanes are longer by the margin, and lie up to half a picture beside the border.
+        let beyond_m = area.margin_m + area.spacing.footprint.across_m / 2.0;
         let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
         let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
         let own = area.rings_of(RingKind::NoFly).map(<[_]>::len).sum();
-        let zones = obstacles.zones(floor_m, &places, own, MAX_CORNERS);
+        let zones = obstacles.zones(floor_m, (&places, beyond_m), own, MAX_CORNERS);
         let zones = zones.map_err(|TooManyCorners(corners)| {
             let why = format!(
                 "map.file: no-fly zones have {corners} corners with those around the map's \
