@@ -143,7 +143,7 @@ fn plans_keep_clear_of_all_that_a_map_holds_at_their_height() {
         let path = folder.path().join(format!("{seed}.bt"));
         write(&boxes, cell_m, &path);
         let text = with_map(&text, &path, cell_m);
-        let told = |error: String| {
+        let refused = |error: String| {
             let known = ["no-fly zone", "from an obstacle of the map"];
             match known.iter().any(|known| error.contains(known)) {
                 true => Ok(None),
@@ -152,11 +152,11 @@ fn plans_keep_clear_of_all_that_a_map_holds_at_their_height() {
         };
         let scenario = match scenario::parse(&text, "random") {
             Ok(scenario) => scenario,
-            Err(error) => return told(error.to_string()),
+            Err(error) => return refused(error.to_string()),
         };
         let planned = match CoveragePlan::new(&scenario, Method::PowellBinpat) {
             Ok(planned) => planned,
-            Err(error) => return told(format!("{error:#}")),
+            Err(error) => return refused(format!("{error:#}")),
         };
         match wrong(&scenario, &planned, &boxes) {
             Some(why) => Err(format!("seed {seed}: {why}\n{text}{boxes:?}")),

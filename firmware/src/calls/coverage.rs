@@ -78,6 +78,15 @@ fn flat([x, y]: [f32; 2]) -> Flat {
     Flat::new(x, y)
 }
 
+/// The lanes to be divided among `vehicles`, waypoint by waypoint.
+fn work_on<'a, const L: usize, const N: usize>(
+    tracks: &'a Tracks<L>,
+    transit: &'a Transit<'a, N>,
+    vehicles: &'a [Vehicle],
+) -> Work<'a, L, N> {
+    Work { tracks, transit, vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint }
+}
+
 fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
     let vehicle = |i: usize| {
         let place = Flat::new(5.0 * i as f32, -10.0);
@@ -118,24 +127,12 @@ fn measure_plans(
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build_lanes(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
-        let work = Work {
-            tracks,
-            transit: &transit,
-            vehicles: &few,
-            heights: HEIGHTS,
-            unit: TrackUnit::Waypoint,
-        };
+        let work = work_on(tracks, &transit, &few);
         powell::powell(&work, &POWELL_SEARCH, powell, plan).expect("routes");
     });
     sum.add_tracks(tracks);
     sum.add_plan(plan);
-    let work = Work {
-        tracks,
-        transit: &transit,
-        vehicles: &few,
-        heights: HEIGHTS,
-        unit: TrackUnit::Waypoint,
-    };
+    let work = work_on(tracks, &transit, &few);
     meter
         .call("powell::powell, 3", size_of_val(powell), || {
             powell::powell(&work, &POWELL_SEARCH, powell, plan)
@@ -158,13 +155,7 @@ fn measure_plans(
     let bytes = size_of_val(left) + size_of_val(pack);
     meter.call("left and binpat, 3", bytes, || {
         divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
-        let work = Work {
-            tracks: left,
-            transit: &transit,
-            vehicles: rest,
-            heights: HEIGHTS,
-            unit: TrackUnit::Waypoint,
-        };
+        let work = work_on(left, &transit, rest);
         pack::binpat(&work, pack, plan).expect("routes");
     });
     sum.add_tracks(left);
@@ -217,13 +208,7 @@ fn measure_division(
         .expect("lanes");
     assert_eq!(tracks.lanes().len(), LANES);
     sum.add_tracks(tracks);
-    let work = Work {
-        tracks,
-        transit: &transit,
-        vehicles: &many,
-        heights: HEIGHTS,
-        unit: TrackUnit::Waypoint,
-    };
+    let work = work_on(tracks, &transit, &many);
     meter
         .call("pack::binpat, 32", size_of_val(pack), || pack::binpat(&work, pack, plan))
         .expect("routes");
@@ -241,13 +226,7 @@ fn measure_division(
     let rest = &many[1..];
     meter.call("left and binpat, 32", size_of_val(left) + size_of_val(pack), || {
         divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
-        let work = Work {
-            tracks: left,
-            transit: &transit,
-            vehicles: rest,
-            heights: HEIGHTS,
-            unit: TrackUnit::Waypoint,
-        };
+        let work = work_on(left, &transit, rest);
         pack::binpat(&work, pack, plan).expect("routes");
     });
     sum.add_tracks(left);
@@ -372,13 +351,7 @@ fn measure_largest_area(
         .expect("lanes");
     sum.add_tracks(tracks);
     let few = vehicles(LIMITED_VEHICLES);
-    let work = Work {
-        tracks,
-        transit: &transit,
-        vehicles: &few,
-        heights: HEIGHTS,
-        unit: TrackUnit::Waypoint,
-    };
+    let work = work_on(tracks, &transit, &few);
     meter
         .call("pack::binpat, 3 around zones", size_of_val(&powell.pack), || {
             pack::binpat(&work, &mut powell.pack, plan)

@@ -27,6 +27,11 @@ const GATES: usize = 8;
 
 type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
+/// A call that plans the flights of these routes.
+type PlanCall<'p> = dyn FnMut(&AreaWork<'_>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Planned + 'p;
+type AreaWork<'w> = Work<'w, LANES, CORNERS>;
+type Planned = Result<(), PlanError>;
+
 /// Memory that is lent to the calls.
 pub(super) struct FlightWorkspaces {
     area: coverage::CoverageMemory,
@@ -160,11 +165,7 @@ fn call_flight_plans(
 
 /// Plans for a vehicle or a pad with a hard number.
 fn call_hard_vehicles(
-    plan: &mut impl FnMut(
-        &Work<'_, LANES, CORNERS>,
-        &Plan<VEHICLES>,
-        &FlightInputs<'_>,
-    ) -> Result<(), PlanError>,
+    plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
     hard: f32,
@@ -197,11 +198,7 @@ fn call_hard_vehicles(
 /// Plans with unusual routes. An unknown vehicle or a wrong waypoint range must be refused; an odd
 /// heading or layer may be planned or refused; no routes at all must be planned.
 fn unusual_routes(
-    plan: &mut impl FnMut(
-        &Work<'_, LANES, CORNERS>,
-        &Plan<VEHICLES>,
-        &FlightInputs<'_>,
-    ) -> Result<(), PlanError>,
+    plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
 ) {
@@ -233,11 +230,7 @@ fn unusual_routes(
 
 /// Plans flights above a height field, with extreme settings of terrain following.
 fn call_field_plans(
-    plan: &mut impl FnMut(
-        &Work<'_, LANES, CORNERS>,
-        &Plan<VEHICLES>,
-        &FlightInputs<'_>,
-    ) -> Result<(), PlanError>,
+    plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
     routes: &Plan<VEHICLES>,
 ) {

@@ -1,5 +1,5 @@
-//! Tells a stack overflow from other faults, by the fault registers of a Cortex-M (ARMv7-M ARM,
-//! B3.2.15 "CFSR"; ARMv8-M ARM, "UFSR.STKOF").
+//! Distinguishes a stack overflow from other faults, by the fault registers of a Cortex-M (ARMv7-M
+//! ARM, B3.2.15 "CFSR"; ARMv8-M ARM, "UFSR.STKOF").
 
 use core::ops::Range;
 

@@ -330,9 +330,9 @@ impl<'a> Referee<'a> {
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
         // Progress falls only because it now counts along another path.
-        let anew =
+        let on_other_path =
             now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
-        if let Some(progress_m) = anew {
+        if let Some(progress_m) = on_other_path {
             vehicle.best_progress_m = progress_m - OFF_HOVER_M;
         }
         let moved = match now.progress_m {

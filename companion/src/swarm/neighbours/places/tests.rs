@@ -210,7 +210,7 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
             let told = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
             table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
-            // Whatever shape is told, no place is free that may be too near by the truth.
+            // Whatever shape was reported, no place is free that may truly be too near.
             let away = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0)
                 .normalize();
             let truly_m = apart_m + if in_air { stray_m } else { 0.0 };
