@@ -6,10 +6,10 @@
 //! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The set of edges is the one
 //! of a loop over all pairs ([`connect_all_pairs`]); only the work is less:
 //!
-//! nodes are sorted into cubes ([`NodeIndex`]), so that only near pairs are measured;
+//! 1. nodes are sorted into cubes ([`NodeIndex`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
-//!    a neighbour inside it is clear, and a ray that leaves it mostly does so into a wall. Both
-//! the segments that are left go to the exact check, without their part inside the box.
+//!    a neighbour inside it is clear, and a ray that leaves it mostly does so into a wall;
+//! 3. the segments that are left go to the exact check, without their part inside the box.
 //!
 //! Cost: O(nodes · neighbours); 2300 nodes have some 80 000 pairs within the length range. Memory:
 //! 14 bytes per node, 2 per cube. Metres, mission frame, f32.
