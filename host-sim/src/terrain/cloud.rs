@@ -1,12 +1,14 @@
 //! Reads point clouds (LAS, LAZ): each cell of the grid gets the highest return in it.
 //!
 //! Cells are so large that they hold four returns on average, so that few are empty; an empty cell
-//! between others gets the highest height near it. Returns classified as noise do not count.
+//! between others gets the highest height near it. Returns classified as noise do not count, nor
+//! do those flagged as withheld: their producer deleted them.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
+use las::point::Classification;
 use las::{Header, PointDataBuilder, Reader};
 use planner_core::coverage::Flat;
 
@@ -28,8 +30,8 @@ const MIN_CELL_M: f64 = 0.5;
 const BRIDGED_CELLS: usize = 3;
 /// Number of returns decoded at a time.
 const RETURNS_PER_BATCH: u64 = 4096;
-/// Classification codes of returns that are errors: low points and high noise.
-const NOISE_CLASSES: [u8; 2] = [7, 18];
+/// Classes of returns that are errors.
+const NOISE: [Classification; 2] = [Classification::LowPoint, Classification::HighNoise];
 
 pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
     let length = files::regular_file_len(path)?;
@@ -71,13 +73,14 @@ where
             return Err(malformed(&format!("it has {count} returns, its header says {most}")));
         }
         count += read;
-        let places = points.x().zip(points.y()).zip(points.z()).zip(points.classification());
-        for (((x, y), z), class) in places {
-            if NOISE_CLASSES.contains(&class) || !z.is_finite() {
+        for point in points.points() {
+            let point = point.map_err(|error| malformed(&error))?;
+            let deleted = point.is_withheld || NOISE.contains(&point.classification);
+            if deleted || !point.z.is_finite() {
                 continue;
             }
-            if let Some(place) = crs.to_mission(frame.origin, [x, y]) {
-                grid.raise_cell(&place, (z * unit_m) as f32);
+            if let Some(place) = crs.to_mission(frame.origin, [point.x, point.y]) {
+                grid.raise_cell(&place, (point.z * unit_m) as f32);
             }
         }
     }

@@ -74,8 +74,8 @@ pub(super) struct CameraControl {
     /// Whether the autopilot's trigger by distance was switched on.
     trigger_on: bool,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
-    /// Number of times that the first queued command was sent, and (`sent_at`) when it was sent
-    /// last.
+    /// Number of commands sent since the last answer, repetitions included, and (`sent_at`) when
+    /// the first queued command was sent last.
     tries: u8,
     sent_at: Option<Instant>,
     /// Whether a command was dropped or refused: from then on such failures are not reported.
@@ -163,10 +163,10 @@ impl CameraControl {
 
     fn queue_command(&mut self, order: CameraCommand) {
         // The queue is full while the autopilot is silent: drop the oldest command, whose place is
-        // farthest away.
+        // farthest away. Its tries count for the next, so that the silence is reported.
         if self.commands.is_full() {
             self.commands.pop_front();
-            (self.tries, self.sent_at, self.failed) = (0, None, true);
+            self.sent_at = None;
         }
         let _ = self.commands.push_back(order);
     }
@@ -179,7 +179,12 @@ impl CameraControl {
             return;
         }
         if self.tries == MAX_TRIES {
-            self.drop_current_command();
+            // Where the last tries were those of a command dropped from the full queue, this one
+            // was not sent yet.
+            if self.sent_at.is_some() {
+                self.commands.pop_front();
+            }
+            (self.tries, self.sent_at) = (0, None);
             if !core::mem::replace(&mut self.failed, true) {
                 links.send_text(true, "Camera trigger is not acknowledged");
             }

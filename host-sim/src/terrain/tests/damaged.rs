@@ -35,20 +35,21 @@ fn returns(compressed: bool, format: u8) -> Vec<u8> {
         };
         writer.write_point(point).unwrap();
     }
-    // The last one is noise, and higher than all.
-    let noise = las::point::Classification::LowPoint;
-    let (gps_time, color) = (Some(0.0), (format == 3).then(Color::default));
-    writer
-        .write_point(Return {
+    // The last two are higher than all: noise, and a return that was deleted.
+    for withheld in [false, true] {
+        let noise = las::point::Classification::LowPoint;
+        let deleted = Return {
             x: 500_005.0,
             y: 4_794_005.0,
             z: 900.0,
-            gps_time,
-            color,
-            classification: noise,
+            gps_time: Some(0.0),
+            color: (format == 3).then(Color::default),
+            classification: if withheld { Default::default() } else { noise },
+            is_withheld: withheld,
             ..Return::default()
-        })
-        .unwrap();
+        };
+        writer.write_point(deleted).unwrap();
+    }
     writer.close().unwrap();
     drop(writer);
     std::fs::read(path).unwrap()

@@ -5,7 +5,7 @@ extern crate std;
 
 use std::vec::Vec;
 
-use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
+use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, STATUSTEXT_DATA};
 use planner_core::Point;
 use planner_core::flight::WaypointRange;
 use proptest::prelude::*;
@@ -166,6 +166,30 @@ proptest! {
         let (pictures_m, on) = fly(&photographs, 0.1, false, seed);
         prop_assert_eq!(widest(&photographs, &pictures_m, LOST_M), Ok(()), "{:?}", pictures_m);
         prop_assert!(!on);
+    }
+}
+
+/// Pictures follow each other faster than a silent autopilot's commands are given up: the queue
+/// overflows, and the silence is reported all the same, once.
+#[test]
+fn a_silent_autopilot_is_reported_at_any_speed() {
+    let (photographs, path) = (photographs(Trigger::Waypoint), path());
+    for mps in [2.0, 5.0, 10.0, 20.0, 40.0, 80.0] {
+        let (mut camera, mut links) = (CameraControl::default(), Links::default());
+        let (mut framer, mut now, mut texts) = (Framer::default(), Instant::ZERO, 0);
+        for step in 0..2000_u16 {
+            now = now + Duration::from_millis(50);
+            let progress_m = (mps * STEP_S * f32::from(step)).min(path.length_m());
+            let along = PathProgress { progress_m, place: PathRelation::OnPath };
+            camera.step(&photographs, &path, along, now, &mut links);
+            let mut out = [0; 512];
+            let length = links.write_queued(Link::Autopilot, 1, &mut out);
+            let mut bytes = &out[..length];
+            while let Some(frame) = framer.next(now, &mut bytes) {
+                texts += usize::from(frame.decode::<STATUSTEXT_DATA>().is_some());
+            }
+        }
+        assert_eq!(texts, 1, "at {mps} m/s");
     }
 }
 
