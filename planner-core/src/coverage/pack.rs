@@ -247,7 +247,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         };
         let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.place == vehicle.home {
-            // The same transits in the opposite direction.
+            // From and to one place the transits are the same in the opposite direction.
             forward
         } else {
             transit_m(&ends.last, &ends.first)
