@@ -77,14 +77,14 @@ const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
 /// before the take-off, m/s.
 const MAX_PAD_DRIFT_MPS: f32 = 0.2;
-/// Path searched to either side for the point nearest to a vehicle back from its pilot, metres.
+/// Length of path searched, to either side, for the point nearest to a vehicle after its pilot, m.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
-/// Path searched, to either side, for the point nearest to a vehicle whose position was lost,
-/// metres: it stopped within its braking distance of the reference, so a position further along the
-/// path is not believed.
+/// Length of path searched, to either side, for the point nearest to a vehicle whose position was
+/// lost, metres: it stopped within its braking distance of the reference, so a position further
+/// along the path is not believed.
 pub const LOST_WINDOW_M: f32 = 2.5;
-/// Path searched, to either side, for the point nearest to a setpoint that stands, metres: the raw
-/// point may be a second of flight ahead of it.
+/// Length of path searched, to either side, for the point nearest to a standing setpoint, metres:
+/// the raw point may be a second of flight ahead of it.
 const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
@@ -315,8 +315,7 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // Up to the advised stop, also while stopped: that far the filter goes on checking
-                // the path.
+                // Also while stopped: the filter checks the path up to the advised stop.
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }
@@ -338,8 +337,8 @@ impl Guidance {
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
         if known && (taken || taken_before || !self.smoother.has_setpoint()) {
-            // The autopilot does not follow setpoints, or there was none: the setpoint begins at
-            // the vehicle's position, or takes its velocity.
+            // Another autopilot mode flies or just flew, or there is no setpoint yet: the setpoint
+            // begins at the vehicle's position, or takes its velocity.
             if taken {
                 self.smoother.follow_vehicle(position, self.unsent_s);
             } else if !self.smoother.has_setpoint() {

@@ -26,7 +26,7 @@ pub const EVADE_MARGIN_M: f32 = 0.6;
 /// Deviation of two vehicles from their paths, together, metres: kept beyond the safety distance
 /// from a vehicle behind.
 const FOLLOWER_STRAY_M: f32 = 0.6;
-/// Spacing of the places along the path that are compared, metres.
+/// Spacing of the places along the path that are compared with the columns, metres.
 const PLACE_STEP_M: f32 = 0.25;
 /// Maximum number of places along the path that one search compares.
 const MAX_PLACES: u16 = 48;

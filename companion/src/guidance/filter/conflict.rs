@@ -110,8 +110,7 @@ impl Guidance {
             neighbours.add_silence(contact, now, &mut met);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
-                // A neighbour out of radio range is where its gates let it be, and they keep it
-                // away.
+                // Out of radio range the neighbour is where its gates let it be: away from here.
                 continue;
             }
             if by_gates {
@@ -140,8 +139,8 @@ impl Guidance {
                 // A stranger, which anybody can feign, keeps no vehicle in the air for good.
                 continue;
             }
-            // On its way back to its pad, before its path, or hearing nobody, this vehicle has no
-            // other landing place to fly to.
+            // Flying back to its pad, before its path, or hearing nobody, this vehicle has no other
+            // landing place.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
             // The end of its path over an area is above its pad; by then it has sought a place
@@ -153,8 +152,8 @@ impl Guidance {
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.motion.grounded || met.stands) && by_gates {
-                // The schedule leads this vehicle past a waiting one at the safety distance plus
-                // both tracking errors.
+                // The schedule leads past a waiting vehicle at the safety distance plus the
+                // tracking errors of both.
                 safety_m
             } else if met.motion.grounded {
                 let vertical = lands || state == State::Climb || self.is_descending();

@@ -149,8 +149,7 @@ impl Guidance {
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
-                // A vehicle that slowly passes a stranger does so until the path has been free for
-                // longer.
+                // Past a stranger the vehicle flies slowly until the path has been free for longer.
                 let clear_for = if self.filter.passes_stranger(now) {
                     MAX_STOP_FOR_STRANGER
                 } else {
