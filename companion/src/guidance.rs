@@ -69,22 +69,22 @@ const DESCENDED_M: f32 = 0.2;
 /// Time for which the setpoint has stood at the end of a guided descent, after which the
 /// autopilot's landing takes over, wherever the vehicle is.
 const LAND_AFTER: Duration = Duration::from_secs(2);
-/// Time without progress after which the autopilot's landing takes over from one that setpoints
-/// lead down from the path.
+/// Time without progress of a landing that setpoints lead down, after which the autopilot's own
+/// landing takes over.
 const LEADS_FOR: Duration = Duration::from_secs(4);
 /// Greatest distance of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
 /// before the take-off, m/s.
 const MAX_PAD_DRIFT_MPS: f32 = 0.2;
-/// Path searched to either side for the point nearest to a vehicle back from its pilot, metres.
+/// Length of path searched, to either side, for the point nearest to a vehicle after its pilot, m.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
-/// Path searched, to either side, for the point nearest to a vehicle whose position was lost,
-/// metres: it stopped within its braking distance of the reference, so a position further along the
-/// path is not believed.
+/// Length of path searched, to either side, for the point nearest to a vehicle whose position was
+/// lost, metres: it stopped within its braking distance of the reference, so a position further
+/// along the path is not believed.
 pub const LOST_WINDOW_M: f32 = 2.5;
-/// Path searched, to either side, for the point nearest to a setpoint that stands, metres: the raw
-/// point may be a second of flight ahead of it.
+/// Length of path searched, to either side, for the point nearest to a standing setpoint, metres:
+/// the raw point may be a second of flight ahead of it.
 const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
@@ -158,7 +158,7 @@ pub struct Guidance {
     stopped_at_fence: bool,
     progress_m: f32,
     progress_at: Instant,
-    /// When the vehicle was last at its setpoint or the setpoint advanced, and its place then.
+    /// When the vehicle was last at its setpoint or that advanced, and the setpoint's place then.
     followed_at: Instant,
     followed_place: Point,
     reported_m: f32,
@@ -169,11 +169,11 @@ pub struct Guidance {
     evade_search: EvadeSearch,
     /// Whether the vehicle keeps out of the column below a vehicle that descends.
     pub evading: bool,
-    /// Distance ahead on the path at which it stops, by advice or to evade, metres.
+    /// Distance ahead on the path at which the vehicle stops, by advice or to evade, metres.
     wait_distance_m: f32,
-    /// Place along the path where it holds for a division, metres; ∞ for none.
+    /// Place along the path where the vehicle holds for a division, metres; ∞ for none.
     halt_m: f32,
-    /// Place along the path to which it steps back from below a vehicle that descends, metres.
+    /// Place along the path to which the vehicle steps back from below one that descends, metres.
     back_to_m: Option<f32>,
     /// Whether no place back along the path is outside the columns of vehicles that descend.
     no_better_place: bool,
@@ -186,7 +186,7 @@ pub struct Guidance {
     low_height_m: f32,
     /// Height of the lowest ground between pads, ENU up, metres; ∞ where only the pads' are known.
     lowest_ground_m: f32,
-    /// Acceleration sent last: the setpoint's, and the correction towards the setpoint.
+    /// Acceleration sent last: the setpoint's plus the correction towards it, with limited jerk.
     sent_acceleration: Point,
 }
 
@@ -315,7 +315,7 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // Also while stopped: the filter goes on checking the path up to there.
+                // Also while stopped: the filter checks the path up to the advised stop.
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }
@@ -337,8 +337,8 @@ impl Guidance {
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
         if known && (taken || taken_before || !self.smoother.has_setpoint()) {
-            // The autopilot does not follow setpoints, or there was none: the setpoint begins at
-            // the vehicle's position, or takes its velocity.
+            // Another autopilot mode flies or just flew, or there is no setpoint yet: the setpoint
+            // begins at the vehicle's position, or takes its velocity.
             if taken {
                 self.smoother.follow_vehicle(position, self.unsent_s);
             } else if !self.smoother.has_setpoint() {
@@ -396,7 +396,7 @@ impl Guidance {
         let share = self.lag_share(scene.telemetry, moves, now);
         let mut blocked = false;
         let dt_s = if self.smoother.resumes_from_last() { self.unsent_s } else { dt_s };
-        // The place where advice stops the vehicle stays the same while the raw points of this step
+        // Advice was computed once for this step: its stop stays at one place while the raw points
         // move on.
         let stops_at_m = advised_at_m + advice.stop_within_m;
         self.stopped_at_fence &= !moves;
@@ -487,7 +487,7 @@ impl Guidance {
         self.trapped_since
     }
 
-    /// Restarts the time for which it counts as trapped.
+    /// Restarts the time for which the vehicle counts as trapped below one that descends.
     pub(crate) fn reset_trap_timer(&mut self) {
         self.trapped_since = None;
     }

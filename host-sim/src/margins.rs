@@ -34,7 +34,8 @@ use crate::scenario::{Simulation, Vehicle};
 /// Sum of the deviations of two vehicles from their paths, which the default separation adds to the
 /// safety distance, metres.
 pub const PAIR_STRAY_M: f32 = 0.5;
-/// The same over fields, metres: wider, since there is room, and for receivers without RTK.
+/// As [`PAIR_STRAY_M`], over fields, metres: wider, since there is room, and for receivers without
+/// RTK.
 pub const PAIR_STRAY_OVER_FIELDS_M: f32 = 2.4;
 /// Deviation of a flying vehicle from its path that is added to the separation from a parked
 /// vehicle, metres.

@@ -96,7 +96,7 @@ pub struct Advice {
     /// Distance along the path within which the vehicle has to stop, metres; infinite if it need
     /// not.
     pub stop_within_m: f32,
-    /// System id of the vehicle that it stops for; 0 if it need not stop.
+    /// System id of the neighbour that the own vehicle stops for; 0 if it need not stop.
     pub waiting_for: u8,
 }
 

@@ -198,8 +198,8 @@ pub struct NeighbourMotion<'a> {
     pub column_to_m: Option<f32>,
 }
 
-/// Where a vehicle is on the points that it reports. Valid until position or points are heard
-/// again.
+/// Place of a vehicle on the polyline of points that it reports. Valid until position or points are
+/// heard again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PlaceOnPoints {
     /// Not computed yet.

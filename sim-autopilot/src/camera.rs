@@ -42,7 +42,7 @@ pub struct Photo {
 /// State of the camera's trigger.
 #[derive(Clone, Debug, Default)]
 pub struct CameraTrigger {
-    /// Distance between pictures while it triggers by distance, metres.
+    /// Distance between pictures while the camera triggers by distance, metres; else `None`.
     distance_m: Option<f32>,
     /// Estimated position (east, north; metres) from which the distance is measured.
     last: Option<[f32; 2]>,

@@ -109,7 +109,7 @@ impl Autopilot {
         self.firmware.status(&self.platform, &self.platform.sensors()).custom_mode
     }
 
-    /// Whether it is in its autopilot's Land mode.
+    /// Whether the simulated autopilot is in its Land mode.
     pub fn is_landing(&self) -> bool {
         let land = match self.platform.config.autopilot {
             AutopilotKind::Px4 => Mode::Land.custom_mode(),

@@ -50,7 +50,7 @@ pub struct Snapshot {
     pub accuracy: [f32; 2],
     /// Remaining battery charge, 0 to 1.
     pub battery: f32,
-    /// Computed when the first message needs it.
+    /// Attitude of the body, computed when the first message needs it.
     pub attitude: OnceCell<Attitude>,
 }
 

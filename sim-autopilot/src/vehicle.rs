@@ -370,7 +370,7 @@ pub fn wrap_pi(angle: f32) -> f32 {
     }
 }
 
-/// Power at this speed relative to hovering.
+/// Power that a vehicle draws while it moves at `speed_mps`, as a multiple of its power in a hover.
 pub fn power_ratio_at_speed(speed_mps: f32) -> f32 {
     1.0 + 0.004 * speed_mps * speed_mps
 }

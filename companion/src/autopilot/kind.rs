@@ -27,8 +27,8 @@ impl AutopilotKind {
         }
     }
 
-    /// The projection by which it converts latitude and longitude to local metres about its EKF
-    /// origin.
+    /// The projection by which this autopilot converts latitude and longitude to local metres about
+    /// its EKF origin.
     pub fn projection(self) -> Projection {
         match self {
             Self::Px4 => Projection::Px4,
@@ -45,7 +45,7 @@ impl AutopilotKind {
         }
     }
 
-    /// `custom_mode` of the mode in which it lands where it is.
+    /// `custom_mode` of the mode in which the autopilot lands the vehicle where it is.
     pub fn land_mode(self) -> u32 {
         match self {
             Self::Px4 => px4::LAND,
@@ -111,8 +111,9 @@ impl AutopilotKind {
         }
     }
 
-    /// Whether it takes off by NAV_TAKEOFF only, as ArduCopter does, where a setpoint sent before
-    /// the lift-off would cancel the take-off. PX4 (false) lifts off towards a setpoint.
+    /// Whether this autopilot takes off by NAV_TAKEOFF only, as ArduCopter does, where a setpoint
+    /// sent before the lift-off would cancel the take-off. PX4 (false) lifts off towards a
+    /// setpoint.
     pub fn takes_off_by_command(self) -> bool {
         self == Self::ArduPilot
     }

@@ -80,7 +80,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_on_detour()
             || self.detours.is_homeward()
             || self.detours.has_left_plan();
-        // On a detour that leads back to its path it keeps its part of the area.
+        // On a detour that leads back to its path the vehicle keeps its part of the area.
         let beside = self.detours.is_beside_plan();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
@@ -110,8 +110,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 0
             },
             commitment_dm: if on_pad { Some(0) } else { self.commitment_dm().filter(|_| flies) },
-            // Beside its path it does not hold: it first flies its own plan to where it promised to
-            // hold.
+            // Beside its path the vehicle does not hold: it first flies its own plan to where it
+            // promised to hold.
             holds: on_pad || (state == Dividing && !beside),
             wants_division: flies && self.wants_division(),
         }

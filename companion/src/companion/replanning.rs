@@ -172,7 +172,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let leads_back = (ends? - back.position).length() < MAX_REJOIN_ERROR_M;
                 (leads_back && promised_m.is_none()).then_some(purpose)
             }
-            // From aside it comes back to its path no further than where it promised to hold.
+            // From aside the vehicle comes back to its path no further than where it promised to
+            // hold.
             DetourPurpose::Aside(Some(places)) => {
                 let allowed =
                     |place: &RejoinPlace| promised_m.is_none_or(|at_m| place.along_m <= at_m);

@@ -231,7 +231,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// What it says of itself: whether it flies, follows the plan, waits or is blocked.
+    /// Flags of this vehicle's intent: whether it flies, follows the plan, waits or is blocked.
     fn intent_flags(&self) -> u8 {
         use State::*;
         let grounded = match self.mission.state() {

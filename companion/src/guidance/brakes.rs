@@ -12,7 +12,7 @@ use crate::time::{Duration, Instant};
 
 /// A stop nearer ahead than this is the place where the vehicle will wait, metres.
 const WAIT_WITHIN_M: f32 = 8.0;
-/// Age below which a report that others hear this vehicle shows that it is linked.
+/// Age below which another vehicle's report that it hears this one shows that this one is linked.
 const LINKED_WITHIN: Duration = Duration::from_millis(800);
 /// Drift in gusts of a vehicle that its autopilot lands from a standstill, with some reserve,
 /// metres.
@@ -38,10 +38,10 @@ impl Guidance {
         self.evade_search.reset();
     }
 
-    /// Seeks a place to step back to, out from below a vehicle that descends; a place ahead is
-    /// flown to. A vehicle in `Alone` steps back from above one that may lie below, to land beside
-    /// it, and to the end of the part of its path that others know, never beyond where they last
-    /// heard it.
+    /// Moves the place where the vehicle waits back along its path, out of the columns of vehicles
+    /// that descend: the advised stop if it is ahead of the reference, else `back_to_m`. In
+    /// `Alone`, before it lands, the vehicle steps back from above vehicles that may lie below, and
+    /// to the end of the part of its path that others know; never beyond where they last heard it.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,
@@ -57,7 +57,7 @@ impl Guidance {
                 along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let (alone, follows) = (state == State::Alone, state == State::Follow);
-        // A vehicle in its descent, or on its way aside, flies on.
+        // A vehicle in its climb or descent, or on its way aside, is not moved.
         let waits = state.is_on_path()
             && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_aside && follows);

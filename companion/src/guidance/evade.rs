@@ -2,11 +2,11 @@
 //! its path until it is beside the column.
 //!
 //! A vehicle that left the plan and is still in the air is landed by its autopilot, which does not
-//! look. No vehicle waits within [`EVADE_MARGIN_M`] beyond the safety distance of the column in
-//! which that one may come down (`neighbours.rs`). A vehicle that is to wait at a place in there
-//! waits at the nearest free place before it on its path; one that holds its place there flies back
-//! from where it stands. It came that way, so the way is free of walls. It comes no nearer to a
-//! vehicle behind it than [`FOLLOWER_STRAY_M`] beyond the safety distance.
+//! avoid others. No vehicle waits within [`EVADE_MARGIN_M`] beyond the safety distance of the
+//! column in which that one may come down (`neighbours.rs`). A vehicle that is to wait at a place
+//! in there waits at the nearest free place before it on its path; one that holds its place there
+//! flies back from where it stands. It came that way, so the way is free of walls. It comes no
+//! nearer to a vehicle behind it than [`FOLLOWER_STRAY_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several
 //! steps: one for the column of one neighbour, a dozen among the most columns there can be; in
@@ -26,7 +26,7 @@ pub const EVADE_MARGIN_M: f32 = 0.6;
 /// Deviation of two vehicles from their paths, together, metres: kept beyond the safety distance
 /// from a vehicle behind.
 const FOLLOWER_STRAY_M: f32 = 0.6;
-/// Spacing of the places along the path that are compared, metres.
+/// Spacing of the places along the path that are compared with the columns, metres.
 const PLACE_STEP_M: f32 = 0.25;
 /// Maximum number of places along the path that one search compares.
 const MAX_PLACES: u16 = 48;
@@ -50,7 +50,7 @@ pub enum EvadeTarget {
     /// The place where the vehicle would wait anyway is outside all columns.
     #[default]
     Here,
-    /// The nearest place back along the path that is, as arc length in metres.
+    /// The nearest place back along the path that is outside all columns: arc length, metres.
     Back(f32),
     /// No place within 12 m back along the path is outside all columns.
     Nowhere,
@@ -70,7 +70,8 @@ pub struct EvadeSearch {
 
 impl EvadeSearch {
     /// Continues the search, back along the path from `wait_m`, where the vehicle would wait.
-    /// `tell` calls back with each column of the neighbour of an index below `neighbours`.
+    /// `tell` calls its second argument with each column of the neighbour with the given index,
+    /// which is below `neighbours`.
     pub fn continue_search<const W: usize>(
         &mut self,
         path: &Path<W>,

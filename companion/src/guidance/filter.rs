@@ -37,10 +37,10 @@ const MAX_TURNING_SETPOINT_M: f32 = 0.03;
 /// A vehicle nearer than this to its advised stop stands before it, metres: a little more than the
 /// distance that advice looks ahead.
 const STANDSTILL_WITHIN_M: f32 = 0.6;
-/// Time since the filter last hindered the vehicle within which the hindrance still counts as
-/// present.
+/// Time since the filter last kept the vehicle from continuing within which it still counts as
+/// kept.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
-/// Time without a hindrance after which a later one counts as a new hindrance.
+/// Time for which the filter lets the vehicle fly after which a later stop begins a new count.
 const FREE_AFTER: Duration = Duration::from_secs(5);
 /// A vehicle that yields in its descent climbs back up its column after standing for this long.
 const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
@@ -67,7 +67,7 @@ pub(crate) struct SafetyFilter {
     /// Whether the neighbour that the filter stops for is on the ground, or lost.
     blocker_rests: bool,
     blocker_is_stranger: bool,
-    /// Whether the reachable sets of both conflicted in the last step.
+    /// Whether this vehicle's reachable set conflicted with that of a neighbour in the last step.
     sets_intersect: bool,
     /// Whether the filter checked the path backwards in the last step: the vehicle flies back or is
     /// about to.
@@ -84,7 +84,7 @@ pub(crate) struct SafetyFilter {
     /// shorter than [`FREE_AFTER`] count as part of it.
     hindered_since: Option<Instant>,
     hindered_at: Instant,
-    /// Whether this vehicle was to yield when it was last hindered.
+    /// Whether this vehicle was to yield when the filter last kept it from continuing.
     hindered_yields: bool,
     /// Number of times that the filter stopped the vehicle.
     activations: u32,

@@ -20,7 +20,7 @@ const MAX_CORNER_ACCEL_SHARE: f32 = 1.5;
 /// Longest window of the smoother's moving averages, seconds: where a low limit of jerk would need
 /// a longer one, the acceleration is lowered.
 pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
-/// Least time within which an unheard vehicle has stopped, seconds.
+/// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
 const UNHEARD_STOPPED_S: f32 = 3.0;
 /// Time after which a vehicle notices that it is unheard, and brakes, seconds.
 const UNHEARD_NOTICED_S: f32 = 1.8;
@@ -156,7 +156,8 @@ impl Settings {
 pub(crate) fn filter_bounds(track: &TrackConfig, fastest_mps: f32) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
     let speed_max_mps = fmaxf(track.cruise_mps, fastest_mps);
-    // What an unheard vehicle flies until it has stopped, as seconds at full speed.
+    // Distance that an unheard vehicle flies until it has stopped, as the time for it at full
+    // speed.
     let stopped_s = UNHEARD_NOTICED_S + braking.stop_m(speed_max_mps) / speed_max_mps;
     MotionBounds { braking, speed_max_mps, silent_s: fmaxf(UNHEARD_STOPPED_S, stopped_s) }
 }

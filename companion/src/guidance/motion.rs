@@ -24,7 +24,7 @@ impl Motion {
     }
 }
 
-/// The vector, shortened to the length `most` if it is longer.
+/// The vector, shortened to the length `most` if it is longer than that.
 pub(super) fn clamp_length(vector: Point, most: f32) -> Point {
     vector * (most / fmaxf(vector.length(), fmaxf(most, 1e-6)))
 }

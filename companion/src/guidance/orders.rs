@@ -1,5 +1,5 @@
-//! What the mission orders guidance to do: to begin a path, to resume or reverse it, to be led
-//! down.
+//! Commands of the mission to guidance: hold, begin the climb or a path, resume or reverse the
+//! path, lead a landing down.
 
 use super::known_way::KnownWay;
 use super::nearest::nearest_arc_length_m;
@@ -41,7 +41,7 @@ impl Guidance {
         }
     }
 
-    /// Lets the reference run along the path from its place there.
+    /// Puts the flight on its path: the reference advances from the arc length that it has.
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
         self.evade_search.reset();

@@ -87,8 +87,8 @@ impl Guidance {
                     self.tracker.along_m - behind * 0.5,
                     behind,
                 );
-                // Within `ARRIVED_M` of its reference it counts as having come as far as gates ask
-                // of a vehicle that waits there.
+                // Within `ARRIVED_M` of its reference the vehicle reports at least the progress
+                // that gates ask of a vehicle that waits there.
                 let at = path.point_at(self.tracker.along_m);
                 let arrived =
                     at.is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_M);
@@ -103,7 +103,7 @@ impl Guidance {
         }
     }
 
-    /// Whether the vehicle is at the end of its path, if that is not one back or aside.
+    /// Whether the reference has come to the end of a path that leads neither back nor aside.
     pub fn is_at_goal<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -147,7 +147,7 @@ impl Guidance {
             && self.is_leg_done()
             && top.is_some_and(|top| {
                 let apart = self.smoother.position() - scene.telemetry.position;
-                // Setpoint and vehicle have to be at the top both: a low climb must not count as
+                // Both setpoint and vehicle have to be at the top: a low climb must not count as
                 // done while the vehicle is on its pad.
                 (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
                     && self.is_standing()

@@ -94,8 +94,8 @@ impl Guidance {
         reference.map_or(raw, |reference| reference.position)
     }
 
-    /// The next raw point of a stop: it brakes along the path or leg, as a stop from high speed is
-    /// longer than what the smoother's curve still holds.
+    /// The next raw point of a stop: it brakes along the path or leg, since a stop from high speed
+    /// is longer than the raw steps that the smoother's averages still hold.
     pub(super) fn next_braked_raw_point<const W: usize>(&mut self, path: &Path<W>) -> Point {
         let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
         let reference = match (self.phase, &self.leg) {

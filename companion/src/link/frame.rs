@@ -128,7 +128,7 @@ pub struct Framer {
 
 const _: () = assert!(size_of::<Framer>() <= 480);
 
-/// What the bytes at the front of the buffer are.
+/// Result of parsing the bytes at the front of the receive buffer.
 enum ParseStatus {
     /// An incomplete candidate; it needs this many bytes in all for the next decision.
     NeedsBytes(usize),

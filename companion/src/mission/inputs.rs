@@ -64,7 +64,8 @@ pub struct GuardInputs {
     /// Whether, in `Ready`, the position estimate's error bound exceeds what the margin leaves for
     /// it at cruise speed.
     pub imprecise: bool,
-    /// Time for which that bound has exceeded what the margin leaves for it even at crawl speed.
+    /// Time for which the position estimate's error bound has exceeded what the margin leaves for
+    /// it even at crawl speed.
     pub imprecise_for: Duration,
     /// Whether the EKF origin moved while the motors were armed.
     pub origin_moved: bool,
@@ -90,9 +91,9 @@ pub struct GuardInputs {
     pub may_fly_beside: bool,
     /// Whether this vehicle stands at the end of its detour, back on its path.
     pub around_flown: bool,
-    /// Whether the rest of its own plan has come there.
+    /// Whether the rest of its own plan has come to this vehicle, back on its path after a detour.
     pub own_plan_ready: bool,
-    /// Whether the rest of its own plan could not be planned there.
+    /// Whether the rest of its own plan could not be planned for this vehicle, back on its path.
     pub own_plan_lost: bool,
     /// Whether this vehicle flies its path home over the field, or seeks one.
     pub homeward: bool,
@@ -152,27 +153,29 @@ pub struct GuardInputs {
     /// Time for which the column below the vehicle, before take-off the column above its pad, has
     /// not been free of other vehicles.
     pub column_blocked_for: Duration,
-    /// Time for which a vehicle that rests for good, or is lost, has been in that column.
+    /// Time for which a vehicle that rests for good, or is lost, has been in the column below this
+    /// vehicle, or before take-off above its pad.
     pub column_blocked_for_good_for: Duration,
-    /// Time for which another vehicle in that column, or an obstacle on the path, has kept this
-    /// vehicle on its pad.
+    /// Time for which another vehicle in the column above its pad, or an obstacle on its path, has
+    /// kept this vehicle on its pad.
     pub start_barred_for: Duration,
     /// Whether, in a coverage mission, another vehicle that takes part is in flight.
     pub others_fly: bool,
-    /// Time for which that column has been free of other vehicles.
+    /// Time for which the column below this vehicle, or before take-off above its pad, has been
+    /// free of other vehicles.
     pub column_clear_for: Duration,
     /// Whether the vehicle can turn back along the path flown so far: it is on that path and does
     /// not fly back yet. In a coverage mission only while it seeks a path home.
     pub can_turn_back: bool,
-    /// Time for which the last leg of this vehicle has been blocked: the descent to its pad on a
-    /// way home by any vehicle, the way home itself, and at the end of a coverage path the descent,
-    /// by one that rests for good.
+    /// Time for which the last leg of this vehicle has been blocked: on its way home the descent to
+    /// its pad by any vehicle; the way home before that, and the descent at the end of a coverage
+    /// path, by a vehicle that rests for good.
     pub pad_blocked_for: Duration,
     /// Whether a place aside to land at may be sought.
     pub can_land_aside: bool,
     /// Whether a place aside to land at is being sought.
     pub seeks_landing: bool,
-    /// Whether a place aside to land at is being sought or flown to.
+    /// Whether a place aside to land at is being sought, flown to, or reached.
     pub lands_aside: bool,
     /// Whether the vehicle stands at the end of its path to a place aside where it is to land.
     pub aside_reached: bool,

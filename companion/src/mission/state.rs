@@ -134,24 +134,25 @@ impl State {
         )
     }
 
-    /// Whether a vehicle in this state will fly on along its coverage path as long as its lease
-    /// lasts, unheard too, or is about to take off.
+    /// Whether a vehicle in this state flies on along its coverage path while its lease lasts, even
+    /// if no other vehicle hears it, or is about to: it prepares its take-off or climbs.
     pub(crate) fn flies_on_lease(self) -> bool {
         use State::*;
         self.is_on_path() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
     }
 
-    /// Whether a vehicle that stands in this state stays there until its own mission moves it on.
+    /// Whether a vehicle in this state is on its path, flying or holding: once it holds, only its
+    /// own mission moves it on.
     pub(crate) fn is_on_path(self) -> bool {
         use State::*;
         matches!(self, Follow | Paused | Alone | Blocked | Replanning | Dividing)
     }
 }
 
-/// Target state of a row.
+/// Target state of a row of the mission table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetState {
-    /// This state.
+    /// A given state.
     State(State),
     /// The state that was interrupted.
     Interrupted,

@@ -121,7 +121,7 @@ impl Ftp {
             | FtpOperation::Close(held) => same(held),
         };
         if !at_work && !self.queue.iter().any(same) {
-            // A full queue drops it: the client repeats it.
+            // A full queue drops the request: the client sends it again.
             let _ = self.queue.push_back(request);
         }
     }

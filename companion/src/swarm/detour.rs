@@ -1,18 +1,18 @@
-//! Flying around what left the plan: which vehicles count as out of the plan, whether their places
-//! block the path, and the turn to fly a detour.
+//! Detours around vehicles that left the plan, and around reported obstacles: which vehicles count
+//! as out of the plan, whether something blocks the path, and the turn to fly a detour.
 //!
 //! A vehicle that is out of the plan (landed elsewhere, with its pilot for good, or silent for so
 //! long that it counts as dead) opens every gate that waits for it, and is an obstacle where it
 //! rests. A vehicle whose path it blocks, or which was out itself and may fly again, stops and
-//! waits until all others are out, or stand and wait too. Then the blocked one with the lowest
-//! system id requests a detour from its shell and flies it to its goal. Meanwhile it reports the
-//! progress at which it left the plan: vehicles that wait for it go on waiting, so it flies alone.
-//! Once it has landed it is out of the plan, and the next may go.
+//! waits until all others are out of the plan, or stand and wait too. Then the blocked one with the
+//! lowest system id requests a detour from its shell and flies it to its goal. Meanwhile it reports
+//! the progress at which it left the plan: vehicles that wait for it go on waiting, so it flies
+//! alone. Once it has landed it is out of the plan, and the next may go.
 //!
-//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: for
-//! [`TURN_CLAIM`], longer than messages take, the vehicle reports that its path is blocked and no
-//! longer that it waits. It begins only if all others wait then; a vehicle that hears a lower
-//! system id claim waits again.
+//! Two vehicles must not begin a detour at once, each before it hears of the other. So a turn is
+//! claimed first: for [`TURN_CLAIM`], longer than messages take, the vehicle reports that its path
+//! is blocked and no longer that it waits. It begins only if all others wait then; a vehicle that
+//! hears a lower system id claim waits again.
 //!
 //! The place of a vehicle that is out is compared with the whole path before its gates open, and
 //! from then on twice a second: [`MAX_STRETCHES_PER_STEP`] stretches of the path a step, so a scan
@@ -47,13 +47,13 @@ use crate::time::{Duration, Instant};
 
 /// Period of the scans that check whether the path is blocked.
 const BLOCKED_CHECK_EVERY: Duration = Duration::from_millis(500);
-/// Number of comparisons of a stretch of the path with a keep-out zone in one step; at least those
-/// of the whole path with one zone.
+/// Maximum number of comparisons of a path segment with a keep-out zone in one step, or those of
+/// the whole path with one zone if they are more.
 const MAX_STRETCHES_PER_STEP: usize = 160;
-/// Cost of making one keep-out zone, as a number of such comparisons.
+/// Cost of computing one keep-out zone, as a number of comparisons of it with a path segment.
 const ZONE_COST: usize = 12;
-/// Time for which all other vehicles have to stand before a detour begins, seconds: longer than a
-/// vehicle takes to see and obey a gate that opened.
+/// Time for which all other vehicles have to stand before this one claims the turn, seconds: longer
+/// than a vehicle takes to see and obey a gate that opened.
 const ALL_STAND_S: u64 = 3;
 /// Time for which a vehicle claims the turn to fly a detour before it takes the turn.
 const TURN_CLAIM: Duration = Duration::from_secs(1);
@@ -64,20 +64,20 @@ const DETOUR_RETRY_S: u64 = 10;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
 /// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(30);
-/// Number of searches without a detour after which a vehicle gives up; one fewer is enough after
-/// [`GIVE_UP_AFTER_S`].
+/// Number of failed searches, and detours without progress, after which a vehicle seeks no further
+/// detour; one search fewer is enough if they failed in one place over [`GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 4;
-/// Time of searching from one place after which one search fewer is enough to give up, seconds.
+/// Time since the first failed search in one place after which one search fewer is enough, s.
 const GIVE_UP_AFTER_S: u64 = 60;
-/// Time without progress after which a detour counts as blocked, or a stopped vehicle's path.
+/// Time without progress on a detour, or under a stop by the safety filter, that counts as a block.
 const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress since the last block after which a further block counts as a new one, metres.
 const BLOCKED_AGAIN_M: f32 = 2.0;
-/// Time since the filter last hindered the vehicle within which the hindrance still counts; for a
-/// blocked vehicle it is [`BLOCKED_HINDERED_WITHIN`], so that a neighbour that sways at the edge of
-/// the path does not make the block begin again and again.
+/// Time since the safety filter last stopped the vehicle within which it still counts as stopped;
+/// for a blocked vehicle it is [`BLOCKED_HINDERED_WITHIN`], so that a neighbour that sways at the
+/// edge of the path does not make the block begin again and again.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
-/// Time without a hindrance after which a blocked vehicle counts as free.
+/// Time without a stop by the safety filter after which a blocked vehicle counts as free.
 const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which the vehicle counts as out of the plan: others fly
 /// around it.
@@ -86,24 +86,24 @@ const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 /// Time after which a vehicle on its pad that no other vehicle hears reports that it waits.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
-/// Distance from the end of a path aside at which a blocked vehicle still is aside, metres.
+/// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
 const SWAY_ASIDE_M: f32 = 0.5;
-/// Deviation from the path, metres: a zone within the safety distance and this blocks the path.
+/// Deviation, metres: a neighbour within the safety distance plus this of the path blocks it.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
 /// What blocks the path ahead, and the detour that is requested or flown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Detours {
     obstacles: Obstacles,
-    /// Whether the path is blocked, or the plan was left.
+    /// Whether the vehicle has to wait for a detour: its path is blocked, or it left the plan.
     blocked: bool,
-    /// Whether this vehicle was out of the plan once, or flew a detour that leads not back to it.
+    /// Whether this vehicle was out of the plan once, or got a path that does not lead back to it.
     left_plan: bool,
     flown: FlownPath,
     /// Purpose of the path requested from the shell, and whether the shell has read the request.
     sought: Option<DetourPurpose>,
     request_read: bool,
-    /// Search and flight straight home over an area.
+    /// The search for a path straight home over an area.
     pub(crate) home: HomewardSearch,
     /// Searches for a detour over an area that leads back to the plan's path.
     area_searches: AreaDetourSearches,
@@ -111,10 +111,10 @@ pub(crate) struct Detours {
     left_at_m: f32,
     /// Whether the requested detour has come and is not flown yet.
     detour_ready: bool,
-    /// Number of failed searches since another vehicle last moved.
+    /// Number of failed searches for a detour to the goal since another vehicle last moved.
     failures: u8,
-    /// Whether a further search is useless: all others lie or rest for good, or searches from here
-    /// failed for a while.
+    /// Whether a further search is useless: no other vehicle will move any more, or searches from
+    /// this place have failed for [`GIVE_UP_AFTER_S`].
     no_retry: bool,
     /// Number of failed searches from about this place, the place along the path, metres, and the
     /// time of the first.
@@ -125,7 +125,7 @@ pub(crate) struct Detours {
     detours_without_progress: u8,
     /// When a search for a path aside last failed.
     no_way_aside_at: Option<Instant>,
-    /// Place of the vehicle before its position jumped, and when; `None` without a jump.
+    /// Place from before a jump of the position, and the time of the jump; `None` without a jump.
     before_jump: Option<(Point, Instant)>,
     all_standing_since: Option<Instant>,
     /// Since when this vehicle claims the turn to fly a detour.
@@ -136,8 +136,8 @@ pub(crate) struct Detours {
     /// Progress of the scan under way, and whether the last one found an obstacle on the path.
     scan: IncrementalScan,
     obstructed: bool,
-    /// Place along the path where the vehicle was blocked, metres, and since when: it has come no
-    /// further, though its path may have been clear in between.
+    /// Place along the path where the vehicle was first blocked, metres, and when; kept until it is
+    /// blocked [`BLOCKED_AGAIN_M`] further on, though the path may be clear in between.
     blocked_here: Option<(f32, Instant)>,
 }
 
@@ -155,7 +155,7 @@ impl Detours {
         self.obstacles.forget_avoided();
     }
 
-    /// Begins a new flight over an area: the others count this vehicle as a new one.
+    /// Begins a new flight over an area: the vehicle no longer counts as having left the plan.
     pub(crate) fn begin_flight(&mut self) {
         self.left_plan = false;
     }
@@ -165,7 +165,7 @@ impl Detours {
         (self.blocked, self.obstructed) = (true, true);
     }
 
-    /// Adds or removes the obstacle of a command; returns the MAV_RESULT.
+    /// Adds, or removes, the obstacle that a command reports; returns the MAV_RESULT.
     pub(crate) fn handle_obstacle_command(
         &mut self,
         command: &Command,
@@ -174,7 +174,7 @@ impl Detours {
     ) -> u8 {
         let result = self.obstacles.handle_command(command, origin, clearance_m);
         if command.param1 <= 0.0 && result == ACCEPTED {
-            // A scan under way counts obstacles by index: it begins again.
+            // Obstacles were removed: a scan under way knows them by index, so it begins again.
             self.scan.restart();
             self.scan_began = None;
         }
@@ -186,23 +186,23 @@ impl Detours {
         self.obstacles.count()
     }
 
-    /// Whether the path is blocked, or the plan was left.
+    /// Whether the vehicle has to wait for a detour, or for its path home.
     pub(crate) fn is_blocked(&self) -> bool {
         self.blocked || self.home.is_seeking()
     }
 
-    /// Time for which the vehicle, blocked now and again, has come no further.
+    /// Time since the vehicle was first blocked about here, free times in between included; else 0.
     pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
         self.blocked_here.map_or(Duration::default(), |(_, since)| now - since)
     }
 
-    /// Whether this vehicle was out of the plan once, or flew a detour that leads not back to it.
+    /// Whether this vehicle was out of the plan once, or got a path that does not lead back to it.
     pub(crate) fn has_left_plan(&self) -> bool {
         self.left_plan
     }
 
-    /// First free place along the path over an area beyond what blocks it, metres: there the
-    /// vehicle could come back to its path.
+    /// First free place along the path over an area beyond the block, metres, for the end of a
+    /// detour; `None` if there is none.
     pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -238,7 +238,8 @@ impl Detours {
             && self.area_searches.may_seek(view.now)
     }
 
-    /// Ends a detour over an area: with the own plan, if that `came`, else without a return to it.
+    /// Ends a detour over an area. If the vehicle's own plan `came` from the shell, it flies that
+    /// next; else it does not return to its plan.
     pub(crate) fn end_area_detour(&mut self, came: bool) {
         if came {
             let field_searches = self.area_searches;
@@ -259,7 +260,8 @@ impl Detours {
         self.left_at_m
     }
 
-    /// Whether this vehicle is out of the plan: at rest, not at its goal, or kept by its pilot.
+    /// Whether this vehicle is out of the plan: done away from its goal or after leaving the plan,
+    /// aborted, or flown by its pilot for [`PILOT_KEEPS_AFTER`].
     pub(crate) fn is_out_of_plan<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -275,7 +277,7 @@ impl Detours {
         }
     }
 
-    /// Whether this vehicle stands until another one moves, without claiming the turn to move.
+    /// Whether this vehicle stands until another one moves, and does not claim the turn itself.
     pub(crate) fn is_waiting<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -304,7 +306,7 @@ impl Detours {
                 view.guidance.filter.is_stopped()
                     && view.telemetry.velocity.length() < MAX_HOVER_MPS
             }
-            // A vehicle that is blocked in its descent hovers in it.
+            // `stands` is false in a descent, where a blocked vehicle hovers too.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
             // A held landing goes on by itself once its column is free.
             State::LandingHeld => view.telemetry.velocity.length() < MAX_HOVER_MPS,
@@ -312,8 +314,8 @@ impl Detours {
         }
     }
 
-    /// Continues the scan for obstacles on the path, and decides whether the vehicle is blocked.
-    /// Returns when the scan that ended now began, if it found the path clear.
+    /// Continues the scan for obstacles on the path, and decides whether the vehicle is blocked. If
+    /// a scan ends in this step and found the path clear, returns when it began; else `None`.
     pub(crate) fn scan_path<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,
@@ -343,7 +345,7 @@ impl Detours {
         looked.and_then(|looked| looked.clear_at)
     }
 
-    /// Continues the scan under way; `None` while none has ended.
+    /// Continues the scan under way; `None` while it goes on, or where there is none.
     fn take_scan_result<const V: usize, const W: usize, const G: usize>(
         &mut self,
         on_ground: bool,
@@ -366,7 +368,7 @@ impl Detours {
         let stuck = self.is_on_detour()
             && view.mission.state() != State::Scheduled
             && now - view.guidance.last_progress_at() > STUCK_AFTER;
-        // A vehicle that stands aside may have swayed back a little from the end.
+        // A vehicle that stands at the end of a path aside may have swayed back a little.
         let stands = matches!(view.mission.state(), State::Blocked | State::Replanning);
         let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
@@ -405,8 +407,8 @@ impl Detours {
         self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
-    /// Whether the filter has kept the vehicle from continuing for 20 s although it goes first;
-    /// over an area also because of a neighbour off the plan.
+    /// Whether the safety filter has kept the vehicle from flying on for 20 s although it goes
+    /// first; over an area also if it yields to a neighbour off the plan.
     fn is_stopped_for_long<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -429,8 +431,8 @@ impl Detours {
         let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
-        // A vehicle that hovers sways. What blocked the path over an area blocks it until it is as
-        // far away as a detour keeps.
+        // A hovering vehicle sways. So over an area an obstacle that has blocked the path does so
+        // until it is as far from the path as a detour keeps.
         let waits = view.config.lost_vehicle_down_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
@@ -446,8 +448,8 @@ impl Detours {
                 Some(obstacle) => tell(*obstacle),
                 None => neighbours.for_each_zone_of(source - new.len(), now, apart_m, tell),
             },
-            // Over an area the vehicle photographs on, and stops and flies around an obstacle when
-            // it comes near.
+            // Over an area only the path just ahead counts: the vehicle goes on taking pictures
+            // until it is near the obstacle.
             |obstacle| {
                 let until_m = match view.config.lost_vehicle_down_s {
                     Some(_) => along_m.max(0.0) + LOOK_AHEAD_M,
@@ -474,7 +476,7 @@ impl Detours {
         let wait_s = ALL_STAND_S
             + TURN_DELAY_S * view.neighbours.blocked_count_before(view.config.system_id)
             + DETOUR_RETRY_S * u64::from(self.failures);
-        // Over an area there are no turns.
+        // Over an area vehicles take no turns.
         self.blocked
             && view.config.lost_vehicle_down_s.is_none()
             && view.neighbours.are_all_standing(view.now)

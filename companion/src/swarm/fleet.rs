@@ -113,7 +113,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Begins a flight, or a new plan: silence before does not count.
+    /// Begins a flight, or a new plan: all silence before is forgotten. A vehicle that was lost,
+    /// has left or flew a division takes part again under a new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
         let entry = self.members[self.own].entry;
         if entry.status != MemberStatus::Alive || self.excluded || !self.divisions.is_empty() {
@@ -143,7 +144,7 @@ impl<const V: usize> Fleet<V> {
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[self.own].entry;
-        // A vehicle that has left flies a path outside its share.
+        // The path of a vehicle that has left is no part of its share: its progress does not count.
         if caught_up && entry.status == MemberStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
@@ -171,7 +172,8 @@ impl<const V: usize> Fleet<V> {
         }
         let asks = own.wants_division && self.is_alive(self.own) && !self.divisions.is_full();
         if (self.is_dividing() || asks) && caught_up {
-            // The promise requests the division from the others.
+            // This vehicle's promise, in its next report, also requests the division from the
+            // others.
             let entry = &mut self.members[self.own].entry;
             entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
             entry.holds |= own.holds && entry.commitment_dm.is_some();
@@ -195,7 +197,7 @@ impl<const V: usize> Fleet<V> {
         self.is_alive(self.own) && !self.divisions.is_full() && asked
     }
 
-    /// Whether the vehicle of this rank takes part.
+    /// Whether the vehicle of this rank takes part in the mission.
     pub(crate) fn is_alive(&self, rank: usize) -> bool {
         let member = &self.members[rank];
         member.in_roster && member.entry.status == MemberStatus::Alive

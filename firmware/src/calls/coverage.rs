@@ -23,7 +23,7 @@ use crate::scratch::CoverageBenchWorkspace;
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
 /// Vehicles in the plans for which the bench sets a limit of instructions.
 const LIMITED_VEHICLES: usize = 3;
-/// Number of packings that the POWELL search tries.
+/// Settings of the POWELL search, as on the desk.
 const POWELL_SEARCH: powell::PowellConfig = powell::PowellConfig::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 
@@ -66,7 +66,7 @@ pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageBenchWo
     let five = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]].map(flat);
     let area = Area::new(&five, &[Ring { end: 5, kind: RingKind::Outer }]).expect("an area");
     measure_plans(meter, area, lent, &mut sum);
-    // Area that takes the most lanes, for the most vehicles.
+    // Area of as many lanes as a board holds, 512, for as many vehicles, 32.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(flat);
     let area = Area::new(&wide, &[Ring { end: 4, kind: RingKind::Outer }]).expect("an area");
     measure_division(meter, area, lent, &mut sum);
@@ -237,7 +237,7 @@ fn measure_division(
     }));
 }
 
-/// Plans detours home, and one that leaves a column, among no-fly zones and 128 keep-out zones.
+/// Plans three detours home and one to a place aside, among no-fly zones and 128 keep-out zones.
 fn measure_ways_home(
     meter: &mut impl Meter,
     transit: &Transit<'_, AREA_CORNERS>,
@@ -282,7 +282,8 @@ fn measure_ways_home(
 /// No-fly zones of the largest area.
 const ZONES: usize = AREA_CORNERS / 4;
 
-/// The vertices and rings of an area with as many as there may be.
+/// The vertices and rings of an area with as many vertices and corners of no-fly zones as a board
+/// holds.
 fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
     const OUTER: usize = AREA_VERTICES - AREA_CORNERS;
     let mut vertices: Vec<Flat, AREA_VERTICES> = Vec::new();
@@ -304,7 +305,8 @@ fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
     (vertices, rings)
 }
 
-/// Plans an area with the most vertices, some of them of no-fly zones with the most corners.
+/// Plans an area with as many vertices, and as many corners of no-fly zones among them, as a board
+/// holds.
 fn measure_largest_area(
     meter: &mut impl Meter,
     lent: &mut CoverageBenchWorkspace,

@@ -72,7 +72,7 @@ const NO_FLY_ZONES: [[[f32; 2]; 4]; 2] = [
     [[200.0, 60.0], [240.0, 60.0], [240.0, 110.0], [200.0, 110.0]],
 ];
 
-/// Makes and measures all coverage plans and divisions; returns a checksum of the results.
+/// Measures all coverage plans and divisions; returns a checksum of the results.
 #[inline(never)]
 pub fn measure_coverage_flights(
     meter: &mut impl Meter,
@@ -229,7 +229,8 @@ fn measure_mission_plans(
     }
 }
 
-/// Measures the flights of given routes, and the division of a lost vehicle's work.
+/// Measures the planning of flights for given routes, and the division after the loss of a vehicle,
+/// for three vehicles and for 32.
 #[inline(never)]
 fn measure_plan_parts(
     meter: &mut impl Meter,
@@ -250,7 +251,7 @@ fn measure_plan_parts(
         };
         measure_division(meter, &case, names, lent, out, &mut sum);
     }
-    // Area that takes the most lanes, for the most vehicles.
+    // Area of as many lanes as a board holds, 512, for as many vehicles, 32.
     let wide =
         [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
     let rings = [Ring { end: 4, kind: RingKind::Outer }];

@@ -2,7 +2,8 @@
 //!
 //! The script acts as a PX4 that moves to each setpoint, and as neighbours that send random
 //! positions, intents and flags, or fall silent. In half of the flights (hard) all neighbours are
-//! near, and off the plan, out of it, or silent for up to 90 s.
+//! off the plan, out of it, or silent for up to 90 s; they are near, but for the silent ones of
+//! some flights.
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
@@ -29,8 +30,8 @@ pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
 /// Row of the table: a control step after most neighbours left the plan or fell silent.
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
-/// Row of the table: a control step while all neighbours are near and off the plan but few are on
-/// the path, so that the safety filter compares all of them.
+/// Row of the table: a control step while all neighbours are near, on the plan or off it, but few
+/// are on the path, so that the safety filter compares all of them.
 pub const NEAR_STEP: &str = "a control step, 32 near";
 /// Row of the table: a control step of a coverage mission beside 32 neighbours, in flight or while
 /// the work is divided.
@@ -47,9 +48,10 @@ const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
 /// Least distance of a neighbour beside this vehicle, metres.
 const MIN_BESIDE_M: f32 = 4.0;
-/// Least additional distance of a silent neighbour that is far away, metres.
+/// Least distance by which a silent neighbour is moved away in a flight of [`has_silent_far_away`],
+/// metres.
 const MIN_FAR_M: f32 = 70.0;
-/// Greatest additional distance of a silent neighbour that is far away, metres.
+/// Greatest such distance, metres.
 const MAX_FAR_M: f32 = 120.0;
 /// Control steps counted in each flight.
 const COUNTED_STEPS: usize = 200;
@@ -58,7 +60,7 @@ const COUNTED_STEPS: usize = 200;
 const MAX_AGEING_STEPS: usize = 100;
 const STEP_TIME: Duration = Duration::from_millis(50);
 const AGEING_TIME: Duration = Duration::from_millis(900);
-/// Steps of 50 ms in which the vehicle must have taken off.
+/// Number of steps of 50 ms within which the vehicle must be on its path.
 const MAX_TAKE_OFF_STEPS: usize = 400;
 
 const HEARTBEAT: u32 = 0;
@@ -223,7 +225,8 @@ const FILTER_ROUNDS: usize = 40;
 const FILTERED: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
-/// Pairs from which a neighbour is drawn: its intent's flags, and whether it falls silent.
+/// Pairs of which each neighbour gets one at random: its intent's flags, and whether it falls
+/// silent.
 const MOSTLY_ON_PLAN: [(u8, bool); 4] = [
     (AIR, false),
     (intent::GROUNDED | intent::ON_PLAN | intent::WAITING, false),

@@ -74,7 +74,7 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         to.add_count(word ^ mask as usize);
         let grid =
             to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
-        // None of these shapes needs four words, so `new` must refuse the words of [`SHAPE`].
+        // None of these shapes has four words, so `new` must refuse `WORDS`, which fit [`SHAPE`].
         assert!(grid.is_err(), "{shape:?}");
     }
     for hard in HARD_NUMBERS {
@@ -87,7 +87,7 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         }
         to.call("voxel::GridShape::center", || shape.center([u32::MAX; 3]));
     }
-    // Padding bits, which belong to no cell and must be 0, and neighbouring bits that belong to a
+    // Padding bits, which belong to no cell and must be 0, and bits beside them that belong to a
     // cell.
     for (word, bit, padding) in
         [(1, 1, true), (1, 0, false), (2, 8, true), (2, 4, false), (0, 48, true)]
@@ -281,7 +281,7 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
     assert!(!to.call("flight::Path::waypoints", || path.waypoints().is_empty()));
 }
 
-/// The way along a path, whatever the advice, the step and the limits.
+/// Calls of the reference along a path, with extreme advice, time steps and limits.
 fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32, other: f32) {
     let track = TrackConfig::default();
     let advice = |scale: f32, within_m: f32| Advice {

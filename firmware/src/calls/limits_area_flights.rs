@@ -27,7 +27,8 @@ const GATES: usize = 8;
 
 type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-/// A call that plans the flights of these routes.
+/// A closure that plans the flights of given routes by `flights::plan_flights`, and checks the
+/// result.
 type PlanCall<'p> = dyn FnMut(&AreaWork<'_>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Planned + 'p;
 type AreaWork<'w> = Work<'w, LANES, CORNERS>;
 type Planned = Result<(), PlanError>;
@@ -41,7 +42,7 @@ pub(super) struct FlightWorkspaces {
 }
 
 impl FlightWorkspaces {
-    /// Empty; its bytes are all zeros.
+    /// Empty workspaces, whose bytes are all zeros.
     pub(super) const fn new() -> Self {
         Self {
             area: coverage::CoverageMemory::new(),
@@ -163,7 +164,7 @@ fn call_flight_plans(
     call_field_plans(&mut plan, good, routes);
 }
 
-/// Plans for a vehicle or a pad with a hard number.
+/// Plans with `hard` in one field of the second vehicle or of its pad.
 fn call_hard_vehicles(
     plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
@@ -228,7 +229,7 @@ fn unusual_routes(
     assert_eq!(plan(good, &Plan::new(), &SWARM), Ok(()));
 }
 
-/// Plans flights above a height field, with extreme settings of terrain following.
+/// Plans flights above a height field, with extreme settings for terrain following.
 fn call_field_plans(
     plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,

@@ -1,4 +1,4 @@
-//! The calls on cameras and spacings at their limits and beyond.
+//! Calls on cameras and on spacings of lanes and waypoints, with extreme and invalid arguments.
 
 use planner_core::coverage::CoverageError;
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};

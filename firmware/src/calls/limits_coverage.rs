@@ -66,7 +66,7 @@ pub(super) struct CoverageMemory {
 }
 
 impl CoverageMemory {
-    /// Empty; its bytes are all zeros.
+    /// Empty memory, whose bytes are all zeros.
     pub(super) const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
@@ -237,7 +237,7 @@ fn call_lanes(
     call_waypoint_numbers(to, tracks);
 }
 
-/// Calls with lanes of another tool: none, parallel ones, and ones with extreme ends.
+/// Calls of `given::order_given_lanes`: with no lanes, with parallel ones, and with extreme ends.
 fn call_given_lanes(
     to: &mut Results<'_, impl Listener>,
     transit: &ZoneTransit<'_>,

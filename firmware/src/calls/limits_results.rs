@@ -1,8 +1,8 @@
-//! What calls at their limits are made of, and what becomes of their answers.
+//! Extreme arguments for the calls, and the checksum of the calls' results.
 
 use planner_core::Point;
 
-/// Numbers that make code fail which does not check its arguments.
+/// Extreme and invalid arguments, which make code fail that does not check them.
 pub(super) const HARD_NUMBERS: [f32; 14] = [
     0.0,
     -0.0,
@@ -20,7 +20,7 @@ pub(super) const HARD_NUMBERS: [f32; 14] = [
     f32::NAN,
 ];
 
-/// Is given the name of each call before it is made, so that a panic can be attributed.
+/// Receives the name of each call before the call is made, so that a panic can be attributed to it.
 pub trait Listener {
     /// Called before each call; `name` is the callee's file, type (if any) and function.
     fn next(&mut self, name: &'static str);
@@ -33,7 +33,7 @@ pub struct Results<'a, L> {
 }
 
 impl<'a, L: Listener> Results<'a, L> {
-    /// No results yet.
+    /// A checksum of no results.
     pub fn new(listener: &'a mut L) -> Self {
         Self { listener, sum: 0 }
     }

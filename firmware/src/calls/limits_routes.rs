@@ -37,7 +37,7 @@ pub struct RouteWorkspaces {
 }
 
 impl RouteWorkspaces {
-    /// Empty; its bytes are all zeros.
+    /// Empty workspaces, whose bytes are all zeros.
     pub const fn new() -> Self {
         Self {
             ws: Workspace::new(),

@@ -24,16 +24,18 @@ const ROUGH_GROUND_M: f32 = 0.5;
 const ROUNDING_M: f64 = 0.01;
 /// Most corners of a zone that is not a box.
 const MAX_ZONE_CORNERS: usize = 8;
-/// Distance from lanes and pads within which zones are kept, metres: transits may lead there.
+/// Distance from the box around all lanes and pads within which zones are kept, metres: transits
+/// may lead there.
 const NEAR_M: f32 = 30.0;
-/// Distance from a kept zone within which other zones are kept, metres.
+/// Distance by which a kept zone widens the box in which other zones are kept, metres.
 const NEAR_ZONE_M: f32 = 5.0;
 
-/// How zones are drawn: the first has the least area, the last the fewest corners.
+/// Ways to draw zones, the preferred one first: the first gives the least area, the last the fewest
+/// corners.
 const OUTLINES: [Outline; 2] =
     [Outline { boxes: false, free_share: 0.3 }, Outline { boxes: true, free_share: 0.5 }];
 
-/// How zones are drawn around blocked columns.
+/// A way to draw zones around blocked columns.
 #[derive(Clone, Copy)]
 struct Outline {
     /// Boxes along the axes, in place of convex hulls.
@@ -42,7 +44,7 @@ struct Outline {
     free_share: f64,
 }
 
-/// The zones have more corners than can be planned around: so many.
+/// Error: the zones have this many corners, more than can be planned around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyCorners(pub usize);
 
@@ -99,8 +101,9 @@ impl Obstacles {
     }
 
     /// Zones around the obstacles that reach above `floor_m` and are near `places`, beyond which
-    /// lanes lead by `beyond_m`.
-    /// `own` is the number of corners that other no-fly zones have.
+    /// lanes lead by `beyond_m`. `own` is the number of corners that other no-fly zones have. Of
+    /// the ways to draw zones the first is taken with which a board can plan, else the first within
+    /// `most` corners.
     ///
     /// # Errors
     /// All zones together have more than `most` corners.
@@ -142,8 +145,9 @@ fn to_flat(polygon: &Polygon) -> Vec<Flat> {
     polygon.iter().map(|[x, y]| Flat::new(*x as f32, *y as f32)).collect()
 }
 
-/// The zones that may matter to flights between `places`: those within `near_m` of them, and those
-/// near these.
+/// The zones that may matter to flights between `places`: those that meet the box around all
+/// places, wider by `near_m`. The box grows by each kept zone, wider by [`NEAR_ZONE_M`], until it
+/// meets no further zone. Zones count by their boxes.
 fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Vec<Flat>> {
     let extent = |points: &[Flat], around_m: f32| {
         let start = [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)];
@@ -212,7 +216,7 @@ impl Columns {
         (0..tall).flat_map(move |j| (0..wide).map(move |i| [i, j]))
     }
 
-    /// The columns around one, itself included.
+    /// A column and the columns beside it, diagonally too.
     fn around(&self, [i, j]: Column) -> impl Iterator<Item = Column> + use<> {
         let [wide, tall] = self.size;
         let near = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
@@ -228,7 +232,8 @@ impl Columns {
             steps.filter(|[i, j]| gap_m(*i).hypot(gap_m(*j)) <= self.clearance_m).collect();
         self.grown.clone_from(&self.blocked);
         for column in self.all() {
-            // Only from the columns at the edge: what is beside the others is blocked.
+            // Only columns at an edge are grown from: all columns around the others are blocked
+            // anyway.
             let is_blocked = |column: Column| self.blocked[self.index(column)];
             if !is_blocked(column) || self.around(column).all(is_blocked) {
                 continue;

@@ -7,7 +7,7 @@ use super::check::CoverageFindings;
 use super::sorties::Sortie;
 use crate::result::{CoverageResult, RouteResult, SortieResult, TerrainResult, rounded};
 
-/// The coverage section from a plan and the check of its pictures.
+/// Makes the coverage section from a plan and from the check of its pictures.
 pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverageResult {
     let routes = &planned.plan.routes;
     let max_cost_s = planned.max_cost_s();

@@ -277,7 +277,7 @@ pub struct Fault {
     pub at_s: f32,
     /// Duration of the fault, seconds; `None`: it does not end.
     pub duration_s: Option<f32>,
-    /// MAVLink id of the vehicle that it strikes; `None`: it strikes all.
+    /// MAVLink id of the vehicle that the fault strikes; `None`: it strikes all.
     pub vehicle: Option<u8>,
     /// Kind of the fault: one of [`FAULT_KINDS`], or [`FAULT_OBSTACLE`].
     pub kind: &'static str,

@@ -60,7 +60,7 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
         .collect()
 }
 
-/// The settings of the autopilot of a vehicle whose path begins so far above its pad.
+/// The settings of a vehicle's autopilot; the vehicle's path begins `climb_m` above its pad.
 fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autopilot::Config {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;

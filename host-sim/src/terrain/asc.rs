@@ -36,7 +36,7 @@ fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
     Ok(Crs::Stated(Box::new(system)))
 }
 
-/// What the lines before the heights say.
+/// Values of the header, the lines before the heights.
 struct Header {
     /// Columns and rows.
     size: [usize; 2],

@@ -218,7 +218,8 @@ impl<'a> Area<'a> {
     }
 
     fn check_sizes(&self) -> Result<(), AreaError> {
-        // As much as a strip half as long as the perimeter and a millimetre wide.
+        // A ring is flat if its area is less than that of a strip half as long as its perimeter and
+        // a millimetre wide.
         let is_flat = |(_, ring): (_, &[Flat])| {
             fabs(signed_area_m2(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
         };

@@ -1,4 +1,4 @@
-//! Lanes that another tool has laid, put into the order in which one vehicle flies them.
+//! Orders lanes that another tool has laid, as one vehicle flies them.
 
 use libm::roundf;
 

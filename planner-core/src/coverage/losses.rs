@@ -24,7 +24,7 @@ const MAX_DONE_RANGES: usize = 128;
 /// Status of one vehicle at a division. All vehicles agree on it before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleStatus {
-    /// Whether it continues.
+    /// Whether the vehicle continues, and gets a part of the remaining lanes.
     pub alive: bool,
     /// Arc length of its path up to which the pictures count as its own, taken or promised, metres.
     /// A vehicle that continues holds there; at 0 it is still on its pad. If it does not continue,

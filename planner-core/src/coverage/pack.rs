@@ -22,14 +22,14 @@ use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::assignment::{AssignmentWorkspace, assign};
 
-/// What packing needs of a vehicle: ends of its transits, speeds, weight.
+/// A vehicle as packing sees it: ends of its transits, speeds, weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
     /// Place where the vehicle begins its transit to the first waypoint, east and north.
     pub place: Flat,
     /// Place where the vehicle's transit home ends, east and north.
     pub home: Flat,
-    /// Speed over ground, m/s.
+    /// Cruise speed over ground, m/s.
     pub cruise_mps: f32,
     /// Speed of climb (V_a in the paper), m/s.
     pub climb_mps: f32,
@@ -247,7 +247,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         };
         let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.place == vehicle.home {
-            // The same transits in the opposite direction.
+            // From and to one place the transits are the same in the opposite direction.
             forward
         } else {
             transit_m(&ends.last, &ends.first)
@@ -389,7 +389,7 @@ fn fill_bin<const L: usize>(
     };
     let nearer = more.1 - full_m < full_m - fits.1;
     let best = if nearer { more } else { fits };
-    // A bin takes nothing away from the bin before it.
+    // A bin never ends before the end of the bin before it.
     if best.0 >= from {
         best
     } else {

@@ -1,5 +1,5 @@
-//! An area cut into strips, one lane wide: what of each strip is to be photographed, and where its
-//! lanes are.
+//! An area cut into strips, one lane wide: which parts of each strip are to be photographed, and
+//! where its lanes are.
 
 use heapless::Vec;
 use libm::{ceilf, fmaxf, fminf};

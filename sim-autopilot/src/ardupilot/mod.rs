@@ -49,7 +49,7 @@ const TAKEOFF_TO_LIFT_S: f32 = 2.07;
 const LAND_DETECTOR_S: f32 = 1.6;
 /// Time from landed to disarmed in LAND and RTL, seconds: 0.4 s seen; HEARTBEAT shows it at 0.8 s.
 const LAND_DISARM_S: f32 = 0.4;
-/// How much earlier than `DISARM_DELAY` it disarms, seconds: 9.94 s of 10 seen.
+/// Time by which ArduCopter disarms earlier than `DISARM_DELAY`, seconds: 9.94 s of 10 seen.
 const DISARM_EARLY_S: f32 = 0.06;
 /// Delay of the failsafe beyond `FS_GCS_TIMEOUT`, seconds: 5.1 s of 5 seen.
 const GCS_REACTION_S: f32 = 0.1;

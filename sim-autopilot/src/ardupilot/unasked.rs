@@ -6,7 +6,7 @@ use crate::platform::Platform;
 
 const PARAM_VALUE: u32 = 22;
 const HOME_POSITION: u32 = 242;
-/// Period at which it updates STAT_RUNTIME and sends it, microseconds.
+/// Period at which ArduCopter updates STAT_RUNTIME and sends it, microseconds.
 const RUNTIME_EVERY_US: u64 = 30_000_000;
 /// Value of MAV_PARAM_TYPE_INT32.
 const INT32: u8 = 6;

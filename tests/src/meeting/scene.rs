@@ -1,4 +1,4 @@
-//! Random meetings: where each vehicle flies, by which plan, and what else happens to it.
+//! Random meetings: each vehicle's path and plan, and the events that happen to it.
 
 mod happenings;
 mod passing;
@@ -39,7 +39,7 @@ pub fn floor_z(vehicles: &[Vehicle], place: &Point) -> f32 {
     floor
 }
 
-/// Where a plan ends on the ground; `None` for an empty path.
+/// Place on the ground where a plan ends; `None` for an empty path.
 pub fn landing(plan: &Plan) -> Option<Point> {
     plan.path.waypoints().last().map(|w| w.position - Point::new(0.0, 0.0, plan.descent_m))
 }
@@ -122,7 +122,7 @@ fn drawn(seed: u64, draw: u64) -> Option<Scene> {
     Some(Scene { seed, kind, on_plan, limit_s: LIMIT_S, vehicles, happenings, delay_s, loss, liar })
 }
 
-/// Which of the vehicles lies, and of what.
+/// Index of the vehicle whose messages are false, and what is false in them.
 fn liar(count: usize, dice: &mut Dice) -> (usize, Lie) {
     let lie = match dice.below(6) {
         0 | 1 => Lie::Position(dice.direction() * 0.5),

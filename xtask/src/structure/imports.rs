@@ -1,4 +1,4 @@
-//! Import cycles between the files of a crate.
+//! Finds import cycles between the files of a crate.
 
 use std::collections::BTreeSet;
 
@@ -127,8 +127,9 @@ fn flatten(tree: &UseTree, before: &mut Vec<String>, give: &mut impl FnMut(Vec<S
     }
 }
 
-/// Index of the file that defines what `path`, used in `module`, names; `None` if that is in
-/// another crate. `passed_on` is the number of `pub use` items that may still be followed.
+/// Index in `tree.sources` of the file that defines the item that `path`, used in `module`, names;
+/// `None` if it is in another crate. `passed_on` is the number of `pub use` items that may still be
+/// followed.
 fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) -> Option<usize> {
     let (first, rest) = path.split_first()?;
     let whole = match first.as_str() {
@@ -155,7 +156,8 @@ fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) ->
     }
 }
 
-/// The file that defines `name`, which `source` re-exports by `pub use`; `None` if it does not.
+/// Index of the file that defines `name`, which `source` re-exports by `pub use`; `None` if
+/// `source` does not.
 fn reexported_file(
     tree: &Tree,
     source: &Source,

@@ -1,5 +1,5 @@
-//! Files and lines beyond the limits. rustfmt breaks lines, but not in macros that it cannot parse,
-//! attributes and comments.
+//! Finds files of too many lines, and lines of too many characters. rustfmt breaks lines, but not
+//! in macros that it cannot parse, attributes and comments.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,18 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow};
 use proc_macro2::{Delimiter, LineColumn, TokenStream, TokenTree};
 
-/// Lines of a file.
+/// Most lines of a file.
 const LINES: usize = 500;
-/// Characters of a line, as in `rustfmt.toml`.
+/// Most characters of a line, as in `rustfmt.toml`.
 const WIDTH: usize = 100;
-/// Folders without sources of ours.
+/// Folders that are not searched: they hold no sources of ours.
 const OTHERS: [&str; 2] = ["target", ".git"];
 
 /// Exceptions from either limit: file and reason.
 const EXCEPTIONS: &[(&str, &str)] = &[];
 
-/// What is beyond the limits in all Rust files of the repository, and why it may be.
+/// Every file and line beyond the limits in the Rust files of the repository, as a line to print;
+/// with the reason if the file is listed as an exception.
 pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
     let mut files = Vec::new();
     find_sources(Path::new(""), &mut files)?;
@@ -51,7 +52,7 @@ fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// What is beyond the limits in one file.
+/// The faults of one file, each as a line to print without the file's name.
 fn beyond_in(text: &str) -> Result<Vec<String>> {
     let mut found = Vec::new();
     let count = text.lines().count();
@@ -67,7 +68,7 @@ fn beyond_in(text: &str) -> Result<Vec<String>> {
     mark_unbreakable(tokens, &mut may_be_long);
     for (index, line) in text.lines().enumerate() {
         let comment = line.trim_start().strip_prefix("//");
-        // Neither a row of a table nor a command can be broken.
+        // Rows of Markdown tables and commands in comments cannot be broken: they may be long.
         let is_whole =
             |comment: &str| comment.trim_start_matches(['/', '!', ' ']).starts_with(['|', '`']);
         if is_long(line) && !comment.map_or(may_be_long[index], is_whole) {
@@ -78,8 +79,8 @@ fn beyond_in(text: &str) -> Result<Vec<String>> {
     Ok(found)
 }
 
-/// Marks the lines of `rustfmt::skip`, those of strings of several lines, and those that a string
-/// makes long.
+/// Marks lines that may be long: those under `rustfmt::skip`, those of strings of several lines,
+/// and those that a string makes long.
 fn mark_unbreakable(tokens: TokenStream, lines: &mut [bool]) {
     let mut is_skipped = false;
     let mut may_skip = false;
@@ -108,7 +109,7 @@ fn mark_unbreakable(tokens: TokenStream, lines: &mut [bool]) {
     }
 }
 
-/// Whether this is a string of several lines, or one across the width.
+/// Whether this is a string of several lines, or one that crosses column [`WIDTH`].
 fn is_string_beyond(token: &TokenTree, start: LineColumn, end: LineColumn) -> bool {
     let is_string = matches!(token, TokenTree::Literal(text) if text.to_string().contains('"'));
     is_string && (end.line > start.line || (start.column < WIDTH && end.column >= WIDTH))

@@ -32,9 +32,9 @@ const STOPPING_SWAY_MPS: f32 = 0.3;
 const LATE_LANDING_AFTER: Duration = Duration::from_secs(40);
 
 impl Guidance {
-    /// Adds to the place of the setpoint what the vehicle can no longer avoid on its path, and
-    /// `extra_m`. The set begins at the setpoint, which is all that a stop can hold back: the
-    /// vehicle flies on to the setpoint in any case.
+    /// Extends the set by the stretch of path that the vehicle flies at least before it stops, and
+    /// by `extra_m`. The set begins at the setpoint, not at the vehicle, which flies on to its
+    /// setpoint in any case.
     pub(super) fn extend_own_set<const W: usize>(
         &self,
         set: &mut ReachableSet,
@@ -61,7 +61,8 @@ impl Guidance {
             let behind = points[..next].iter().rev().map(|w| w.position);
             return set.extend_along(core::iter::once(here).chain(join).chain(behind), fly_m);
         }
-        // Forward, advice stops the vehicle at `stops_at_m` in any case.
+        // Forward, the vehicle stops at `stops_at_m` by advice, so the set ends there at the
+        // latest.
         let join_m = join.map_or(0.0, |join| (join - here).length());
         let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
@@ -109,7 +110,7 @@ impl Guidance {
             neighbours.add_silence(contact, now, &mut met);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
-                // The neighbour is out of radio range, and where its gates let it be.
+                // Out of radio range the neighbour is where its gates let it be: away from here.
                 continue;
             }
             if by_gates {
@@ -138,12 +139,12 @@ impl Guidance {
                 // A stranger, which anybody can feign, keeps no vehicle in the air for good.
                 continue;
             }
-            // At its own pad, off its path, and where it hears nobody, there is no other landing
-            // place to fly to.
+            // Flying back to its pad, before its path, or hearing nobody, this vehicle has no other
+            // landing place.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
-            // By then a place aside was sought in vain, and over an area the end of its path is
-            // above its pad.
+            // The end of its path over an area is above its pad; by then it has sought a place
+            // aside in vain.
             let at_end =
                 || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
             let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());
@@ -151,7 +152,7 @@ impl Guidance {
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.motion.grounded || met.stands) && by_gates {
-                // The schedule leads past a vehicle that waits at the safety distance and the
+                // The schedule leads past a waiting vehicle at the safety distance plus the
                 // tracking errors of both.
                 safety_m
             } else if met.motion.grounded {
@@ -162,7 +163,7 @@ impl Guidance {
             } else {
                 safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m())
             };
-            // Landing late at the last place, it ignores where a vehicle may have fallen.
+            // A late landing ignores where a silent vehicle may have fallen.
             let fallen = Some(now).filter(|_| !lands_late);
             let may_lie_below =
                 |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
@@ -186,7 +187,7 @@ impl Guidance {
             }
             near += 1;
             let meets = || {
-                // Between two on the plan gates keep the order, so no time ahead is added.
+                // Between two vehicles on the plan gates keep the order, so no look-ahead is added.
                 let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
                 let other = met.motion.reachable_set(bounds, if ahead { ahead_s } else { 0.0 });
                 let low = |low: Point| own.conflicts(&ReachableSet::at(low), &low, apart_m);

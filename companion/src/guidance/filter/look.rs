@@ -149,7 +149,7 @@ impl Guidance {
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
-                // Past a stranger it flies slowly in this stop, until free for longer.
+                // Past a stranger the vehicle flies slowly until the path has been free for longer.
                 let clear_for = if self.filter.passes_stranger(now) {
                     MAX_STOP_FOR_STRANGER
                 } else {
@@ -208,7 +208,7 @@ impl Guidance {
         self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
     }
 
-    /// Counts as a hindrance by the filter where advice stops the vehicle right before another one
+    /// Counts it as a stop by the filter if advice stops the vehicle right before another one
     /// although no gate nearby waits for that one.
     fn count_standstill<const V: usize, const W: usize, const G: usize>(
         &mut self,

@@ -7,13 +7,13 @@ use planner_core::Length;
 use super::super::motion::clamp_to;
 use super::{ClockPace, END_JERK_SHARE, STOP_DECAY_PER_S, SetpointSmoother, TICK_S};
 
-/// Share of the jerk that the clock plans with: the rest is for the next raw point, which it cannot
-/// foresee.
+/// Share of the jerk limit that curve and clock together may use in a step: the rest is for the
+/// next raw point, which is not known yet.
 const PLANNED_JERK_SHARE: f32 = 0.9;
-/// Share of the jerk with which an acceleration of the clock ends: nothing depends on how soon it
-/// runs at 1 again.
+/// Share of the jerk limit with which the clock's speeding up ends: small, since nothing depends on
+/// how soon the clock runs at 1 again.
 const RISE_JERK_SHARE: f32 = 0.15;
-/// Least speed of the curve from which the clock's acceleration is computed, m/s.
+/// Least value of the curve's speed where the clock's acceleration is a quotient by it, m/s.
 const MIN_CURVE_MPS: f32 = 0.2;
 
 impl SetpointSmoother {
@@ -39,8 +39,8 @@ impl SetpointSmoother {
         let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), STOP_DECAY_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
-        // The clock speeds up only by the part of the acceleration that the curve leaves, which may
-        // change meanwhile.
+        // The clock speeds up only by the acceleration that the curve leaves; the curve's part
+        // counts twice, since it may grow meanwhile.
         let [least, most] = [fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)];
         let wanted = clamp_to(wanted, least, most) / speed;
         // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than

@@ -1,10 +1,11 @@
-//! The answers to requests.
+//! Replies to MAVLink FTP requests: the packets of ACK and NAK.
 
 use super::packet::{ACK, HEADER_LEN, MAX_DATA, NAK, NakError, Request};
 use super::{Ftp, Reply};
 
 impl Ftp {
-    /// Sends the reply, and remembers it for repetitions of the request.
+    /// Sets ACK or NAK as the reply to `request`, and remembers `result`: a repetition of the
+    /// request is answered alike, not executed again.
     pub(super) fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
         self.duplicates.remember(request, result, self.now);
         self.respond(request, result);

@@ -19,13 +19,13 @@ const SIDESTEP_RETRY_S: u64 = 30;
 /// Time for which a landing was held, after which a vehicle that hears no other one seeks a landing
 /// place aside.
 const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
-/// Two searches from places nearer than this are searches from the same place, metres.
+/// Distance along the path up to which two failed searches count as in one place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
 
 /// Whether a search that found no detour may succeed later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RetryOutlook {
-    /// A silent vehicle is still coming down; on the ground it leaves more room.
+    /// A silent vehicle may still be coming down; once on the ground it leaves more room.
     Settles,
     /// Another vehicle may still move.
     Open,
@@ -34,8 +34,9 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
-    /// Whether this vehicle may search for a landing place beside its path: it has a flight, hears
-    /// another vehicle or has waited for long, and did not fail lately.
+    /// Whether this vehicle may search for a landing place beside its path: its task leaves the
+    /// pad; it hears another vehicle, all others rest, or its landing has been held for
+    /// [`UNHEARD_SIDESTEP_AFTER`]; and no search aside failed within [`SIDESTEP_RETRY_S`].
     pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -67,7 +68,8 @@ impl Detours {
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
-    /// Notes that a path for this purpose is requested from the shell.
+    /// Notes that a path for this purpose is requested from the shell. Unless it leads aside or
+    /// back to the plan's path, the vehicle gives up returning to that.
     pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Rejoin(_)) {
             self.flown = self.flown.without_return();
@@ -108,8 +110,8 @@ impl Detours {
         match view.config.lost_vehicle_down_s {
             Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut tell),
             _ => {
-                // A vehicle that lies is kept off by no more than what blocks a path: a goal that
-                // is planned beside it can be flown to.
+                // The zone of a grounded vehicle is only as wide as what blocks a path, so that a
+                // goal planned beside it can be reached.
                 let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
                 view.neighbours.for_each_place(view.now, apart, &mut tell);
             }
@@ -156,8 +158,9 @@ impl Detours {
         })
     }
 
-    /// Begins the detour that has come, at `progress_m` on the path before, which last grew at
-    /// `progress_at`.
+    /// Makes the path that has come for `purpose` the one flown. `progress_m` is the progress on
+    /// the path before, which last grew at `progress_at`: a detour on which that is longer than
+    /// [`STUCK_AFTER`] ago counts as one without progress.
     pub(crate) fn begin_detour(
         &mut self,
         purpose: DetourPurpose,
@@ -197,7 +200,7 @@ impl Detours {
         match self.sought {
             // The path home is sought again after a while.
             Some(DetourPurpose::Home) => return self.home.note_failure(now),
-            // Without a path aside there may still be a detour.
+            // A failed search for a path aside does not count as a failed search for a detour.
             Some(DetourPurpose::Aside(_) | DetourPurpose::Landing) => {
                 self.no_way_aside_at = Some(now);
                 return;
@@ -206,7 +209,8 @@ impl Detours {
             Some(DetourPurpose::Goal) | None => {}
         }
         if outlook == RetryOutlook::Settles {
-            // The vehicle requests a detour later and later, and once more when that vehicle lies.
+            // Each failure delays the next request, but alone never ends the search: once the
+            // silent vehicle is on the ground, a detour may be found.
             self.failures = self.failures.saturating_add(1).min(MAX_DETOUR_SEARCHES - 1);
             return;
         }

@@ -1,4 +1,4 @@
-//! Around an obstacle that hovers or lies on a path over an area, and back to that path beyond it.
+//! Detours over an area: around an obstacle or vehicle on the path, and back to the path beyond it.
 //!
 //! The vehicle stops, requests from its shell the way to the first free place of its path beyond
 //! the obstacle, flies it beside the plan, and then requests its own plan again, to continue from
@@ -73,8 +73,9 @@ fn source_count<const V: usize, const W: usize, const G: usize>(
     2 * view.neighbours.len()
 }
 
-/// Keep-out zones of one source over an area: first come the places of each neighbour, then for
-/// each the columns in which it may come down from the air off the plan.
+/// Passes the keep-out zones of source number `source` over an area to `tell`. The first half of
+/// the numbers stands for each neighbour's places, the second half for the column in which each may
+/// come down if it is in the air off the plan.
 fn zones_of_source<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     source: usize,
@@ -92,7 +93,7 @@ fn zones_of_source<const V: usize, const W: usize, const G: usize>(
     }
 }
 
-/// Keep-out zones of all other vehicles over an area.
+/// Passes the keep-out zones of all other vehicles over an area to `tell`.
 pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     tell: &mut dyn FnMut(KeepOutZone),
@@ -118,8 +119,8 @@ pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
     barred
 }
 
-/// The first free place along the path beyond the block, metres; `None` if there is none before the
-/// last descent and the first closed gate.
+/// First free place along the path, metres, beyond the first stretch ahead that zones block; `None`
+/// if none is blocked ahead, or none is free before the last descent and the first closed gate.
 pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     known: &[KeepOutZone],
@@ -135,8 +136,8 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     };
     known.iter().for_each(|thing| add(*thing, &mut things));
     for source in 0..source_count(view) {
-        // When the list is full the rest is left out: the search for the detour itself knows all
-        // zones.
+        // Zones beyond the list's capacity are left out here: the shell's search for the detour
+        // knows all of them.
         if things.is_full() {
             break;
         }
@@ -149,7 +150,7 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
             return None;
         }
         let place = plan.path.point_at(at_m)?;
-        // No zone is nearer than this.
+        // Distance to the nearest zone: nothing blocks the path up to this far on.
         let free_m = things
             .iter()
             .map(|thing| distance_to_zone_m(thing, &place))

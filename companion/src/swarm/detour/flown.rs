@@ -17,10 +17,10 @@ pub(crate) struct RejoinPlace {
 /// Places where a vehicle that went aside over an area comes back to its path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RejoinPlaces {
-    /// Where the vehicle left its path, or is to hold for a division.
+    /// Place where the vehicle left its path, or where it is to hold for a division.
     pub own: RejoinPlace,
-    /// First free place beyond the block when it left, used if `own` stays barred; equal to `own`
-    /// where there was none.
+    /// First free place beyond the block when the vehicle left, used if `own` stays barred; equal
+    /// to `own` where there was none.
     pub beyond: RejoinPlace,
 }
 

@@ -17,7 +17,7 @@ const MAX_RETURNS: u8 = 4;
 /// The search of a vehicle for its path home over an area.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HomewardSearch {
-    /// Since when the vehicle stops for its path home, and seeks it.
+    /// Since when the vehicle has been stopping to seek a path home; `None` if it does not.
     seeks_since: Option<Instant>,
     /// When a search for the path home last failed.
     missed_at: Option<Instant>,
@@ -31,7 +31,7 @@ impl HomewardSearch {
         *self = Self { seeks_since: Some(now), attempts: turns, ..Self::default() };
     }
 
-    /// Ends the search: the path home has come, or the vehicle flies back another way.
+    /// Ends the search: a path from the shell has come, or the vehicle flies back another way.
     pub(crate) fn cancel(&mut self) {
         *self = Self { attempts: self.attempts, ..Self::default() };
     }
@@ -41,7 +41,7 @@ impl HomewardSearch {
         self.missed_at = Some(now);
     }
 
-    /// Whether the vehicle stops for its path home, or seeks it.
+    /// Whether the vehicle has turned home and has no path home yet.
     pub(crate) fn is_seeking(&self) -> bool {
         self.seeks_since.is_some()
     }

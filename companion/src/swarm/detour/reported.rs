@@ -1,4 +1,5 @@
-//! The place that the vehicle reports: that of before its position jumped, while it may be wrong.
+//! The position that this vehicle reports to the others. After a jump of the autopilot's position
+//! estimate it is the place on the path from before the jump, until the estimate is trusted again.
 
 use planner_core::Point;
 
@@ -8,11 +9,12 @@ use crate::mission::State;
 use crate::swarm::view::{DetourView, ReportedPlace};
 use crate::time::{Duration, Instant};
 
-/// Age of this vehicle's position from which it reports no velocity with it.
+/// Age of this vehicle's position above which the velocity reported with it is 0.
 const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
 
 impl Detours {
-    /// Position and velocity that this vehicle reports to the others, and when they were measured.
+    /// Position and velocity that this vehicle reports to the others, and when they were measured;
+    /// velocity 0 after a jump of the position, and with an old position.
     pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> ReportedPlace {
         let t = telemetry;
         let vague = self.before_jump.is_some() || t.position_age(now) > MAX_POSITION_AGE;
@@ -21,8 +23,9 @@ impl Detours {
         ReportedPlace { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
 
-    /// On entering the state `to`, remembers the place from before a jump of the position, which
-    /// may be wrong since; or forgets it.
+    /// To be called on entering state `to`. `PositionLost` because of a jump: keeps the reference's
+    /// place on the path as the one to report. `Follow` or `WaitPosition`: the position is trusted
+    /// again.
     pub(crate) fn save_place_before_jump<const V: usize, const W: usize, const G: usize>(
         &mut self,
         to: State,

@@ -67,8 +67,8 @@ impl Detours {
     }
 
     /// Place where a vehicle aside comes back to its path now: where it left that; or beyond the
-    /// block, if that place stays barred, or no way leads there. `None` while it waits for that
-    /// place.
+    /// block, once that place has been barred, or no way to it was found, for too long. `None`
+    /// while it waits for that place to be free.
     pub(crate) fn rejoin_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -82,19 +82,19 @@ impl Detours {
         }
     }
 
-    /// Gives up the plan: the vehicle does not come back to it from beside its path.
+    /// Gives up the return to the plan's path: a vehicle beside it is from now on astray.
     pub(crate) fn give_up_plan(&mut self) {
         self.flown = self.flown.without_return();
     }
 
-    /// The vehicle flies its plan's path, if that has come again.
+    /// Makes the plan's path the one flown, if it has come again from the shell.
     pub(crate) fn take_up_plan(&mut self) {
         if self.is_own_plan_ready() {
             self.flown = FlownPath::Plan;
         }
     }
 
-    /// Whether the plan's path has come again, and is not flown yet.
+    /// Whether the plan's path has come again from the shell after a detour, and is not flown yet.
     pub(crate) fn is_own_plan_ready(&self) -> bool {
         self.flown == FlownPath::PlanReturned
     }

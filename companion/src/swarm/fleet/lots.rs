@@ -4,8 +4,8 @@ use heapless::Vec;
 
 use crate::link::roster::{MemberStatus, RosterReportEntry};
 
-/// What a division needs to know of one vehicle: as
-/// [`planner_core::coverage::losses::VehicleStatus`], in decimetres.
+/// Input of a division for one vehicle: as [`planner_core::coverage::losses::VehicleStatus`], in
+/// decimetres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct DivisionInput {
     /// Whether the vehicle flies on, and gets a part of what is divided.

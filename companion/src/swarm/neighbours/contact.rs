@@ -14,7 +14,7 @@ use crate::link::echo::MessageDelay;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, MAX_POINTS, ON_DETOUR, OUT_OF_PLAN, WAITING};
 use crate::time::{Duration, Instant};
 
-/// What a mission over an area knows of where its vehicles come down.
+/// Where and when silent vehicles come down in a mission over an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AreaGround {
     /// Heights of the ground, where it is not level.
@@ -77,7 +77,7 @@ pub(crate) struct NeighbourEntry {
     pub(super) shares_plan: bool,
     /// Whether the neighbour follows a plan of our mission with another CRC than ours.
     pub(super) other_plan: bool,
-    /// When a position last showed it faster than [`MAX_HOVER_MPS`].
+    /// When a position last showed the neighbour faster than [`MAX_HOVER_MPS`].
     pub(super) moved_at: Instant,
     /// Greatest progress that the neighbour can have made, metres along its path, and when.
     pub(super) furthest: Option<(f32, Instant)>,
@@ -293,7 +293,7 @@ impl NeighbourEntry {
                 ZoneKind::Descending,
             );
         } else {
-            // By now it may be anywhere down to there, and descends from there.
+            // The neighbour may be anywhere down to `fallen_m` below by now, and descends on.
             column(here, fallen_m, ZoneKind::Static);
             column(here - up(fallen_m), LANDING_COLUMN_DEPTH_M, ZoneKind::Descending);
         }

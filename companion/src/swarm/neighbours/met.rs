@@ -1,5 +1,5 @@
-//! A neighbour as the safety filter sees it: the inputs of its reachable set; or that it is too far
-//! away to matter.
+//! Neighbours for the safety filter: a cheap test by which most are too far away to matter, and for
+//! the others the inputs of their reachable sets.
 
 use planner_core::Point;
 use planner_core::safety::{
@@ -8,16 +8,17 @@ use planner_core::safety::{
 
 use super::*;
 
-/// A neighbour as the safety filter sees it.
+/// State of a neighbour that the safety filter compares: its priority, and its reachable set's
+/// inputs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilterNeighbour<'a> {
     pub(crate) id: u8,
-    /// Whether the roster does not name it, so that only its positions count.
+    /// Whether the roster does not name the neighbour, so that only its positions count.
     pub(crate) stranger: bool,
     /// Whether the neighbour was last heard to follow the shared plan.
     pub(crate) on_plan: bool,
-    /// Whether the neighbour follows the shared plan out of radio range, as others relay or by its
-    /// last position.
+    /// Whether the neighbour follows the shared plan out of radio range, by others' reports or by
+    /// its last position.
     pub(crate) out_of_range: bool,
     /// Whether the neighbour's plan has our plan's CRC, even while it flies off that plan.
     pub(crate) shares_plan: bool,
@@ -29,8 +30,8 @@ pub(crate) struct FilterNeighbour<'a> {
     pub(crate) lost: bool,
     /// Inputs of the neighbour's reachable set.
     pub(crate) motion: NeighbourMotion<'a>,
-    /// Last position of a neighbour that may have climbed to its top since, where its set is: it
-    /// may not have begun the climb.
+    /// Last position of a neighbour, silent in its climb, whose set is at the top of the climb: it
+    /// may not have begun to climb. `None` for any other.
     pub(crate) before_climb: Option<Point>,
 }
 
@@ -43,7 +44,7 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) within_m: f32,
     /// Limits within which neighbours are expected to fly.
     pub(crate) bounds: &'a MotionBounds,
-    /// Flight time of the neighbours that has to be free as well, seconds.
+    /// Time for which neighbours fly on that has to be free of conflicts as well, seconds.
     pub(crate) ahead_s: f32,
     /// Whether this vehicle follows the shared plan: gates keep it apart from those that do too.
     pub(crate) on_plan: bool,
@@ -55,9 +56,10 @@ pub(crate) struct ReachQuery<'a> {
 }
 
 impl NeighbourEntry {
-    /// Whether it counts as dead, where it may come within reach; `None` where it stays out of
-    /// reach wherever it can be: what most of them do, seen without making a set of it. Never
-    /// `None` where [`Neighbours::add_silence`] and its reach say otherwise.
+    /// Whether the neighbour counts as dead, if it may come within reach; `None` if it stays out of
+    /// reach wherever it can be, or has no position. Most are far away: this test needs no
+    /// reachable set. Never `None` for a neighbour that is within reach after
+    /// [`Neighbours::add_silence`].
     #[inline(always)]
     fn dead_if_within_reach(
         &self,
@@ -96,10 +98,10 @@ impl NeighbourEntry {
     }
 
     /// Whether a neighbour whose position is older than [`MAX_HEIGHT_AGE`] stays out of reach, seen
-    /// from above. It is at its last position or, by a newer intent, at the first of its points; or
-    /// as far from there as it can have flown: at full speed for as long as it may not have noticed
-    /// that no vehicle hears it; in a climb to its top and a little further; once dead, along its
-    /// points alone. A vehicle that lies on the ground moves no more.
+    /// from above. The neighbour is at its last position or, by a newer intent, at the first of its
+    /// points; or as far from there as it can have flown: at full speed for as long as it may not
+    /// have noticed that no vehicle hears it; in a climb to its top and a little further; once
+    /// dead, along its points alone. A vehicle that lies on the ground moves no more.
     fn is_silent_out_of_reach(
         &self,
         age: Duration,
@@ -140,26 +142,27 @@ impl NeighbourEntry {
         away_sq >= most_m * most_m
     }
 
-    /// Whether it may come down from where it is.
+    /// Whether the neighbour may come down from where it is, so that the column below it counts.
     #[inline]
     fn has_column(&self) -> bool {
         self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan()
     }
 
-    /// Height of the ground below it, as far as a column leads from this height, metres.
+    /// Height of the lower end of the neighbour's column, ENU metres: the ground below it or, where
+    /// that is unknown, [`MAX_COLUMN_M`] below `height_m`.
     #[inline]
     fn floor_m(&self, height_m: f32) -> f32 {
         if self.ground_m.is_nan() { height_m - MAX_COLUMN_M } else { self.ground_m }
     }
 
-    /// Age of its position; of one that was never placed as if it had been at the start.
+    /// Age of the neighbour's position; if it never had one, the time since the companion's start.
     #[inline(always)]
     fn placed_for(&self, now: Instant) -> Duration {
         now - self.position_at.unwrap_or(Instant::ZERO)
     }
 
-    /// As the safety filter sees it, `dead` or not, if it is heard; where it is not,
-    /// [`Neighbours::add_silence`] has to follow.
+    /// The neighbour for the safety filter, as its last reports describe it, `dead` or not. If its
+    /// position is old, [`Neighbours::add_silence`] has to follow.
     #[inline(always)]
     pub(crate) fn as_heard(&self, dead: bool, now: Instant) -> FilterNeighbour<'_> {
         let grounded = self.reports(GROUNDED | LANDED);
@@ -190,7 +193,7 @@ impl NeighbourEntry {
         }
     }
 
-    /// Over an area: for a vehicle silent for longer than a stop takes, replaces the ball around
+    /// Over an area: for a neighbour silent for longer than a stop takes, replaces the ball around
     /// its last position by the part of its points that it may have flown since.
     pub(crate) fn follow_unheard<'a>(
         &'a self,
@@ -212,7 +215,7 @@ impl NeighbourEntry {
         heard.rests_within_m = libm::fminf(flown_m, self.unheard_distance_m());
     }
 
-    /// Greatest distance of the vehicle's set from the place where it stopped unheard, metres.
+    /// Greatest extent of the neighbour's set around the place where it stopped unheard, metres.
     #[inline(never)]
     fn rest_radius_m(&self, reach: &ReachQuery<'_>) -> f32 {
         let rests = NeighbourMotion {
@@ -282,8 +285,8 @@ impl<const V: usize> Neighbours<V> {
         None
     }
 
-    /// Changes what [`NeighbourEntry::as_heard`] says of a contact that has had no position for
-    /// long. Not in one call with that: a board takes long to copy what it returns.
+    /// Changes `met`, made by [`NeighbourEntry::as_heard`], if the contact's position is older than
+    /// [`MAX_HEIGHT_AGE`]. Not in one call with that: a board takes long to copy what it returns.
     #[inline(always)]
     pub(crate) fn add_silence<'a>(
         &'a self,
@@ -308,21 +311,22 @@ impl<const V: usize> Neighbours<V> {
     ) {
         let (motion, dead) = (&mut met.motion, met.lost);
         let placed_s = motion.age_s;
-        // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
+        // If positions get lost but an intent is fresh, its first point, the neighbour's setpoint,
+        // stands for the position.
         let told_at =
             contact.intent_at.filter(|_| placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
         let told_s =
             told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
-        // Dead, or without a position of its own, it rests by then where a reroute keeps off; later
-        // on the ground below.
+        // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
+        // the ground below; before that it rests where reroutes keep off.
         let down = placed_for >= self.down_after
             || (contact.reports(GROUNDED) && contact.lacks_position());
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
         if let Some(first) = contact.points.first().filter(|_| by_intent) {
             motion.position = *first;
         }
-        // Unheard in its climb it may have come to the top of it, and a little further.
+        // A neighbour silent in its climb may have come to the climb's top, and a little further.
         let top = if age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
         if lies {
@@ -335,8 +339,8 @@ impl<const V: usize> Neighbours<V> {
         }
         motion.grounded = (motion.grounded && top.is_none()) || lies;
         let floor_m = contact.floor_m(motion.position.z);
-        // A vehicle that flew along its points stopped on them, and rests where a reroute keeps
-        // off.
+        // A dead neighbour that flew along its points stopped on them, and rests where reroutes
+        // keep off.
         motion.age_s = age_s;
         if dead || top.is_some() {
             (motion.speed_mps, motion.age_s) = (0.0, 0.0);

@@ -1,4 +1,5 @@
-//! Which vehicles of the roster still fly, and which wait, rest or lie.
+//! Queries over the neighbours of the roster: whether they have landed, are dead, wait, or claim
+//! the turn to fly a detour.
 
 use super::Neighbours;
 use super::contact::NeighbourEntry;
@@ -6,15 +7,16 @@ use crate::link::intent::{BLOCKED, GROUNDED, LANDED, OUT_OF_PLAN};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
-    /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for
-    /// so long that they lie on the ground.
+    /// Whether all vehicles of the roster last reported that they have landed or are out of the
+    /// plan, or have been silent for `down_after`, by when a lost vehicle is on the ground.
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster_count]
             .iter()
             .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
     }
 
-    /// Whether a vehicle of the roster counts as dead, but may still be coming down.
+    /// Whether a vehicle of the roster counts as dead, but may still be in the air: silent for less
+    /// than `down_after`, it last reported itself neither on the ground nor out of the plan.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
         let roster = &self.contacts[..self.roster_count];
         roster.iter().any(|c| {
@@ -24,7 +26,8 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Whether the vehicle `id` of the roster has landed, or is out of the plan.
+    /// Whether the vehicle `id` has landed, or is out of the plan; false for an id outside the
+    /// roster.
     pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now)
@@ -40,8 +43,8 @@ impl<const V: usize> Neighbours<V> {
         self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
     }
 
-    /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand
-    /// and wait.
+    /// Whether every other vehicle of the roster is out of the plan, recently reported that it
+    /// waits or has landed, or descends at the end of a detour.
     pub fn are_all_waiting(&self, now: Instant) -> bool {
         self.contacts[..self.roster_count].iter().all(|c| c.is_waiting(now))
     }

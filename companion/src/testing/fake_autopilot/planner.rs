@@ -21,8 +21,8 @@ pub(super) struct Answer {
 }
 
 impl Bench {
-    /// Sends the answer that is due, or begins the next request, by the vehicle's wishes at that
-    /// time. Returns false if there was nothing to do.
+    /// Sends the answer that is due, or begins the next request, with what the companion requests
+    /// at that time. Returns false if there was nothing to do.
     pub(super) fn step_planner(&mut self) -> bool {
         if let Some(answer) = self.answer_under_way.take_if(|answer| answer.due <= self.now) {
             self.companion.handle_plan(

@@ -87,7 +87,7 @@ pub(in crate::scenario) fn goals_mission(
     })
 }
 
-/// Whether goals are flown to in this mode.
+/// Refuses coverage mode, whose scenario needs `[area]`; notes formation mode as unsupported.
 fn check_mode(
     text: Text<'_>,
     root: &Table<'_>,

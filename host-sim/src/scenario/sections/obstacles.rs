@@ -24,7 +24,7 @@ pub(super) struct MapBesideArea {
     has_origin: bool,
 }
 
-/// What the distance from obstacles depends on.
+/// Settings of the scenario on which the distance between paths and obstacles depends.
 pub(super) struct Flown<'a> {
     pub(super) vehicles: &'a [Vehicle],
     pub(super) spans: &'a [VehicleSpans],
@@ -34,8 +34,8 @@ pub(super) struct Flown<'a> {
 }
 
 impl MapBesideArea {
-    /// `[map]`, if the scenario has one. Space that the map does not know is free unless it says
-    /// otherwise.
+    /// Reads `[map]`, if the scenario has one. Unknown space counts as free unless `map.unknown` is
+    /// given.
     pub(super) fn from_root(root: &Table<'_>, folder: &Path) -> Result<Option<Self>> {
         let Some(value) = root.get("map") else { return Ok(None) };
         let table = value.table()?;
@@ -52,13 +52,13 @@ impl MapBesideArea {
         self.has_origin.then_some(self.map.origin)
     }
 
-    /// Refuses a map whose frame is not that of the mission, or may be another one.
+    /// Refuses a map whose origin is not the mission's, or is missing while the area has one.
     fn check_origin(&self, text: Text<'_>, origin: &Geodetic) -> Result<()> {
         let same = self.map.origin == *origin;
         let why = match (self.has_origin, same) {
             (true, true) => return Ok(()),
             (true, false) => "map.origin is not area.origin",
-            // Metres about the test field, like the map.
+            // Neither the area nor the map has an origin: both are in metres about the default one.
             (false, _) if *origin == DEFAULT_ORIGIN => return Ok(()),
             (false, _) => "map.origin is missing",
         };

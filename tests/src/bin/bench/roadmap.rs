@@ -1,13 +1,13 @@
 //! Times our roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, over all
 //! pairs, with OctoMap's `castRay`.
 //!
-//! Both get the same map (the built-in building at 0.25 m, for theirs written as `.bt`), the same
-//! ten starts and goals, 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run
+//! Both programs get the same map (the built-in building at 0.25 m, for theirs written as `.bt`),
+//! the same ten starts and goals, 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run
 //! alternately. Loading the map is in neither time: theirs holds an octree, ours the voxel grid.
 //! Both times include random nodes, the index of nodes, neighbours, rays, and the graph in both
 //! directions with the lengths of its edges (theirs an adjacency list, ours the roadmap file with
-//! its CRC-32 and a list of lengths beside it). Nothing is kept from one repeat to the next.
-//! Checking the file as a reader does is in neither time: nobody reads theirs.
+//! its CRC-32 and a list of lengths beside it). Nothing is kept from one repeat to the next. Our
+//! reader's check of the file is in neither time, since their graph is not read from a file.
 //!
 //! `roadmap_s of plan` is what `host-sim plan` reports for the same building, on two cores, for
 //! vehicles of 0.3 m without a safety margin: in addition to the above, starts and goals are
@@ -116,10 +116,11 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         .collect())
 }
 
-/// A time of theirs.
+/// Reads one time, milliseconds, from the JSON line of the baseline program.
 type Value = fn(&Theirs) -> f64;
 
-/// A row of times beside theirs: the ratio that is required, and of how many.
+/// A row of the bench: our `times` beside `value` of theirs, the required ratio of theirs to ours,
+/// and `n`, the number of nodes or vehicles.
 fn row(
     name: &str,
     (required, n): (f64, usize),
@@ -127,7 +128,7 @@ fn row(
     theirs: &[Theirs],
     value: Value,
 ) -> Row {
-    // One ratio a round: a slow spell of the machine strikes both programs.
+    // One ratio for each round, since a slow spell of the machine slows both programs.
     let ratios =
         theirs.iter().zip(times.chunks(REPEATS)).map(|(t, ours)| value(t) / median(ours.to_vec()));
     let ratio = median(ratios.collect());
@@ -184,7 +185,7 @@ fn print_parts(whole: &[Timing]) {
     );
 }
 
-/// Writes starts and goals to the second and third file, for the other program.
+/// Writes starts and goals to the second and third file, for the baseline program.
 fn write_terminals(files: &[PathBuf; 3], terminals: &[Point]) -> Result<()> {
     for (file, points) in files[1..].iter().zip(terminals.chunks(VEHICLES)) {
         let mut out = std::fs::File::create(file)?;

@@ -17,7 +17,8 @@ pub fn wide(at: Flat) -> Place {
     [f64::from(at.x), f64::from(at.y)]
 }
 
-/// Scale of the obstacles: paths run along their borders, where its lanes end.
+/// Scale of the obstacles: paths run along their borders, where Fields2Cover's lanes end, and must
+/// not count as crossing them.
 const SHRUNK: f64 = 0.999;
 /// Depth to which a path may enter an obstacle and only touch it, metres.
 const TOUCHES_M: f64 = 1e-6;
@@ -43,7 +44,7 @@ pub struct Best {
     pub lanes: Vec<[Place; 2]>,
 }
 
-/// Share of a field that lies no further beside a lane than half its width.
+/// Share of a field that lies beside a lane by at most half of `lane_m`.
 pub fn swept_share(
     lanes: &[[Place; 2]],
     lane_m: f64,
@@ -118,7 +119,8 @@ impl Obstacles {
         Self(rings.map(shrunk).collect())
     }
 
-    /// Lanes; lanes and connections; connections that are not straight.
+    /// Length of the lanes, length with the connections around obstacles, and number of connections
+    /// that are not straight.
     pub fn measure(&self, lanes: &[[Place; 2]]) -> (f64, f64, usize) {
         let lanes_m = lanes.iter().map(|[from, to]| apart_m(from, to)).sum::<f64>();
         let mut found = (lanes_m, lanes_m, 0);
@@ -129,13 +131,13 @@ impl Obstacles {
         found
     }
 
-    /// Corners, a little shrunk.
+    /// Corners of each obstacle, slightly shrunk.
     pub fn rings(&self) -> &[Vec<Place>] {
         &self.0
     }
 
-    /// Whether a straight way crosses none: where it meets a convex ring, the middle between both
-    /// crossings is inside.
+    /// Whether a straight way crosses no obstacle: where it meets a convex ring, the middle between
+    /// both crossings is inside.
     fn is_free(&self, from: &Place, to: &Place) -> bool {
         self.0.iter().all(|ring| {
             let (x, y) = (to[0] - from[0], to[1] - from[1]);

@@ -1,4 +1,5 @@
-//! Our order of the lanes that Fields2Cover laid: what is left of the difference without the lanes.
+//! Our order of the lanes that Fields2Cover laid: the part of the difference in length that is not
+//! due to the lanes themselves.
 
 use anyhow::Result;
 use companion::planner::coverage::MAX_ORDER_CHANGES;
@@ -23,8 +24,8 @@ pub fn way_m(
     lanes: &[[Place; 2]],
     lane_m: f32,
 ) -> Result<f64> {
-    // Its lanes end at the obstacles: those of our graph are as much smaller as those it is
-    // measured with.
+    // Fields2Cover's lanes end at the obstacles. So our graph has the obstacles slightly shrunk, as
+    // those by which its routes are measured.
     let mut vertices = outer.to_vec();
     let mut rings = vec![Ring { end: outer.len() as u16, kind: RingKind::Outer }];
     for ring in obstacles.rings() {
