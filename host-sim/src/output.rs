@@ -11,6 +11,7 @@ use crate::report::{
 };
 use crate::result::{self, MissionResult, Timing};
 use crate::say;
+use crate::scenario::Scenario;
 use crate::swarm::Flight;
 use crate::swarm::referee::Sample;
 
@@ -113,6 +114,21 @@ pub fn add(
 /// The points as text, one `x y z` a line in metres: other programs read the same problem from it.
 pub fn points_to_text(points: impl Iterator<Item = Point>) -> String {
     points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect()
+}
+
+/// Prints which vehicles of a coverage mission are slower than its cruise speed.
+pub fn print_speed_limits(scenario: &Scenario) {
+    if scenario.area.is_none() {
+        return;
+    }
+    let cruise_mps = scenario.mission.cruise_mps;
+    for vehicle in scenario.vehicles.iter().filter(|v| v.speed_max_mps < cruise_mps) {
+        say!(
+            "speed      vehicle {} cruises at its speed_max_mps of {:.1} m/s, not at cruise_mps of {cruise_mps:.1}",
+            vehicle.id,
+            vehicle.speed_max_mps
+        );
+    }
 }
 
 /// Prints the content of `result.json` for a person: a table of vehicles, then totals.

@@ -4,10 +4,13 @@
 //! `FLOCKMATE_RESUMED=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_RESUMED_FROM`
 //! others.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
+use std::fs;
 use std::path::Path;
+use std::process::Command;
 
-use flockmate_tests::{areas, covered, number};
+use flockmate_tests::{Profile, areas, covered, host_sim, number};
 use host_sim::coverage::check::Picture;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -23,6 +26,24 @@ const STARTS: usize = 4;
 /// What brings a vehicle down early; it is carried back to its pad, charged and switched on.
 const KINDS: [&str; 5] =
     ["battery-low", "battery-low", "pilot-takeover", "companion-reset", "kill"];
+
+/// The field of docs/coverage.md.
+const FIELD: &str = "[area]
+polygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]
+camera = { fov_deg = 73.7, aspect = 1.5 }
+height_m = 35.0
+[mission]
+cruise_mps = 5.0
+[[vehicles]]
+id = 1
+start = [0, -20, 0]
+[[vehicles]]
+id = 2
+start = [10, -20, 0]
+[[vehicles]]
+id = 3
+start = [20, -20, 0]
+";
 
 /// The scenario without faults, and what happens in the first flights.
 fn drawn(seed: u64) -> (String, Vec<String>) {
@@ -194,4 +215,37 @@ fn what_was_flown_around_is_photographed_after_the_next_start() {
     wrong.iter().for_each(|wrong| println!("{wrong}"));
     println!("{left} of {count} left waypoints out that they flew around, {} wrong", wrong.len());
     assert!(wrong.is_empty() && left > 0, "{left} of {count}");
+}
+
+/// Some time after a takeover a journal is waypoints behind: the next start flies these, and what
+/// was whole before is still judged whole.
+#[test]
+fn an_area_that_was_whole_is_judged_whole_at_the_next_start() {
+    let program = host_sim(Profile::Release);
+    let flown = |at_s: u64| -> Result<usize, String> {
+        let dir = tempfile::tempdir().expect("a directory");
+        let at = |name: &str| dir.path().join(name);
+        let fault = format!("[[faults]]\nkind = \"battery-low\"\nvehicle = 1\nat_s = {at_s}.0\n");
+        fs::write(at("struck.toml"), format!("{FIELD}{fault}")).expect("a file");
+        fs::write(at("sound.toml"), FIELD).expect("a file");
+        let mut whole = Vec::new();
+        for name in ["struck.toml", "sound.toml", "sound.toml", "sound.toml"] {
+            let done = Command::new(&program)
+                .arg("fly")
+                .arg(at(name))
+                .args([OsStr::new("--flash"), at("flash").as_os_str()])
+                .args([OsStr::new("--out"), at("out").as_os_str()])
+                .output()
+                .expect("it runs");
+            whole.push(done.status.success());
+        }
+        match whole[..] {
+            [first, true, true, true] => Ok(usize::from(first)),
+            _ => Err(format!("struck at {at_s} s: whole {whole:?}")),
+        }
+    };
+    let all: Result<Vec<usize>, String> =
+        [40, 80, 100, 120, 140, 200].into_par_iter().map(flown).collect();
+    let whole_at_once: usize = all.expect("whole once, whole again").iter().sum();
+    assert!(whole_at_once >= 3, "{whole_at_once} of 6 missions were whole after a takeover");
 }

@@ -239,7 +239,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             (None, None, 0, None);
         (self.division_plan_ready, self.division_requested) = (false, None);
         self.waits.barred_start = BarredStart::default();
-        self.tasks.reset();
+        self.tasks.begin_plan();
     }
 
     /// Forgets the last failure, since a detour is requested; the plan stays until the detour
@@ -322,7 +322,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         let begins = self.starts_at(plan, place);
         if begins {
             self.begin_plan(plan);
-            self.tasks.reset();
+            self.tasks.begin_plan();
             (self.division, self.division_plan_ready) = (division, in_air);
         }
         begins

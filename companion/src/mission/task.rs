@@ -22,9 +22,9 @@ pub(crate) struct Tasks {
 }
 
 impl Tasks {
-    /// Forgets the commands of a former plan.
-    pub(crate) fn reset(&mut self) {
-        *self = Self::default();
+    /// Ends the commands of the former plan.
+    pub(crate) fn begin_plan(&mut self) {
+        self.camera.begin_path();
     }
 
     /// Sends the task's commands to the autopilot that are due at this place of the path.
@@ -37,7 +37,7 @@ impl Tasks {
         links: &mut Links,
     ) {
         match task {
-            Task::Stay | Task::Goto(_) => {}
+            Task::Stay | Task::Goto(_) => self.camera.send_current_command(now, links),
             Task::Photograph(photographs) => self.camera.step(photographs, path, along, now, links),
         }
     }

@@ -403,6 +403,12 @@ impl<const V: usize> Neighbours<V> {
                 .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
+    /// Whether this vehicle holds the lease over an area.
+    #[inline(never)]
+    pub(crate) fn holds_lease(&self, now: Instant) -> bool {
+        self.fleet().is_some_and(|fleet| fleet.has_lease(now))
+    }
+
     /// An echo of a neighbour's last intent, for the next own intent: of each neighbour in turn.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
         let contact = self.contacts[..self.roster_count].get(turn % self.roster_count.max(1))?;

@@ -42,6 +42,10 @@ function row(list, name, value, { unit = "", style = "", note = "" } = {}) {
 
 const SAFETY_ORDER = ["wall_contacts", "violations", "deadlocks", "min_separation_m", "min_clearance_m"];
 
+// Figures whose key names them badly.
+const NAMES = { max_cost_s: "Largest cost", max_cost_m: "Longest route", mean_cost_s: "Mean cost", sd_cost_s: "Spread of costs", lower_bound_s: "No division costs less than", gap: "Cost above that", ground_least_m: "Least height above ground", ground_most_m: "Greatest height above ground", steepest: "Steepest leg" };
+const SHARES = ["gap", "steepest"];
+
 // What comes first of a coverage mission, and by which name.
 const COVERAGE_NAMES = { covered_share: "Area photographed", photos: "Pictures", waypoints: "Waypoints", left: "Waypoints without a picture", twice: "Waypoints flown twice", lanes: "Lanes", lane_m: "Between lanes", waypoint_m: "Between waypoints", angle_deg: "Lanes from east" };
 
@@ -60,7 +64,9 @@ function rows(list, section, figures) {
   const first = section === "coverage" ? Object.keys(COVERAGE_NAMES).filter((key) => key in figures) : [];
   for (const key of first) coverageRow(list, key, figures[key]);
   for (const key of keys.filter((key) => !first.includes(key))) {
-    const [name, unit] = nameAndUnit(key);
+    const [words, unit] = nameAndUnit(key);
+    if (SHARES.includes(key) && isNumber(figures[key])) { row(list, NAMES[key], 100 * figures[key], { unit: "%" }); continue; }
+    const name = NAMES[key] ?? words;
     const style = section === "safety" && flown ? verdict(key, figures) : "";
     const note = key === "min_separation_m" && isNumber(figures.safety_distance_m) ? `(limit ${valueText(figures.safety_distance_m)} m)` : "";
     row(list, name, figures[key], { unit: key === "bytes" ? "B" : unit, style, note });
@@ -84,7 +90,7 @@ function buildSummary() {
   const ends = Array.isArray(result.vehicles) ? result.vehicles : [];
   if (!flown && ends.length > 0 && report.command !== "cover") {
     const assigned = ends.filter((v) => isNumber(v.goal)).length;
-    row(host.appendChild(element("dl")), "Given a goal", `${assigned} of ${ends.length}`);
+    if (assigned > 0 || ends.every((v) => v.end === "no goal")) row(host.appendChild(element("dl")), "Given a goal", `${assigned} of ${ends.length}`);
   }
   if (flown && ends.length > 0) {
     const top = host.appendChild(element("dl"));

@@ -69,7 +69,11 @@ impl EmulatedBoard {
     /// # Errors
     /// QEMU or the firmware does not start, or the firmware is not built for lock step.
     pub fn start(program: &Path, log: &Path) -> anyhow::Result<Self> {
-        ensure!(program.is_file(), "no firmware: {}", quoted_path(program));
+        ensure!(
+            program.is_file(),
+            "no firmware: {}\nhint: `cargo xtask build --board qemu` builds it",
+            quoted_path(program)
+        );
         let mut qemu = Command::new("sh");
         qemu.args(["-c", START_COMMAND, "sh"])
             .args(["-machine", "mps2-an500", "-icount", "shift=1,sleep=off"])

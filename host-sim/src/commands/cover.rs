@@ -21,7 +21,7 @@ use crate::result::{
 };
 use crate::say;
 use crate::scenario::coverage::Method;
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, DEFAULT_ORIGIN, Scenario};
 
 /// Arguments of `host-sim cover`.
 #[derive(Debug, clap::Args)]
@@ -62,6 +62,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = scenario::load(&args.scenario)?;
     scenario.check_supported()?;
+    output::print_speed_limits(&scenario);
     let files = extra_file_names(&scenario);
     let names: Vec<&str> =
         output::RESULT_FILES.into_iter().chain(files.iter().map(String::as_str)).collect();
@@ -87,6 +88,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     results.commit()?;
     remove_stale(&args.out, &written)?;
     print(&result, &findings, &args.out);
+    print_origin(&planned);
     print_batteries(&planned);
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -260,6 +262,16 @@ fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Pat
         result.method
     );
     say!("report     {}", dir.join("report.html").display());
+}
+
+/// Prints the place that written plans are for: without `area.origin` a polygon in metres has none.
+fn print_origin(planned: &CoveragePlan<'_>) {
+    let origin = &planned.area_settings.origin;
+    let note = match *origin == DEFAULT_ORIGIN {
+        true => ": area.origin is not given, so plans are for this place",
+        false => "",
+    };
+    say!("origin     {:.6}, {:.6}, {:.1} m{note}", origin.lat_deg, origin.lon_deg, origin.alt_m);
 }
 
 /// Prints the longest flight of a vehicle without `endurance_s`, for which it cannot be checked

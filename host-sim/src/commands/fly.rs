@@ -5,14 +5,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 
 use super::load;
+use crate::capacity::BoardCapacity;
 use crate::coverage::kept::PictureStore;
 use crate::coverage::{CoveragePlan, flown, parts};
 use crate::files::ResultFiles;
 use crate::link::LinkUrl;
-use crate::mission::Mission;
+use crate::mission::{Mission, SwarmPlan};
 use crate::output;
 use crate::progress::Progress;
 use crate::quote::quoted_path;
@@ -25,6 +26,9 @@ use crate::swarm::gateway::Gateway;
 
 /// The demo's scenario, compiled into the program so that no file is needed.
 const DEMO: &str = include_str!("../../scenarios/demo.toml");
+
+/// The board that QEMU emulates.
+const EMULATED_BOARD: &str = "qemu";
 
 /// Arguments of `host-sim fly`.
 #[derive(Debug, clap::Args)]
@@ -172,6 +176,18 @@ pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     plan_and_fly(scenario, "demo", &args.out, &FlightDisplay::default(), None)
 }
 
+/// Refuses a mission that is larger than the emulated board holds.
+fn check_emulated_boards(mission: &Mission, plan: &SwarmPlan) -> anyhow::Result<()> {
+    let mut vehicles = mission.scenario.vehicles.iter();
+    if vehicles.any(|vehicle| matches!(vehicle.companion, Companion::Emulated { .. })) {
+        let board = BoardCapacity::by_name(EMULATED_BOARD).map_err(anyhow::Error::msg)?;
+        if let Some(why) = mission.board_limit_exceeded(plan, board) {
+            bail!("the mission does not fit {}: {}: {why}", board.name, mission.scenario.path);
+        }
+    }
+    Ok(())
+}
+
 fn plan_and_fly(
     scenario: Scenario,
     command: &'static str,
@@ -185,15 +201,19 @@ fn plan_and_fly(
     let mut results = ResultFiles::open(out, &output::RESULT_FILES)?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
+    output::print_speed_limits(&scenario);
     let mut mission = Mission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
+    check_emulated_boards(&mission, &plan)?;
     let mut flight = match gateway {
         Some(gateway) => {
             swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?
         }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
-    if let Some(kept) = &kept {
+    // Companions that know of no photographed waypoint begin the area again, and so does its
+    // judgement. That the area was whole is no sign of it: a journal may be some waypoints behind.
+    if let Some(kept) = kept.as_ref().filter(|_| !flight.done.is_empty()) {
         kept.add_to(&mut flight.pictures);
     }
     let pictures = std::mem::take(&mut flight.pictures);
@@ -205,7 +225,7 @@ fn plan_and_fly(
         flight.result.complete &= judged.complete;
         flight.result.coverage = Some(judged.result.clone());
         if let Some(kept) = kept {
-            kept.store_pictures(&pictures, judged.complete)?;
+            kept.store_pictures(&pictures)?;
         }
     }
     let mut page = output::flown_page(&mission, &plan, &flight)?;

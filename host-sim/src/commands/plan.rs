@@ -44,6 +44,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = load(&args.scenario, None)?;
     let names = ["starts.txt", "goals.txt", "roadmap.bin", "field.bin", "mission.bin"];
     let mut results = ResultFiles::open(&args.out, &[&output::RESULT_FILES[..], &names].concat())?;
+    output::print_speed_limits(&scenario);
     let mut mission = Mission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
     if let Some((board, why)) =

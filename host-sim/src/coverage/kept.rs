@@ -46,18 +46,16 @@ impl PictureStore {
         Ok(Self { path, before })
     }
 
-    /// Inserts the pictures of earlier flights before those of this flight.
+    /// Inserts the pictures of earlier flights before those of this flight, which continued them.
     pub fn add_to(&self, pictures: &mut Vec<Picture>) {
         pictures.splice(..0, self.before.iter().copied());
     }
 
-    /// Writes all pictures to the file for the next flight. Once the area is `whole` it writes
-    /// none: the next flight then photographs it from the beginning.
+    /// Writes all pictures to the file for the next flight.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn store_pictures(&self, pictures: &[Picture], whole: bool) -> anyhow::Result<()> {
-        let pictures = if whole { &[] } else { pictures };
+    pub fn store_pictures(&self, pictures: &[Picture]) -> anyhow::Result<()> {
         let row = |p: &Picture| -> PictureRow {
             [p.t_s, p.position.x, p.position.y, p.position.z, p.heading]
         };
@@ -73,17 +71,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_come_back_until_the_area_is_whole() {
+    fn pictures_come_back() {
         let dir = tempfile::tempdir().unwrap();
         let picture =
             Picture { vehicle: None, t_s: 7.0, position: Point::new(1.0, 2.0, 3.0), heading: 0.5 };
-        PictureStore::open(dir.path()).unwrap().store_pictures(&[picture], false).unwrap();
+        PictureStore::open(dir.path()).unwrap().store_pictures(&[picture]).unwrap();
         let mut pictures = vec![Picture { t_s: 1.0, ..picture }];
         let kept = PictureStore::open(dir.path()).unwrap();
         kept.add_to(&mut pictures);
         assert_eq!(pictures, [Picture { t_s: 0.0, ..picture }, Picture { t_s: 1.0, ..picture }]);
-        kept.store_pictures(&pictures, true).unwrap();
-        assert!(PictureStore::open(dir.path()).unwrap().before.is_empty());
         std::fs::write(dir.path().join(FILE_NAME), "[[1, 2]]").unwrap();
         assert!(PictureStore::open(dir.path()).is_err());
     }

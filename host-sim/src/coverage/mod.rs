@@ -55,6 +55,7 @@ impl<'a> CoveragePlan<'a> {
     /// # Errors
     /// No plan was found; the error says why, and names the place in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
+        check_starts_on_ground(scenario)?;
         Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
     }
 
@@ -279,7 +280,7 @@ impl<'a> CoveragePlan<'a> {
             let Some(endurance_s) = vehicle.endurance_s.filter(too_long) else { continue };
             bail!(
                 "area too large: {}: vehicle {} would fly {takes_s:.0} s; its endurance_s is {endurance_s:.0}, and {:.0} % of \
-                 that are for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; \
+                 that are for the landing\nhint: more vehicles, wider lanes, a higher cruise_mps and speed_max_mps take less time; \
                  area.batteries = true plans sorties",
                 self.scenario.vehicle_places[index],
                 vehicle.id,
@@ -313,7 +314,7 @@ fn build_tracks(
 }
 
 /// Checks that every vehicle starts at most 1.5 m above or below the ground: with a greater error
-/// of its height a companion does not take off.
+/// of its height a companion does not take off, and heights in written plans count from the pad.
 ///
 /// # Errors
 /// A vehicle starts too far above or below the ground; the error names it.

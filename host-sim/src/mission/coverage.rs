@@ -128,7 +128,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
             };
             bail!(
                 "area too large: {}: vehicle {} would need the charge of {:.0} s in a hover; its battery lasts {lasts_s:.0} s, \
-                 and {:.0} % of that are for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; {hint}",
+                 and {:.0} % of that are for the landing\nhint: more vehicles, wider lanes, a higher cruise_mps and speed_max_mps take less time; {hint}",
                 planned.scenario.vehicle_places[index],
                 vehicle.id,
                 takes_s,

@@ -21,6 +21,7 @@ use crate::quote::quoted_path;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
+pub(crate) use sections::DEFAULT_ORIGIN;
 pub use sim_autopilot::{AutopilotKind, EstimatorErrors};
 pub use types::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode,

@@ -14,7 +14,7 @@ use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 use planner_core::prm::Sampling;
-use planner_core::roadmap::MAX_EDGE_M;
+use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use sim_autopilot::AutopilotKind;
 use toml::de::DeTable;
 
@@ -36,7 +36,8 @@ const DEFAULT_TIME_LIMIT_S: f32 = 600.0;
 /// Most `[[faults]]` of a scenario.
 const MAX_FAULTS: usize = 1000;
 /// Mission origin if the scenario gives none: a test field.
-const DEFAULT_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+pub(crate) const DEFAULT_ORIGIN: Geodetic =
+    Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
 /// Parses the text as TOML, refuses unknown root keys, and calls `read` with the root table.
 pub(super) fn read_root<T>(
@@ -273,7 +274,20 @@ fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
             format!("{} is given by latitude and longitude, but map.origin is missing", value.name);
         return Err(value.text.with_hint(&value.span, why, hint));
     };
-    Ok(geodetic_to_enu(origin, &position))
+    let place = geodetic_to_enu(origin, &position);
+    if place.xy().norm() > MAX_COORDINATE_M {
+        let why = format!(
+            "{} is {:.0} km from the origin at {:.4}, {:.4}; at most {:.0} km can be flown",
+            value.name,
+            place.xy().norm() / 1e3,
+            origin.lat_deg,
+            origin.lon_deg,
+            MAX_COORDINATE_M / 1e3
+        );
+        let hint = "check the order of latitude and longitude, and the `origin` of [area] or [map]: metres are about it";
+        return Err(value.text.with_hint(&value.span, why, hint));
+    }
+    Ok(place)
 }
 
 fn read_geofence(value: &Value<'_>) -> Result<Geofence> {

@@ -364,7 +364,8 @@ impl<'a> SimulationRun<'a> {
 
     /// Whether the vehicle flew to the end of its path and landed, or had no flight to make.
     fn has_completed_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
-        !self.plan.flights[i].task.leaves_pad() || (vehicle.reached && vehicle.landed)
+        let flight = &self.plan.flights[i];
+        !has_flight(&self.members[i], flight) || (vehicle.reached && vehicle.landed)
     }
 
     /// Whether a fault struck the vehicle and it has come to its end: without power, never taken
@@ -416,6 +417,15 @@ fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
     }
 }
 
+/// Whether the plan gives the vehicle a flight, and earlier flights have not left it without one.
+fn has_flight(
+    member: &SimulatedVehicle,
+    flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
+) -> bool {
+    let stays = member.state() == State::Done && member.took_off_s.is_none();
+    flight.task.leaves_pad() && !stays
+}
+
 fn vehicle_result(
     member: &SimulatedVehicle,
     flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
@@ -423,8 +433,10 @@ fn vehicle_result(
     nearest_goal_m: f32,
     now_s: f64,
 ) -> VehicleResult {
-    let reached = nearest_goal_m <= REACHED_M;
-    let end = match (flight.task.leaves_pad(), member.state()) {
+    // A flight over an area ends where it began: only a landing shows that it is over.
+    let landed = member.landed_s.is_some();
+    let reached = nearest_goal_m <= REACHED_M && (landed || flight.task.goal().is_some());
+    let end = match (has_flight(member, flight), member.state()) {
         (false, _) => "no goal".to_owned(),
         // Its estimate was at the goal, its true position was not.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
@@ -436,7 +448,7 @@ fn vehicle_result(
         id: flight.id,
         goal: flight.task.goal(),
         reached,
-        landed: member.landed_s.is_some(),
+        landed,
         path_m: rounded(flight.path.length_m()),
         flown_m: rounded(flown_m as f32),
         flight_time_s: rounded(flight_time_s as f32),

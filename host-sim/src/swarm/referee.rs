@@ -344,7 +344,8 @@ impl<'a> Referee<'a> {
                 now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
             vehicle.progressed_at = now.position;
             vehicle.progressed_s = t_s;
-            let ends = moved || now.phase == Phase::TakeOffOrLanding;
+            // One whose power fails may have waited for a good reason.
+            let ends = moved || now.phase != Phase::Flying;
             if std::mem::take(&mut vehicle.stuck) && ends && self.retracts_ended_deadlocks {
                 self.deadlocks -= 1;
                 let text = no_progress();

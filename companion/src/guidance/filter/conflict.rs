@@ -100,6 +100,7 @@ impl Guidance {
             ahead_s: if self.filter.is_stopped() { YIELD_LOOK_AHEAD_S } else { 0.0 },
             on_plan,
             hears_nobody,
+            holds_lease: hears_nobody && neighbours.holds_lease(now),
             lands: comes_down,
         };
         let follows = !lands && !hears_nobody;
@@ -117,7 +118,7 @@ impl Guidance {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
                 met.motion.delay_s = 0.0;
             }
-            if met.lost && !lands && hears_nobody {
+            if met.lost && !lands && neighbours.may_fly_on_unheard(contact, now, &reach) {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // are not lost, they fly on.
                 (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);

@@ -25,6 +25,8 @@ const MAX_COMMANDS: usize = 4;
 const REPEAT_EVERY: Duration = Duration::from_millis(300);
 /// Number of times that a command is sent before it is dropped and reported.
 const MAX_TRIES: u8 = 5;
+/// Distance before a picture's place within which a vehicle that holds counts as there, metres.
+const HELD_WITHIN_M: f32 = 0.3;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
 /// Shortest horizontal length of a stretch from which a heading is computed, metres.
@@ -80,6 +82,9 @@ pub(super) struct CameraControl {
     sent_at: Option<Instant>,
     /// Whether a command was dropped or refused: from then on such failures are not reported.
     failed: bool,
+    /// The trigger of the picture at or just ahead of this place of the path; `None` if no picture
+    /// is due there.
+    due: Option<Trigger>,
 }
 
 impl CameraControl {
@@ -100,6 +105,7 @@ impl CameraControl {
                 self.beside_m = 0.0;
                 self.switch_off();
             }
+            self.due = None;
             match photographs.stretches(path).nth(self.stretch) {
                 _ if beside => self.photograph_whole_detour(photographs, along.progress_m),
                 Some(shots) if along.place == PathRelation::OnPath => {
@@ -109,6 +115,19 @@ impl CameraControl {
             }
         }
         self.send_current_command(now, links);
+    }
+
+    /// Begins another path, once the queued commands are sent. A vehicle that holds where a picture is due takes it now: the
+    /// autopilot's trigger may lag behind the last pictures, and is switched off.
+    pub(super) fn begin_path(&mut self) {
+        match self.due.take() {
+            Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
+            Some(_) => self.queue_command(CameraCommand::Picture),
+            None if self.trigger_on => self.queue_command(CameraCommand::Off),
+            None => {}
+        }
+        (self.stretch, self.picture, self.trigger_on) = (0, 0, false);
+        (self.beside, self.beside_m) = (false, 0.0);
     }
 
     fn switch_off(&mut self) {
@@ -132,6 +151,11 @@ impl CameraControl {
     }
 
     fn update_trigger(&mut self, trigger: Trigger, shots: &PictureStretch<'_>, progress_m: f32) {
+        let next_m = match trigger {
+            Trigger::Distance => shots.from_m,
+            _ => shots.picture_at_m(self.picture),
+        };
+        self.due = Some(trigger).filter(|_| progress_m >= next_m - HELD_WITHIN_M);
         if progress_m < shots.from_m {
             self.switch_off();
             return;
@@ -152,11 +176,13 @@ impl CameraControl {
                     self.picture += 1;
                 }
                 if self.picture > before {
+                    self.due = None;
                     self.queue_command(CameraCommand::Picture);
                 }
             }
         }
         if distance || self.picture == shots.count {
+            self.due = None;
             (self.stretch, self.picture, self.trigger_on) = (self.stretch + 1, 0, false);
         }
     }
@@ -173,7 +199,7 @@ impl CameraControl {
 
     /// Sends the first queued command, and repeats it until it is acknowledged or has been sent
     /// five times.
-    fn send_current_command(&mut self, now: Instant, links: &mut Links) {
+    pub(super) fn send_current_command(&mut self, now: Instant, links: &mut Links) {
         let Some(&order) = self.commands.front() else { return };
         if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
             return;

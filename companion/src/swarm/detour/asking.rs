@@ -11,6 +11,7 @@ use super::{
     BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER,
 };
 use crate::guidance::evade;
+use crate::mission::State;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
@@ -31,6 +32,17 @@ pub(crate) enum RetryOutlook {
     Open,
     /// No other vehicle will move any more.
     Closed,
+}
+
+/// Whether a blocked vehicle over an area is held no longer, by a gate or by the safety filter:
+/// what blocked its path has come down.
+pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'_, V, W, G>,
+) -> bool {
+    view.config.lost_vehicle_down_s.is_some()
+        && view.mission.state() == State::Blocked
+        && view.guidance.advice.waiting_for == 0
+        && view.guidance.filter.hindered_for(view.now) == Duration::default()
 }
 
 impl Detours {

@@ -50,6 +50,9 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) on_plan: bool,
     /// Whether this vehicle hears no other one: then the others are assumed to fly on.
     pub(crate) hears_nobody: bool,
+    /// Whether this vehicle holds the lease over an area: heard by it or not, no other one then
+    /// flies on for long.
+    pub(crate) holds_lease: bool,
     /// Whether this vehicle lands, or descends over an area: then places count where unheard
     /// vehicles may lie.
     pub(crate) lands: bool,
@@ -74,7 +77,9 @@ impl NeighbourEntry {
         if age > MAX_HEIGHT_AGE {
             let lies = age >= down && !self.ground_m.is_nan();
             let dead = self.rests_silently(age, now);
-            let beyond = self.is_silent_out_of_reach(age, (dead, lies), across_sq, now, reach);
+            let flies_on = self.may_fly_on_unheard(down, now, reach);
+            let fate = (dead, lies, flies_on);
+            let beyond = self.is_silent_out_of_reach(age, fate, across_sq, now, reach);
             return (!beyond).then_some(dead);
         }
         let heard = NeighbourMotion {
@@ -97,6 +102,19 @@ impl NeighbourEntry {
         (!beyond).then_some(false)
     }
 
+    /// Whether the neighbour may fly on although it counts as dead: this vehicle hears nobody, so
+    /// that its own receiver may have failed. Not once the neighbour has been silent for `down`, in
+    /// which a vehicle without a lease lands, while this vehicle holds the lease.
+    #[inline(always)]
+    pub(crate) fn may_fly_on_unheard(
+        &self,
+        down: Duration,
+        now: Instant,
+        reach: &ReachQuery<'_>,
+    ) -> bool {
+        reach.hears_nobody && (!reach.holds_lease || self.heard_within(now, down))
+    }
+
     /// Whether a neighbour whose position is older than [`MAX_HEIGHT_AGE`] stays out of reach, seen
     /// from above. The neighbour is at its last position or, by a newer intent, at the first of its
     /// points; or as far from there as it can have flown: at full speed for as long as it may not
@@ -105,7 +123,7 @@ impl NeighbourEntry {
     fn is_silent_out_of_reach(
         &self,
         age: Duration,
-        (dead, lies): (bool, bool),
+        (dead, lies, may_fly_on): (bool, bool, bool),
         across_sq: f32,
         now: Instant,
         reach: &ReachQuery<'_>,
@@ -113,9 +131,9 @@ impl NeighbourEntry {
         let delay_s = self.message_delay.delay_s;
         let mut most_m = 0.0;
         let mut reaches = |far_m: f32| most_m = if far_m > most_m { far_m } else { most_m };
-        if reach.hears_nobody || !dead {
+        if may_fly_on || !dead {
             let silent_s = reach.bounds.silent_s;
-            let age_s = if reach.hears_nobody { silent_s } else { age.as_secs_f32().min(silent_s) };
+            let age_s = if may_fly_on { silent_s } else { age.as_secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
         let flies_on = self.is_leased() && !(reach.on_plan && self.on_plan());
@@ -283,6 +301,17 @@ impl<const V: usize> Neighbours<V> {
             }
         }
         None
+    }
+
+    /// Whether a contact may fly on although it counts as dead
+    /// ([`NeighbourEntry::may_fly_on_unheard`]).
+    pub(crate) fn may_fly_on_unheard(
+        &self,
+        contact: &NeighbourEntry,
+        now: Instant,
+        reach: &ReachQuery<'_>,
+    ) -> bool {
+        contact.may_fly_on_unheard(self.down_after, now, reach)
     }
 
     /// Changes `met`, made by [`NeighbourEntry::as_heard`], if the contact's position is older than

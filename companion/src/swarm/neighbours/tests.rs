@@ -384,6 +384,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             ahead_s: if stopped { 3.0 } else { 0.0 },
             on_plan: rng.next_u32().is_multiple_of(2),
             hears_nobody: rng.next_u32().is_multiple_of(4),
+            holds_lease: false,
             lands,
         };
         let dead = table.contacts[1].rests_silently(now - placed_at, now);

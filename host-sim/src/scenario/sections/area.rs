@@ -1,14 +1,16 @@
 //! Reads the scenario of a coverage mission: `[area]`, and the tables that depend on it.
 
+mod errors;
 mod spacing;
 
 use std::path::Path;
 
-use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind, SAME_VERTEX_M};
+use planner_core::coverage::area::{Ring, RingKind, SAME_VERTEX_M};
 use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
+use self::errors::{describe_area_error, faulty_ring, overlap_error};
 use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
 use super::obstacles::{Flown, MapBesideArea};
@@ -17,7 +19,6 @@ use super::{
     Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults,
     read_geodetic, read_unsupported, read_vehicles, unsupported_error,
 };
-use crate::area::overlap::{self, Overlap};
 use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
@@ -87,10 +88,11 @@ pub(in crate::scenario) fn read_coverage_scenario(
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
+    let fastest_mps = vehicles.iter().map(|vehicle| vehicle.speed_max_mps).fold(0.0, f32::max);
     area.usable = margins::usable_footprint(
         &area.spacing,
         area.height_m,
-        mission.cruise_mps,
+        mission.cruise_mps.min(fastest_mps),
         &simulation,
         &vehicles,
     );
@@ -392,13 +394,34 @@ fn rings_in_mission_frame(
         Ok(Some((why, hint))) => bad(format!("area: {why}"), hint),
         Err(error) => {
             let far = matches!(error, core_area::AreaError::TooFar { .. });
-            let near = "metres are about area.origin, and origin must be near the area";
-            bad(
-                format!("area: {}", describe_area_error(error, &rings)),
-                if far { near } else { "" },
-            )
+            let hint = if far {
+                "metres are about area.origin, and origin must be near the area"
+            } else {
+                ""
+            };
+            let why = format!("area: {}", describe_area_error(error, &rings));
+            let own = faulty_ring(error, &rings).and_then(|ring| ring_span(table, &rings, ring));
+            match (own, hint) {
+                (Some(span), "") => Err(table.text.error(&span, why)),
+                _ => bad(why, hint),
+            }
         }
     }
+}
+
+/// Where a ring stands in the scenario; `None` if a file holds it.
+fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<Span> {
+    let kind = rings[ring].kind;
+    let key = match kind {
+        RingKind::Outer => return None,
+        RingKind::Hole => "holes",
+        RingKind::NoFly => "no_fly",
+    };
+    let items = table.get(key)?.items().ok()?;
+    // Those of the file come before those of the key.
+    let all = rings.iter().filter(|other| other.kind == kind).count();
+    let nth = rings[..ring].iter().filter(|other| other.kind == kind).count();
+    items.get(nth.checked_sub(all - items.len())?).map(|item| item.span.clone())
 }
 
 /// A place in the mission frame; `None` for one that is not on earth.
@@ -413,63 +436,5 @@ fn place_in_mission_frame(
             let place = Geodetic { lat_deg: y, lon_deg: x, alt_m: origin.alt_m };
             place.is_valid().then(|| geodetic_to_enu(origin, &place).xy())
         }
-    }
-}
-
-/// Reason why rings that do not cross still form no area, and a remedy; `None` if they do.
-fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
-    let of = |kind: RingKind| {
-        let indices = 0..area.rings().len();
-        indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
-    };
-    Some(match overlap::find_overlap(&of(RingKind::Outer), &of(RingKind::Hole))? {
-        Overlap::Outers(i, j) => {
-            (format!("polygon {i} and polygon {j} overlap"), "draw them as one")
-        }
-        Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
-        Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
-        Overlap::NothingLeft(i) => (format!("holes leave nothing of polygon {i}"), ""),
-    })
-}
-
-/// Text about an area's fault, which names the ring or vertex.
-fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -> String {
-    use core_area::AreaError as E;
-    let ring = |index: u16| {
-        let kind = rings[usize::from(index)].kind;
-        let before = rings[..usize::from(index)].iter().filter(|ring| ring.kind == kind).count();
-        let name = match kind {
-            RingKind::Outer => "polygon",
-            RingKind::Hole => "hole",
-            RingKind::NoFly => "no-fly zone",
-        };
-        format!("{name} {before}")
-    };
-    let vertex = |index: u16| {
-        let of = rings.iter().position(|ring| index < ring.end).unwrap_or(0);
-        let start = if of == 0 { 0 } else { rings[of - 1].end };
-        format!("vertex {} of {}", index - start, ring(of as u16))
-    };
-    match error {
-        E::NoOuter => "there is no polygon".to_owned(),
-        E::Shape => "its rings are out of order".to_owned(),
-        E::TooFewVertices { ring: r } => {
-            format!("{} has fewer than three vertices that differ", ring(r))
-        }
-        E::NotFinite { vertex: v } => format!("{} is not a finite number", vertex(v)),
-        E::TooFar { vertex: v } => {
-            format!("{} is more than {} km from the origin", vertex(v), MAX_VERTEX_M / 1e3)
-        }
-        E::Duplicate { vertex: v } => format!("{} repeats the one before it", vertex(v)),
-        E::NoArea { ring: r } => {
-            format!("{} encloses nothing: its vertices lie on one line", ring(r))
-        }
-        E::SelfCrossing { vertex: v } => {
-            format!("the edge from {} crosses another one of it", vertex(v))
-        }
-        E::RingsCross { ring: r, other } => format!("{} and {} cross", ring(r), ring(other)),
-        E::HoleOutside { ring: r } => format!("{} lies outside every polygon", ring(r)),
-        E::OuterInside { ring: r } => format!("{} lies inside another polygon", ring(r)),
-        E::AreaFull => "it has too many vertices".to_owned(),
     }
 }

@@ -133,5 +133,12 @@ fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
             [at(2.5, 2.0, 5.0, Phase::TakeOffOrLanding), at(5.0, 5.0, 5.0, Phase::Grounded)];
         referee.observe(60.0, &lands);
         assert_eq!(referee.deadlocks, 0);
+        for step in 601..900 {
+            referee.observe(f64::from(step) * 0.1, &on_path(3.5));
+        }
+        assert_eq!(referee.deadlocks, 1);
+        let falls = [at(3.5, 2.0, 5.0, Phase::Falling), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        referee.observe(90.0, &falls);
+        assert_eq!(referee.deadlocks, 0);
     });
 }

@@ -169,6 +169,51 @@ proptest! {
     }
 }
 
+proptest! {
+    /// A vehicle that holds at a picture's place, or a little before it, has that picture when its
+    /// path is replaced, however late the autopilot looks; and no trigger is left on.
+    #[test]
+    fn where_a_vehicle_holds_for_another_path_the_last_picture_is_taken(
+        distance in any::<bool>(),
+        number in 0_u32..9,
+        before_m in 0.0_f32..0.2,
+        looks_every in 1_u32..8,
+    ) {
+        let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
+        let path = path();
+        let hold_m = photographs.stretches(&path).next().unwrap().picture_at_m(number);
+        let (mut camera, mut links, mut fake) =
+            (CameraControl::default(), Links::default(), Fake::default());
+        let (mut framer, mut now, mut at_m) = (Framer::default(), Instant::ZERO, 0.0_f32);
+        let bare = PicturePlan::new(8.0, HeadingMode::Ahead, photographs.trigger);
+        for step in 0..800_u32 {
+            now = now + Duration::from_millis(50);
+            at_m = (at_m + MPS * STEP_S).min(hold_m - before_m);
+            if step == 600 {
+                camera.begin_path();
+            }
+            let flown = if step < 600 { &photographs } else { &bare };
+            let along = PathProgress { progress_m: at_m, place: PathRelation::OnPath };
+            camera.step(flown, &path, along, now, &mut links);
+            if step % looks_every == 0 {
+                fake.fly(at_m);
+            }
+            let mut out = [0; 512];
+            let length = links.write_queued(Link::Autopilot, 1, &mut out);
+            let mut bytes = &out[..length];
+            while let Some(frame) = framer.next(now, &mut bytes) {
+                let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
+                fake.command(&command, at_m);
+                let command = command.command as u32 as u16;
+                camera.handle_ack(&Ack { command, result: ACCEPTED, to: (1, 191) }, &mut links);
+            }
+        }
+        let near = fake.pictures_m.iter().any(|m| (m - hold_m).abs() <= HELD_WITHIN_M);
+        prop_assert!(near, "held at {} m: {:?}", hold_m, fake.pictures_m);
+        prop_assert_eq!(fake.step_m, 0.0);
+    }
+}
+
 /// Pictures follow each other faster than a silent autopilot's commands are given up: the queue
 /// overflows, and the silence is reported all the same, once.
 #[test]

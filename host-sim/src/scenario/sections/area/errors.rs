@@ -1,0 +1,81 @@
+//! Texts about the faults of an area's rings.
+
+use planner_core::coverage::area::{self as core_area, MAX_VERTEX_M, Ring, RingKind};
+
+use crate::area::overlap::{self, Overlap};
+
+/// Reason why rings that do not cross still form no area, and a remedy; `None` if they do.
+pub(super) fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
+    let of = |kind: RingKind| {
+        let indices = 0..area.rings().len();
+        indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
+    };
+    Some(match overlap::find_overlap(&of(RingKind::Outer), &of(RingKind::Hole))? {
+        Overlap::Outers(i, j) => {
+            (format!("polygon {i} and polygon {j} overlap"), "draw them as one")
+        }
+        Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
+        Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
+        Overlap::NothingLeft(i) => (format!("holes leave nothing of polygon {i}"), ""),
+    })
+}
+
+/// Text about an area's fault, which names the ring or vertex.
+pub(super) fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -> String {
+    use core_area::AreaError as E;
+    let ring = |index: u16| {
+        let kind = rings[usize::from(index)].kind;
+        let before = rings[..usize::from(index)].iter().filter(|ring| ring.kind == kind).count();
+        let name = match kind {
+            RingKind::Outer => "polygon",
+            RingKind::Hole => "hole",
+            RingKind::NoFly => "no-fly zone",
+        };
+        format!("{name} {before}")
+    };
+    let vertex = |index: u16| {
+        let of = rings.iter().position(|ring| index < ring.end).unwrap_or(0);
+        let start = if of == 0 { 0 } else { rings[of - 1].end };
+        format!("vertex {} of {}", index - start, ring(of as u16))
+    };
+    match error {
+        E::NoOuter => "there is no polygon".to_owned(),
+        E::Shape => "its rings are out of order".to_owned(),
+        E::TooFewVertices { ring: r } => {
+            format!("{} has fewer than three vertices that differ", ring(r))
+        }
+        E::NotFinite { vertex: v } => format!("{} is not a finite number", vertex(v)),
+        E::TooFar { vertex: v } => {
+            format!("{} is more than {} km from the origin", vertex(v), MAX_VERTEX_M / 1e3)
+        }
+        E::Duplicate { vertex: v } => format!("{} repeats the one before it", vertex(v)),
+        E::NoArea { ring: r } => {
+            format!("{} encloses nothing: its vertices lie on one line", ring(r))
+        }
+        E::SelfCrossing { vertex: v } => {
+            format!("the edge from {} crosses another one of it", vertex(v))
+        }
+        E::RingsCross { ring: r, other } => format!("{} and {} cross", ring(r), ring(other)),
+        E::HoleOutside { ring: r } => format!("{} lies outside every polygon", ring(r)),
+        E::OuterInside { ring: r } => format!("{} lies inside another polygon", ring(r)),
+        E::AreaFull => "it has too many vertices".to_owned(),
+    }
+}
+
+/// Index of the ring that is at fault; `None` if no single one is.
+pub(super) fn faulty_ring(error: core_area::AreaError, rings: &[Ring]) -> Option<usize> {
+    use core_area::AreaError as E;
+    match error {
+        E::TooFewVertices { ring }
+        | E::NoArea { ring }
+        | E::HoleOutside { ring }
+        | E::OuterInside { ring } => Some(usize::from(ring)),
+        // The later one: a hole or zone comes after the polygon that it crosses.
+        E::RingsCross { ring, other } => Some(usize::from(ring.max(other))),
+        E::NotFinite { vertex }
+        | E::TooFar { vertex }
+        | E::Duplicate { vertex }
+        | E::SelfCrossing { vertex } => rings.iter().position(|ring| vertex < ring.end),
+        E::NoOuter | E::Shape | E::AreaFull => None,
+    }
+}
