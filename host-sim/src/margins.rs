@@ -137,8 +137,9 @@ pub fn usable_footprint(
         .map(|v| max_height_error_m(simulation.estimator, v.personality))
         .fold(0.0, f32::max);
     let share = (1.0 - lower_m / height_m).max(0.0);
-    let along_m =
-        spacing.footprint.along_m * share - 2.0 * (stray_m + TRIGGER_DELAY_S * cruise_mps);
+    let fastest_mps = vehicles.iter().map(|vehicle| vehicle.speed_max_mps).fold(0.0, f32::max);
+    let late_m = TRIGGER_DELAY_S * cruise_mps.min(fastest_mps);
+    let along_m = spacing.footprint.along_m * share - 2.0 * (stray_m + late_m);
     let across_m = spacing.footprint.across_m * share - 2.0 * stray_m;
     let footprint = Footprint {
         along_m: along_m.max(spacing.waypoint_m),

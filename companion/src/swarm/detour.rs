@@ -381,7 +381,7 @@ impl Detours {
             FlownPath::Astray => true,
         };
         let dead_end = self.is_stopped_by_others(view)
-            && !asking::is_freed_over_area(view)
+            && !Self::is_freed_over_area(view)
             && self.all_standing_since.is_some_and(|at| now - at > DEAD_END_AFTER);
         let blocked = view.mission.state() == State::Blocked;
         let free = if blocked { BLOCKED_HINDERED_WITHIN } else { HINDERED_WITHIN };

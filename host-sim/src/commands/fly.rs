@@ -211,8 +211,7 @@ fn plan_and_fly(
         }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
-    // Companions that know of no photographed waypoint begin the area again, and so does its
-    // judgement. That the area was whole is no sign of it: a journal may be some waypoints behind.
+    // Companions that know of no photographed waypoint begin the area again.
     if let Some(kept) = kept.as_ref().filter(|_| !flight.done.is_empty()) {
         kept.add_to(&mut flight.pictures);
     }

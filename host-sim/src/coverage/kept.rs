@@ -46,7 +46,8 @@ impl PictureStore {
         Ok(Self { path, before })
     }
 
-    /// Inserts the pictures of earlier flights before those of this flight, which continued them.
+    /// Inserts the pictures of earlier flights before those of this flight, which continued them. A
+    /// flight may do so although the area was whole: a journal may be some waypoints behind.
     pub fn add_to(&self, pictures: &mut Vec<Picture>) {
         pictures.splice(..0, self.before.iter().copied());
     }

@@ -292,6 +292,36 @@ fn what_a_coverage_mission_does_not_act_on_is_refused_by_name() {
 }
 
 #[test]
+fn faults_of_an_area_are_named_where_they_stand() {
+    let polygon = "polygon = [[0, 0], [150, 10], [80, 120]]";
+    let field = "[area]\nPOLYGON\ncamera = { fov_deg = 73.7, aspect = 1.5 }\nLINE\n\
+                 origin = { lat_deg = 40.0, lon_deg = -3.0, alt_m = 5.0 }\n\
+                 [[vehicles]]\nid = 1\nstart = START\n";
+    let metres = "[0, -20, 0]";
+    let crossing = "no_fly = [[[20, 20], [40, 40], [40, 20], [20, 50]]]";
+    let outside = "holes = [[[20, 10], [30, 10], [30, 20]], [[900, 10], [930, 10], [930, 20]]]";
+    let place = |lat: f64, lon: f64| format!("{{ lat_deg = {lat}, lon_deg = {lon}, alt_m = 5.0 }}");
+    let degrees = format!(
+        "polygon = [{}, {}, {}]\ncoordinates = \"metres\"",
+        place(40.0, -3.0),
+        place(41.0, -3.0),
+        place(41.0, -2.0)
+    );
+    let cases = [
+        (polygon, crossing, metres, "x.toml:4:11: area: the edge from vertex 0"),
+        (polygon, outside, metres, "x.toml:4:42: area: hole 1"),
+        (polygon, "", &place(41.0, -3.0), "is 111 km from the origin at 40.0000, -3.0000"),
+        (polygon, "", &place(-3.0, 40.0), "order of latitude and longitude"),
+        (&degrees, "", metres, "area.polygon is in degrees"),
+    ];
+    for (polygon, line, start, wanted) in cases {
+        let text = field.replace("POLYGON", polygon).replace("LINE", line).replace("START", start);
+        let error = parse(&text, "x.toml").unwrap_err().to_string();
+        assert!(error.contains(wanted), "{wanted}: {error}");
+    }
+}
+
+#[test]
 fn geodetic_goals_and_starts_are_metres_about_the_origin() {
     let place = "{ lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 712.5 }";
     let origin = "origin = { lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 700.0 }\n[mission]";

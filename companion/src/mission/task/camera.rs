@@ -117,8 +117,9 @@ impl CameraControl {
         self.send_current_command(now, links);
     }
 
-    /// Begins another path, once the queued commands are sent. A vehicle that holds where a picture is due takes it now: the
-    /// autopilot's trigger may lag behind the last pictures, and is switched off.
+    /// Begins another path, once the queued commands are sent. A vehicle that holds where a picture
+    /// is due takes it now: the autopilot's trigger may lag behind the last pictures, and is
+    /// switched off.
     pub(super) fn begin_path(&mut self) {
         match self.due.take() {
             Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),

@@ -34,18 +34,18 @@ pub(crate) enum RetryOutlook {
     Closed,
 }
 
-/// Whether a blocked vehicle over an area is held no longer, by a gate or by the safety filter:
-/// what blocked its path has come down.
-pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
-    view: &DetourView<'_, V, W, G>,
-) -> bool {
-    view.config.lost_vehicle_down_s.is_some()
-        && view.mission.state() == State::Blocked
-        && view.guidance.advice.waiting_for == 0
-        && view.guidance.filter.hindered_for(view.now) == Duration::default()
-}
-
 impl Detours {
+    /// Whether a blocked vehicle over an area is held no longer, by a gate or by the safety filter:
+    /// what blocked its path has come down.
+    pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
+        view: &DetourView<'_, V, W, G>,
+    ) -> bool {
+        view.config.lost_vehicle_down_s.is_some()
+            && view.mission.state() == State::Blocked
+            && view.guidance.advice.waiting_for == 0
+            && view.guidance.filter.hindered_for(view.now) == Duration::default()
+    }
+
     /// Whether this vehicle may search for a landing place beside its path: its task leaves the
     /// pad; it hears another vehicle, all others rest, or its landing has been held for
     /// [`UNHEARD_SIDESTEP_AFTER`]; and no search aside failed within [`SIDESTEP_RETRY_S`].

@@ -88,11 +88,10 @@ pub(in crate::scenario) fn read_coverage_scenario(
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    let fastest_mps = vehicles.iter().map(|vehicle| vehicle.speed_max_mps).fold(0.0, f32::max);
     area.usable = margins::usable_footprint(
         &area.spacing,
         area.height_m,
-        mission.cruise_mps.min(fastest_mps),
+        mission.cruise_mps,
         &simulation,
         &vehicles,
     );
@@ -280,6 +279,12 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
         }
         (None, Some(polygon)) => {
             let (ring, coordinates) = read_ring(polygon)?;
+            if (coordinates, said) == (Coordinates::Wgs84, Some(Coordinates::Metres)) {
+                let why =
+                    "area.polygon is in degrees, and area.coordinates is \"metres\"".to_owned();
+                let hint = "give [x, y] in metres, or leave `coordinates` out";
+                return Err(table.text.with_hint(&polygon.span, why, hint));
+            }
             let polygons = Polygons { outers: vec![ring], ..Polygons::default() };
             (polygons, coordinates, polygon.span.clone())
         }
