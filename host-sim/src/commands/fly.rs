@@ -20,9 +20,9 @@ use crate::quote::quoted_path;
 use crate::report::Level;
 use crate::say;
 use crate::scenario::{self, Companion, Scenario};
-use crate::swarm;
 use crate::swarm::faults;
 use crate::swarm::gateway::Gateway;
+use crate::swarm::{self, Flight};
 
 /// The demo's scenario, compiled into the program so that no file is needed.
 const DEMO: &str = include_str!("../../scenarios/demo.toml");
@@ -188,6 +188,21 @@ fn check_emulated_boards(mission: &Mission, plan: &SwarmPlan) -> anyhow::Result<
     Ok(())
 }
 
+/// Adds the pictures of earlier flights if this flight continued them: companions that know of no
+/// photographed waypoint, or of nothing else, begin the area again.
+fn add_earlier_pictures(
+    kept: &PictureStore,
+    mission: &Mission,
+    flight: &mut Flight,
+) -> anyhow::Result<()> {
+    let done: u32 = flight.done.iter().map(|range| range.end - range.first).sum();
+    let planned = CoveragePlan::plan_as_companions(&mission.scenario)?;
+    if done > 0 && done < planned.tracks.waypoint_count() {
+        kept.add_to(&mut flight.pictures);
+    }
+    Ok(())
+}
+
 fn plan_and_fly(
     scenario: Scenario,
     command: &'static str,
@@ -211,9 +226,8 @@ fn plan_and_fly(
         }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
-    // Companions that know of no photographed waypoint begin the area again.
-    if let Some(kept) = kept.as_ref().filter(|_| !flight.done.is_empty()) {
-        kept.add_to(&mut flight.pictures);
+    if let Some(kept) = &kept {
+        add_earlier_pictures(kept, &mission, &mut flight)?;
     }
     let pictures = std::mem::take(&mut flight.pictures);
     let judged = match &mission.scenario.area {
