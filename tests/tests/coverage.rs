@@ -455,3 +455,25 @@ fn what_cannot_be_flown_is_refused_by_name() {
         assert!(error.contains(why), "{first}: {error}");
     }
 }
+
+/// Over degrees without an origin the ground is at altitude 0: starts at their true altitude would
+/// make all heights in the plans too low.
+#[test]
+fn starts_above_a_ground_of_unknown_altitude_are_refused() {
+    let place = |lat: f64, lon: f64| format!("{{ lat_deg = {lat}, lon_deg = {lon} }}");
+    let ring = [place(40.0, -3.0), place(40.001, -3.0), place(40.001, -2.999)].join(", ");
+    let pad = "lat_deg = 39.9998, lon_deg = -3.0, alt_m";
+    let text = |alt_m: f32| {
+        format!(
+            "[area]\npolygon = [{ring}]\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\n\
+             [[vehicles]]\nid = 1\nstart = {{ {pad} = {alt_m:.1} }}\n"
+        )
+    };
+    let planned = |alt_m: f32| {
+        let scenario = scenario::parse(&text(alt_m), "degrees").expect("a scenario");
+        CoveragePlan::new(&scenario, Method::PowellBinpat).map(|_| ()).map_err(|e| e.to_string())
+    };
+    planned(0.0).expect("it is on the ground");
+    let error = planned(20.0).expect_err("it is not");
+    assert!(error.contains("vehicle 1 starts 20.0 m above the ground"), "{error}");
+}

@@ -43,7 +43,7 @@ function row(list, name, value, { unit = "", style = "", note = "" } = {}) {
 const SAFETY_ORDER = ["wall_contacts", "violations", "deadlocks", "min_separation_m", "min_clearance_m"];
 
 // Figures whose key names them badly.
-const NAMES = { max_cost_s: "Largest cost", max_cost_m: "Longest route", mean_cost_s: "Mean cost", sd_cost_s: "Spread of costs", lower_bound_s: "No division costs less than", gap: "Cost above that", ground_least_m: "Least height above ground", ground_most_m: "Greatest height above ground", steepest: "Steepest leg" };
+const NAMES = { max_cost_s: "Largest cost", max_cost_m: "Longest route", mean_cost_s: "Mean cost", sd_cost_s: "Spread of costs", lower_bound_s: "Bound of the cost", gap: "Largest cost above the bound", ground_least_m: "Least height above ground", ground_most_m: "Greatest height above ground", steepest: "Steepest leg" };
 const SHARES = ["gap", "steepest"];
 
 // What comes first of a coverage mission, and by which name.

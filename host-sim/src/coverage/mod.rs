@@ -55,7 +55,10 @@ impl<'a> CoveragePlan<'a> {
     /// # Errors
     /// No plan was found; the error says why, and names the place in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
-        check_starts_on_ground(scenario)?;
+        // A pad may be a roof, but not where altitude 0 only stands for one that is not given.
+        if scenario.area.as_ref().is_some_and(|area| area.origin.alt_m == 0.0) {
+            check_starts_on_ground(scenario)?;
+        }
         Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
     }
 
