@@ -2,6 +2,24 @@
 
 use rand_core::Rng;
 
+/// A scenario: three vehicles photograph a small field, without faults.
+pub const SMALL_FIELD: &str = "[area]
+polygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]
+camera = { fov_deg = 73.7, aspect = 1.5 }
+height_m = 25.0
+[mission]
+cruise_mps = 5.0
+[[vehicles]]
+id = 1
+start = [0, -20, 0]
+[[vehicles]]
+id = 2
+start = [10, -20, 0]
+[[vehicles]]
+id = 3
+start = [20, -20, 0]
+";
+
 /// A corner of a polygon, east and north in metres.
 type Corner = [f64; 2];
 

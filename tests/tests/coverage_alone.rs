@@ -60,3 +60,30 @@ fn the_last_vehicle_photographs_all_that_is_left() {
     println!("{} flown, wrong {wrong:?}", all.len());
     assert!(wrong.is_empty() && 2 * all.len() as u64 > count);
 }
+
+/// The other has left, and its pilot keeps it in the air, unheard after a while: no lease lands it,
+/// so the last one keeps clear of where it was last heard for as long as it flies.
+#[test]
+fn an_unheard_vehicle_that_its_pilot_keeps_in_the_air_is_kept_clear_of() {
+    let one = |seed: u64| -> Option<(u64, bool)> {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let mut text = areas::lossy_radio_scenario(&mut random, 2, 0.1);
+        let taken_s = 20 + random.next_u32() % 150;
+        let silent_s = taken_s + 1 + random.next_u32() % 60;
+        for (at_s, kind) in [(taken_s, "pilot-takeover"), (silent_s, "radio-cut")] {
+            text += &format!("[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = 2\n");
+        }
+        let (result, log) = covered::fly_text(&text).ok()?;
+        let safety = result.safety;
+        let wrong = safety.violations + safety.wall_contacts > 0;
+        if wrong {
+            println!("seed {seed}: {safety:?}\n{text}\n{log}");
+        }
+        Some((seed, wrong))
+    };
+    let (from, count) = (number("FLOCKMATE_ALONE_FROM", 0), number("FLOCKMATE_ALONE", MISSIONS));
+    let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
+    let wrong: Vec<u64> = all.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
+    println!("{} flown, too near in {wrong:?}", all.len());
+    assert!(wrong.is_empty() && 2 * all.len() as u64 > count);
+}

@@ -10,7 +10,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use flockmate_tests::{Profile, areas, covered, host_sim, number};
+use flockmate_tests::areas::{self, SMALL_FIELD};
+use flockmate_tests::{Profile, covered, host_sim, number};
 use host_sim::coverage::check::Picture;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -26,24 +27,6 @@ const STARTS: usize = 4;
 /// What brings a vehicle down early; it is carried back to its pad, charged and switched on.
 const KINDS: [&str; 5] =
     ["battery-low", "battery-low", "pilot-takeover", "companion-reset", "kill"];
-
-/// The field of docs/coverage.md.
-const FIELD: &str = "[area]
-polygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]
-camera = { fov_deg = 73.7, aspect = 1.5 }
-height_m = 35.0
-[mission]
-cruise_mps = 5.0
-[[vehicles]]
-id = 1
-start = [0, -20, 0]
-[[vehicles]]
-id = 2
-start = [10, -20, 0]
-[[vehicles]]
-id = 3
-start = [20, -20, 0]
-";
 
 /// The scenario without faults, and what happens in the first flights.
 fn drawn(seed: u64) -> (String, Vec<String>) {
@@ -226,8 +209,8 @@ fn an_area_that_was_whole_is_judged_whole_at_the_next_start() {
         let dir = tempfile::tempdir().expect("a directory");
         let at = |name: &str| dir.path().join(name);
         let fault = format!("[[faults]]\nkind = \"battery-low\"\nvehicle = 1\nat_s = {at_s}.0\n");
-        fs::write(at("struck.toml"), format!("{FIELD}{fault}")).expect("a file");
-        fs::write(at("sound.toml"), FIELD).expect("a file");
+        fs::write(at("struck.toml"), format!("{SMALL_FIELD}{fault}")).expect("a file");
+        fs::write(at("sound.toml"), SMALL_FIELD).expect("a file");
         let mut whole = Vec::new();
         for name in ["struck.toml", "sound.toml", "sound.toml", "sound.toml"] {
             let done = Command::new(&program)

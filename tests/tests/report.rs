@@ -10,6 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use flockmate_tests::areas::SMALL_FIELD;
 use flockmate_tests::{Guard, Profile, chromium, host_sim};
 use host_sim::report::{
     Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint,
@@ -337,35 +338,13 @@ fn map_style_and_roadmap_change_the_picture() {
     assert!(changed(&none, &bare) > 300, "roadmap: {}", changed(&none, &bare));
 }
 
-/// Three vehicles, of which one loses all power over the area.
-const LOST: &str = r#"
-seed = 7
-[area]
-polygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]
-camera = { fov_deg = 73.7, aspect = 1.5 }
-height_m = 25.0
-[mission]
-cruise_mps = 5.0
-[[vehicles]]
-id = 1
-start = [0, -20, 0]
-[[vehicles]]
-id = 2
-start = [10, -20, 0]
-[[vehicles]]
-id = 3
-start = [20, -20, 0]
-[[faults]]
-at_s = 90.0
-kind = "kill"
-vehicle = 2
-"#;
-
 #[test]
 fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("lost.toml");
-    fs::write(&scenario, LOST).expect("the scenario is written");
+    // One of three loses all power over the area.
+    let fault = "[[faults]]\nat_s = 90.0\nkind = \"kill\"\nvehicle = 2\n";
+    fs::write(&scenario, format!("seed = 7\n{SMALL_FIELD}{fault}")).expect("it is written");
     let mut fly = Command::new(host_sim(Profile::Release));
     let flown =
         fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path()).output().expect("it flies");

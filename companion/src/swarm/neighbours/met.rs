@@ -104,7 +104,8 @@ impl NeighbourEntry {
 
     /// Whether the neighbour may fly on although it counts as dead: this vehicle hears nobody, so
     /// that its own receiver may have failed. Not once the neighbour has been silent for `down`, in
-    /// which a vehicle without a lease lands, while this vehicle holds the lease.
+    /// which a vehicle without a lease lands, while this vehicle holds the lease. A neighbour out
+    /// of the plan needs no lease: its pilot may keep it in the air.
     #[inline(always)]
     pub(crate) fn may_fly_on_unheard(
         &self,
@@ -112,7 +113,8 @@ impl NeighbourEntry {
         now: Instant,
         reach: &ReachQuery<'_>,
     ) -> bool {
-        reach.hears_nobody && (!reach.holds_lease || self.heard_within(now, down))
+        let must_have_landed = reach.holds_lease && !self.heard_within(now, down);
+        reach.hears_nobody && (!must_have_landed || self.reports(OUT_OF_PLAN))
     }
 
     /// Whether a neighbour whose position is older than [`MAX_HEIGHT_AGE`] stays out of reach, seen

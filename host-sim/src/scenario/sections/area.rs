@@ -426,7 +426,7 @@ fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<Span> {
     // Those of the file come before those of the key.
     let all = rings.iter().filter(|other| other.kind == kind).count();
     let nth = rings[..ring].iter().filter(|other| other.kind == kind).count();
-    items.get(nth.checked_sub(all - items.len())?).map(|item| item.span.clone())
+    items.get((nth + items.len()).checked_sub(all)?).map(|item| item.span.clone())
 }
 
 /// A place in the mission frame; `None` for one that is not on earth.

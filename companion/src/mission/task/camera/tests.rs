@@ -13,7 +13,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::*;
-use crate::link::frame::Framer;
+use crate::link::frame::{Frame, Framer};
 
 const STEP_S: f32 = 0.05;
 const MPS: f32 = 5.0;
@@ -74,6 +74,14 @@ impl Fake {
     }
 }
 
+/// What was sent to the autopilot since the last call.
+fn sent_frames(links: &mut Links, framer: &mut Framer, now: Instant) -> Vec<Frame> {
+    let mut out = [0; 512];
+    let length = links.write_queued(Link::Autopilot, 1, &mut out);
+    let mut bytes = &out[..length];
+    core::iter::from_fn(|| framer.next(now, &mut bytes)).collect()
+}
+
 /// Flies the path. Returns where pictures were taken, and whether a trigger was left on.
 fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
     let path = path();
@@ -101,10 +109,7 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
         };
         camera.step(photographs, &path, along, now, &mut links);
         fake.fly(at_m);
-        let mut out = [0; 512];
-        let length = links.write_queued(Link::Autopilot, 1, &mut out);
-        let mut bytes = &out[..length];
-        while let Some(frame) = framer.next(now, &mut bytes) {
+        for frame in sent_frames(&mut links, &mut framer, now) {
             let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
             if lost < MAX_TRIES - 1 && chance(loss) {
                 lost += 1;
@@ -198,10 +203,7 @@ proptest! {
             if step % looks_every == 0 {
                 fake.fly(at_m);
             }
-            let mut out = [0; 512];
-            let length = links.write_queued(Link::Autopilot, 1, &mut out);
-            let mut bytes = &out[..length];
-            while let Some(frame) = framer.next(now, &mut bytes) {
+            for frame in sent_frames(&mut links, &mut framer, now) {
                 let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
                 fake.command(&command, at_m);
                 let command = command.command as u32 as u16;
@@ -227,10 +229,7 @@ fn a_silent_autopilot_is_reported_at_any_speed() {
             let progress_m = (mps * STEP_S * f32::from(step)).min(path.length_m());
             let along = PathProgress { progress_m, place: PathRelation::OnPath };
             camera.step(&photographs, &path, along, now, &mut links);
-            let mut out = [0; 512];
-            let length = links.write_queued(Link::Autopilot, 1, &mut out);
-            let mut bytes = &out[..length];
-            while let Some(frame) = framer.next(now, &mut bytes) {
+            for frame in sent_frames(&mut links, &mut framer, now) {
                 texts += usize::from(frame.decode::<STATUSTEXT_DATA>().is_some());
             }
         }
