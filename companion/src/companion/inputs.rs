@@ -210,8 +210,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.detours.lands_at_end()
                 && self.guidance.is_at_end(scene)
                 && standing,
-            yielded_for: self.guidance.filter.yielded_for(now),
-            hindered_for: self.guidance.filter.hindered_for(now),
+            yielded_for: self.counted_hindrance(self.guidance.filter.yielded_for(now)),
+            hindered_for: self.counted_hindrance(self.guidance.filter.hindered_for(now)),
             room_below,
             outside: self.guidance.is_standing_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
@@ -221,6 +221,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             no_way_around: self.detours.has_given_up(),
             time_below_landing: self.detours.time_below_landing(&view),
             standing,
+        }
+    }
+
+    /// The part of the time for which the safety filter has kept this vehicle from moving on that
+    /// counts against it. Over an area it begins once a vehicle that came down unheard must lie on
+    /// the ground: that one takes longer than this one yields, and then leaves room.
+    fn counted_hindrance(&self, hindered_for: Duration) -> Duration {
+        match self.config.lost_vehicle_down_s {
+            Some(_) => hindered_for.min(self.guidance.filter.time_since_fall(self.now)),
+            None => hindered_for,
         }
     }
 

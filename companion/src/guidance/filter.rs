@@ -86,6 +86,9 @@ pub(crate) struct SafetyFilter {
     hindered_at: Instant,
     /// Whether this vehicle was to yield when the filter last kept it from continuing.
     hindered_yields: bool,
+    /// When the filter last kept the vehicle from continuing because of one that comes down
+    /// unheard.
+    fall_at: Instant,
     /// Number of times that the filter stopped the vehicle.
     activations: u32,
 }
@@ -184,6 +187,12 @@ impl SafetyFilter {
     pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
         let since = self.hindered_since.filter(|_| now - self.hindered_at < HINDERED_WITHIN);
         since.map_or(Duration::default(), |at| now - at)
+    }
+
+    /// Time since the filter last kept the vehicle from continuing because of one that comes down
+    /// unheard: that one is soon out of its path.
+    pub(crate) fn time_since_fall(&self, now: Instant) -> Duration {
+        now - self.fall_at
     }
 
     /// Whether no other vehicle could be in the landing column in the last step.

@@ -143,6 +143,9 @@ impl Guidance {
                 if !found.stranger || self.filter.passes_stranger(now) {
                     self.filter.note_hindered(found.yields, now);
                 }
+                if neighbours.comes_down_unheard(found.id, now) {
+                    self.filter.fall_at = now;
+                }
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
                 (self.filter.blocker_is_stranger, self.filter.blocker_rests) =
                     (found.stranger, found.rests);

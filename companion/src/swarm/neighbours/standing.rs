@@ -18,12 +18,16 @@ impl<const V: usize> Neighbours<V> {
     /// Whether a vehicle of the roster counts as dead, but may still be in the air: silent for less
     /// than `down_after`, it last reported itself neither on the ground nor out of the plan.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
-        let roster = &self.contacts[..self.roster_count];
-        roster.iter().any(|c| {
-            !c.reports(GROUNDED | OUT_OF_PLAN)
-                && c.is_dead(now)
-                && c.heard_within(now, self.down_after)
-        })
+        self.contacts[..self.roster_count]
+            .iter()
+            .any(|c| c.comes_down_unheard(now, self.down_after))
+    }
+
+    /// Whether the vehicle `id` counts as dead, but may still be in the air; false for an id
+    /// outside the roster.
+    pub(crate) fn comes_down_unheard(&self, id: u8, now: Instant) -> bool {
+        let at = self.roster_index(id);
+        at.is_some_and(|at| self.contacts[at].comes_down_unheard(now, self.down_after))
     }
 
     /// Whether the vehicle `id` has landed, or is out of the plan; false for an id outside the
