@@ -34,7 +34,9 @@ use planner_core::detour;
 use planner_core::frames::Geodetic;
 use planner_core::{Length, Point};
 
-use self::beside::{AreaDetourSearches, DETOUR_MARGIN_M, LOOK_AHEAD_M};
+use self::beside::{
+    AreaDetourSearches, BLOCKED_BEYOND_STOP_M, DETOUR_MARGIN_M, STAYS_BLOCKED_BEYOND_M,
+};
 use self::flown::{DetourPurpose, FlownPath};
 use self::homeward::HomewardSearch;
 use crate::link::commands::{ACCEPTED, Command};
@@ -434,7 +436,11 @@ impl Detours {
         let waits = view.config.lost_vehicle_down_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
-        let beside_m = if waits { DETOUR_MARGIN_M } else { BLOCKED_WITHIN_M };
+        let (beside_m, beyond_m) = if waits {
+            (DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M)
+        } else {
+            (BLOCKED_WITHIN_M, BLOCKED_BEYOND_STOP_M)
+        };
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.new_ones();
@@ -450,7 +456,7 @@ impl Detours {
             // until it is near the obstacle.
             |obstacle| {
                 let until_m = match view.config.lost_vehicle_down_s {
-                    Some(_) => along_m.max(0.0) + LOOK_AHEAD_M,
+                    Some(_) => view.guidance.stopping_point_m().max(0.0) + beyond_m,
                     None => f32::INFINITY,
                 };
                 let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);

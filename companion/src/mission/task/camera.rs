@@ -4,8 +4,10 @@
 //! Two triggers. By distance: `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the autopilot's trigger on
 //! at a stretch's first place and off at its last, with a picture at each. By waypoint:
 //! `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands are sent one after the other, each
-//! repeated until acknowledged. The trigger is switched off when the vehicle leaves its path. Back
-//! on the path it starts with a picture at once, so that no gap is wider than the spacing.
+//! repeated until acknowledged. A vehicle that leaves its path between two pictures takes a last
+//! one there: others photograph the rest, but may not come near to a vehicle that hovers there. The
+//! trigger is then off. Back on the path it starts with a picture at once, so that no gap is wider
+//! than the spacing.
 
 use heapless::Deque;
 use libm::atan2f;
@@ -73,8 +75,9 @@ pub(super) struct CameraControl {
     beside_m: f32,
     /// Whether the vehicle flies a detour beside its path.
     beside: bool,
-    /// Whether the autopilot's trigger by distance was switched on.
-    trigger_on: bool,
+    /// The trigger between the first picture of a stretch, or of a detour, and the last: by distance
+    /// the autopilot's is on. `None` elsewhere.
+    running: Option<Trigger>,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
     /// Number of commands sent since the last answer, repetitions included, and (`sent_at`) when
     /// the first queued command was sent last.
@@ -111,7 +114,7 @@ impl CameraControl {
                 Some(shots) if along.place == PathRelation::OnPath => {
                     self.update_trigger(photographs.trigger, &shots, along.progress_m);
                 }
-                _ => self.switch_off(),
+                _ => self.end_early(),
             }
         }
         self.send_current_command(now, links);
@@ -124,16 +127,32 @@ impl CameraControl {
         match self.due.take() {
             Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
             Some(_) => self.queue_command(CameraCommand::Picture),
-            None if self.trigger_on => self.queue_command(CameraCommand::Off),
-            None => {}
+            None => self.switch_off(),
         }
-        (self.stretch, self.picture, self.trigger_on) = (0, 0, false);
+        (self.stretch, self.picture, self.running) = (0, 0, None);
         (self.beside, self.beside_m) = (false, 0.0);
     }
 
     fn switch_off(&mut self) {
-        if core::mem::take(&mut self.trigger_on) {
+        if self.running.take() == Some(Trigger::Distance) {
             self.queue_command(CameraCommand::Off);
+        }
+    }
+
+    /// Takes a last picture if the vehicle leaves its path before the last one there, and switches
+    /// the trigger off.
+    fn end_early(&mut self) {
+        match self.running.take() {
+            Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
+            Some(_) => self.queue_command(CameraCommand::Picture),
+            None => {}
+        }
+    }
+
+    /// Switches the autopilot's trigger by distance on, with a picture at once.
+    fn switch_on(&mut self, step_m: f32) {
+        if self.running.replace(Trigger::Distance).is_none() {
+            self.queue_command(CameraCommand::Every(step_m));
         }
     }
 
@@ -142,11 +161,10 @@ impl CameraControl {
     fn photograph_whole_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
         let spacing_m = photographs.spacing_m;
         if photographs.trigger == Trigger::Distance {
-            if !core::mem::replace(&mut self.trigger_on, true) {
-                self.queue_command(CameraCommand::Every(spacing_m));
-            }
+            self.switch_on(spacing_m);
         } else if progress_m >= self.beside_m {
             self.beside_m = progress_m + spacing_m;
+            self.running = Some(photographs.trigger);
             self.queue_command(CameraCommand::Picture);
         }
     }
@@ -164,9 +182,7 @@ impl CameraControl {
         let distance = trigger == Trigger::Distance;
         match trigger {
             Trigger::Distance if progress_m < shots.to_m => {
-                if !core::mem::replace(&mut self.trigger_on, true) {
-                    self.queue_command(CameraCommand::Every(shots.step_m));
-                }
+                self.switch_on(shots.step_m);
                 return;
             }
             Trigger::Distance => self.queue_command(CameraCommand::Every(0.0)),
@@ -178,13 +194,14 @@ impl CameraControl {
                 }
                 if self.picture > before {
                     self.due = None;
+                    self.running = Some(trigger);
                     self.queue_command(CameraCommand::Picture);
                 }
             }
         }
         if distance || self.picture == shots.count {
             self.due = None;
-            (self.stretch, self.picture, self.trigger_on) = (self.stretch + 1, 0, false);
+            (self.stretch, self.picture, self.running) = (self.stretch + 1, 0, None);
         }
     }
 

@@ -18,9 +18,16 @@ use planner_core::{Length, Point};
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
-/// Distance ahead along the path within which a keep-out zone blocks it, metres: from 8 m/s a
-/// vehicle stops in less than half of it.
-pub(super) const LOOK_AHEAD_M: f32 = 60.0;
+/// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres:
+/// what of the path is before that, it photographs, and no more of it than this is cut off by the
+/// detour. As far as 15 m/s lead while the zones of 32 vehicles are compared with the path.
+pub(super) const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
+/// Further distance within which it stays blocked once it is, metres: where the vehicle stops a
+/// little sooner than expected.
+pub(super) const STAYS_BLOCKED_BEYOND_M: f32 = 4.0;
+/// Distance ahead along the path within which zones count for the place where a detour returns to
+/// it, metres.
+const LOOK_AHEAD_M: f32 = 60.0;
 /// Margin beyond the safety distance on a detour, metres: a zone that deviates a little does not
 /// block the detour again.
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;

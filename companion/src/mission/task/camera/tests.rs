@@ -216,6 +216,45 @@ proptest! {
     }
 }
 
+proptest! {
+    /// A vehicle that leaves its path for good between two pictures of a stretch takes one there,
+    /// one only, and leaves no trigger on: what it photographed ends where it left.
+    #[test]
+    fn where_a_vehicle_leaves_its_path_a_last_picture_is_taken(
+        distance in any::<bool>(),
+        share in 0.01_f32..0.99,
+    ) {
+        let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
+        let path = path();
+        let shots = photographs.stretches(&path).next().unwrap();
+        let leaves_m = shots.from_m + share * (shots.to_m - shots.from_m);
+        let (mut camera, mut links, mut fake) =
+            (CameraControl::default(), Links::default(), Fake::default());
+        let (mut framer, mut now, mut at_m) = (Framer::default(), Instant::ZERO, 0.0_f32);
+        let mut taken_before = 0;
+        for _ in 0..800_u32 {
+            now = now + Duration::from_millis(50);
+            let on_path = at_m < leaves_m;
+            taken_before = if on_path { fake.pictures_m.len() } else { taken_before };
+            at_m += MPS * STEP_S;
+            let place = if on_path { PathRelation::OnPath } else { PathRelation::Elsewhere };
+            camera.step(&photographs, &path, PathProgress { progress_m: at_m, place }, now, &mut links);
+            fake.fly(at_m);
+            for frame in sent_frames(&mut links, &mut framer, now) {
+                let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
+                fake.command(&command, at_m);
+                let command = command.command as u32 as u16;
+                camera.handle_ack(&Ack { command, result: ACCEPTED, to: (1, 191) }, &mut links);
+            }
+        }
+        let last_m = *fake.pictures_m.last().unwrap();
+        prop_assert!((last_m - leaves_m).abs() <= LATE_M, "{} m: {:?}", leaves_m, fake.pictures_m);
+        // Where the first picture of the stretch is still on its way, it may be that one.
+        prop_assert!(fake.pictures_m.len() <= taken_before + 2);
+        prop_assert_eq!(fake.step_m, 0.0);
+    }
+}
+
 /// Pictures follow each other faster than a silent autopilot's commands are given up: the queue
 /// overflows, and the silence is reported all the same, once.
 #[test]
