@@ -20,7 +20,7 @@ pub const DISARMED_BYTES_PER_S: u32 = 4500;
 /// Most bytes a second that a coverage mission of 32 vehicles adds to a vehicle's state, each with
 /// its frame: five roster reports while dividing, of 145 and 85 bytes in turn, NAMED_VALUE_FLOAT,
 /// and on the ground a report of photographed waypoints.
-pub const COVERAGE_BYTES_PER_S: u32 = 5 * (145 + 85) / 2 + 30 + 145;
+pub const COVERAGE_BYTES_PER_S: u32 = 5 * (145 + 85) / 2 + 30 + 141;
 /// Capacity of the token bucket, bytes: a list of all parameters, or five texts.
 pub const MAX_SAVED_BYTES: u32 = 1000;
 /// Bytes of a GLOBAL_POSITION_INT with its frame; no other requested message that is composed when
