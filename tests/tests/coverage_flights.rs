@@ -211,7 +211,8 @@ fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
     {
         let text = format!(
             "[area]\npolygon = [[0, 0], [150, 0], [150, 60], [0, 60]]\nangle_deg = 0.0\n\
-             camera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 25.0\nheading = \"{heading}\"\n\
+             camera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 25.0\n\
+             heading = \"{heading}\"\n\
              [mission]\ncruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\n\
              personality = \"{autopilot}\"\n"
         );

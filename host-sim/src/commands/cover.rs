@@ -319,7 +319,8 @@ mod tests {
         let line = |width_m: u32| {
             let text = format!(
                 "[area]\npolygon = [[0, 0], [50, 0], [50, {width_m}], [0, {width_m}]]\n\
-                 angle_deg = 0.0\ncamera = {{ fov_deg = 73.7 }}\nheight_m = 25.0\nlane_m = 10.0\nwaypoint_m = 10.0\n\
+                 angle_deg = 0.0\ncamera = {{ fov_deg = 73.7 }}\nheight_m = 25.0\n\
+                 lane_m = 10.0\nwaypoint_m = 10.0\n\
                  [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n"
             );
             let scenario = scenario::parse(&text, "lanes").unwrap();

@@ -313,7 +313,8 @@ fn faults_of_an_area_are_named_where_they_stand() {
             polygon,
             crossing,
             metres,
-            "x.toml:4:11: area: the edges from vertex 0 of no-fly zone 0 and from vertex 2 of no-fly zone 0 cross",
+            "x.toml:4:11: area: the edges from vertex 0 of no-fly zone 0 and from vertex 2 of \
+             no-fly zone 0 cross",
         ),
         (polygon, outside, metres, "x.toml:4:42: area: hole 1"),
         (polygon, "", &place(41.0, -3.0), "is 111 km from the origin at 40.0000, -3.0000"),
