@@ -234,11 +234,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.telemetry.position_at.is_some(),
             );
             self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
-            if let Some(fleet) = self.neighbours.fleet() {
-                let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
-                let due = self.timers.take_due(Timer::Roster, now, every);
-                self.links.set_due(Link::Swarm, OnDemandMessage::Roster, due);
-            }
+        }
+        // Its period is its own: neither a multiple of the intent's nor of the step's.
+        if let Some(fleet) = self.neighbours.fleet()
+            && self.timers.is_due(Timer::Roster, now)
+        {
+            let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
+            self.timers.schedule_next(Timer::Roster, now, every);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Roster, true);
         }
     }
 

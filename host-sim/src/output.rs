@@ -35,6 +35,7 @@ pub fn planned_page(
             goal: flight.task.goal().map(|goal| mission.goals[usize::from(goal)]),
             planned: flight.path.waypoints().iter().map(|w| w.position).collect(),
             track: Vec::new(),
+            lost_s: None,
         })
         .collect();
     Ok(ReportData {
@@ -62,8 +63,10 @@ pub fn flown_page(
     flight: &Flight,
 ) -> anyhow::Result<ReportData> {
     let mut page = planned_page(mission, plan, &flight.result)?;
-    for (vehicle, track) in page.vehicles.iter_mut().zip(&flight.tracks) {
+    let flown = flight.tracks.iter().zip(&flight.lost_s);
+    for (vehicle, (track, lost_s)) in page.vehicles.iter_mut().zip(flown) {
         vehicle.track = track.iter().map(|&(t_s, position)| TrackPoint { t_s, position }).collect();
+        vehicle.lost_s = *lost_s;
     }
     page.events = flight.log.clone();
     let t_s: Vec<f32> = flight.samples.iter().map(|s| s.t_s).collect();

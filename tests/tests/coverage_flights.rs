@@ -203,6 +203,47 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
     }
 }
 
+/// By the autopilot's true heading at each picture.
+#[test]
+fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
+    for (autopilot, heading) in
+        [("px4", "sweep"), ("px4", "lane"), ("ardupilot", "sweep"), ("ardupilot", "lane")]
+    {
+        let text = format!(
+            "[area]\npolygon = [[0, 0], [150, 0], [150, 60], [0, 60]]\nangle_deg = 0.0\n\
+             camera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 25.0\n\
+             heading = \"{heading}\"\n\
+             [mission]\ncruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\n\
+             personality = \"{autopilot}\"\n"
+        );
+        let scenario = scenario::parse(&text, "area").expect("a scenario");
+        let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
+        let mut pictures = Vec::new();
+        covered::fly_on(&mut mission, &mut pictures).expect("a flight");
+        // Pictures in the middle of lanes, and by how much the nose is off the way that is flown.
+        let off_deg = pictures.windows(3).filter_map(|three| {
+            let way = three[2].position - three[0].position;
+            let along_lane = way.y.abs() < 1.0 && (20.0..130.0).contains(&three[1].position.x);
+            let off = three[1].heading - way.y.atan2(way.x);
+            along_lane.then(|| f64::from(off).sin().atan2(f64::from(off).cos()).to_degrees().abs())
+        });
+        let off_deg: Vec<f64> = off_deg.collect();
+        let share = |within: std::ops::Range<f64>| {
+            let count = off_deg.iter().filter(|off| within.contains(off)).count();
+            count as f64 / off_deg.len() as f64
+        };
+        let (ahead, back) = (share(0.0..15.0), share(165.0..181.0));
+        let said =
+            format!("{autopilot}, {heading}: {ahead} ahead, {back} back of {}", off_deg.len());
+        assert!(off_deg.len() > 40, "{said}");
+        match heading {
+            "lane" => assert!(ahead > 0.999, "{said}"),
+            // Every other lane is flown backwards.
+            _ => assert!((0.35..0.65).contains(&ahead) && ahead + back > 0.999, "{said}"),
+        }
+    }
+}
+
 /// Pads as near as a scenario may have them, low and fast flights, gusts: a vehicle comes over its
 /// pad with what it flew, and down beside one that stands there.
 #[test]

@@ -10,9 +10,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use companion::services::parameters::Parameters;
+use companion::storage::store::{ErasePermission, MAX_READ, Store};
 use flockmate_tests::areas::{self, SMALL_FIELD};
 use flockmate_tests::{Profile, covered, host_sim, number};
 use host_sim::coverage::check::Picture;
+use host_sim::flash::{DESK_FLASH_LAYOUT, DeskFlash};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
@@ -144,6 +147,45 @@ fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
         [1, 2, 3, 4].map(after)
     );
     assert_eq!(all.iter().filter(wrong).count(), 0);
+}
+
+/// Sets a parameter in the flash of each companion, as a ground station does between flights.
+fn set_parameter(dir: &Path, name: &str, value: f32) {
+    for entry in fs::read_dir(dir).expect("a directory") {
+        let mut flash = DeskFlash::open(Some(&entry.expect("a file").path())).expect("a flash");
+        let mut store = Store::mount(DESK_FLASH_LAYOUT, &mut flash);
+        let index = Parameters::index_of(name.as_bytes()).expect("a parameter");
+        store.set_parameter(index, value).expect("in range");
+        let mut read = [0; MAX_READ];
+        while let Some(request) = store.poll_request(ErasePermission::Allowed) {
+            let outcome = flash.execute_request(request, &mut read);
+            store.handle_outcome(outcome);
+        }
+    }
+}
+
+/// With `FLK_RESUME` 1 the second flight photographs the rest alone, with 0 the whole area again.
+#[test]
+fn flk_resume_0_photographs_the_whole_area_again() {
+    let flown = |resume: f32| {
+        let dir = tempfile::tempdir().expect("a directory");
+        let low = |vehicle| {
+            format!("[[faults]]\nkind = \"battery-low\"\nvehicle = {vehicle}\nat_s = 90.0\n")
+        };
+        let struck = format!("{SMALL_FIELD}{}{}{}", low(1), low(2), low(3));
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        fly(&struck, dir.path(), &mut first).expect("it flies");
+        set_parameter(dir.path(), "FLK_RESUME", resume);
+        let (result, log) = fly(SMALL_FIELD, dir.path(), &mut second).expect("it flies");
+        let coverage = result.coverage.expect("it has an area");
+        assert!(first.len() > 20, "{} pictures before the batteries were low", first.len());
+        (coverage, second.len() as u64, log)
+    };
+    let (whole, pictures, log) = flown(0.0);
+    assert!(whole.covered_share >= 1.0 && whole.left == 0, "{whole:?}\n{log}");
+    assert!(pictures >= u64::from(whole.waypoints), "{pictures} pictures: {whole:?}");
+    let (rest, fewer, _) = flown(1.0);
+    assert!(rest.left > 20 && fewer + 20 < pictures, "{fewer} pictures: {rest:?}");
 }
 
 /// A pilot takes a vehicle, which hovers, and others fly around it: whether they left waypoints

@@ -69,6 +69,7 @@ fn vehicle(id: u8, path: Vec<Point>) -> VehicleTrack {
         goal,
         planned: path,
         track,
+        lost_s: None,
     }
 }
 
@@ -374,9 +375,16 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     let of_lost = taken.filter(|taken| taken["from"] == 2).map(|taken| taken["waypoints"].as_u64());
     let of_lost: u64 = of_lost.map(|count| count.expect("a number")).sum();
     assert!(of_lost > 20 && of_lost < waypoints(plan)[1].1, "{of_lost}");
+    check_lost_vehicle(&data);
     let Some(chromium) = chromium() else { return };
     let (before, later) =
         (open(&chromium, &page, "#t=60&view=top"), open(&chromium, &page, "#t=220&view=top"));
+    assert_eq!((before.count("lost"), later.count("lost")), (0.0, 1.0));
+    assert!(!before.dom.contains(">2 lost</div>") && later.dom.contains(">2 lost</div>"));
+    assert!(
+        before.dom.contains("Flown tracks</label>")
+            && !before.dom.contains("Planned tracks</label>")
+    );
     assert_eq!((before.count("divisions"), before.count("paths")), (2.0, 5.0));
     assert_eq!(
         before.count("footprints"),
@@ -390,6 +398,35 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     assert_eq!((now(&before), now(&later)), (false, true));
     let changed = before.pixels.iter().zip(&later.pixels).filter(|(a, b)| a != b).count();
     assert!(changed > 20_000, "{changed} pixels differ");
+}
+
+/// Vehicle 2 is lost when its power fails, 90 s after the start, and flies no longer than it falls.
+fn check_lost_vehicle(data: &serde_json::Value) {
+    let of_vehicles = |list: &serde_json::Value, key: &str| -> Vec<Option<f64>> {
+        list.as_array().expect("vehicles").iter().map(|vehicle| vehicle[key].as_f64()).collect()
+    };
+    let lost_s = of_vehicles(&data["vehicles"], "lost_s");
+    let [None, Some(at_s), None] = lost_s[..] else { panic!("{lost_s:?}") };
+    assert!((at_s - 90.0).abs() < 0.1, "{at_s}");
+    let times_s = of_vehicles(&data["result"]["vehicles"], "flight_time_s");
+    assert!(times_s[1].is_some_and(|time_s| (30.0..100.0).contains(&time_s)), "{times_s:?}");
+}
+
+#[test]
+fn page_of_a_plan_offers_no_flown_tracks() {
+    let Some(chromium) = chromium() else { return };
+    let dir = tempfile::tempdir().expect("a directory");
+    let scenario = dir.path().join("field.toml");
+    fs::write(&scenario, SMALL_FIELD).expect("it is written");
+    let mut cover = Command::new(host_sim(Profile::Release));
+    let planned = cover.arg("cover").arg(&scenario).arg("--out").arg(dir.path()).output();
+    assert!(planned.expect("it plans").status.success());
+    let opened = open(&chromium, &dir.path().join("report.html"), "#t=60&view=top");
+    assert!(
+        opened.dom.contains("Planned tracks</label>")
+            && !opened.dom.contains("Flown tracks</label>")
+    );
+    assert_eq!(opened.count("lost"), 0.0);
 }
 
 /// What the page draws is what the tables say.

@@ -16,6 +16,7 @@ macro_rules! happens {
 }
 
 mod ardupilot;
+mod area_reports;
 mod divisions;
 mod estimate;
 mod hostile;

@@ -2,9 +2,10 @@
 //! which keeps vehicles apart, is always sent. Everything else is sent only as far as
 //! [`ARMED_BYTES_PER_S`] or [`DISARMED_BYTES_PER_S`] allow.
 //!
-//! State is sent at a fixed rate ([`state_bytes_per_s`]). Everything else (acks, texts, parameters,
+//! State is sent at a fixed rate ([`state_bytes_per_s`]; in a coverage mission also
+//! [`COVERAGE_BYTES_PER_S`]). Everything else (acks, texts, parameters,
 //! files, messages requested by REQUEST_MESSAGE) takes tokens from a bucket that fills with time.
-//! So in any t seconds the radio gets at most t times the sum of both rates, plus
+//! So in any t seconds the radio gets at most t times the sum of these rates, plus
 //! [`MAX_SAVED_BYTES`], plus one frame, whatever is requested.
 
 use crate::link::frame::MAX_FRAME_LEN;
@@ -16,6 +17,10 @@ pub const ARMED_BYTES_PER_S: u32 = 250;
 /// Bytes a second that a disarmed vehicle may send beside its state, when an operator reads and
 /// writes files; with the state of one vehicle this fills a radio of 57 600 baud.
 pub const DISARMED_BYTES_PER_S: u32 = 4500;
+/// Most bytes a second that a coverage mission of 32 vehicles adds to a vehicle's state, each with
+/// its frame: five roster reports while dividing, of 145 and 85 bytes in turn, NAMED_VALUE_FLOAT,
+/// and on the ground a report of photographed waypoints.
+pub const COVERAGE_BYTES_PER_S: u32 = 5 * (145 + 85) / 2 + 30 + 141;
 /// Capacity of the token bucket, bytes: a list of all parameters, or five texts.
 pub const MAX_SAVED_BYTES: u32 = 1000;
 /// Bytes of a GLOBAL_POSITION_INT with its frame; no other requested message that is composed when

@@ -107,7 +107,7 @@ function buildDivisions(onSeek) {
     for (const p of d.parts) {
       const line = box.appendChild(element("p"));
       const color = cssColor(vehicleById.get(p.vehicle)?.color ?? [140, 150, 160]);
-      line.append(element("span", null, { class: "swatch", style: `background: ${color}` }), `UAV ${p.vehicle}: ${p.waypoints} waypoints${takenText(d.taken, p.vehicle)}`);
+      line.append(element("span", null, { class: "swatch", style: `background: ${color}` }), `UAV ${p.vehicle}: ${p.waypoints} ${p.waypoints === 1 ? "waypoint" : "waypoints"}${takenText(d.taken, p.vehicle)}`);
     }
     li.addEventListener("click", () => onSeek(d.t_s));
     if (i > 0 && endTime > 0) byId("ticks").appendChild(element("i", null, { class: "division", title: "Area divided again" })).style.left = `${(100 * d.t_s) / endTime}%`;

@@ -59,7 +59,8 @@ function showSelected() {
   byId("hud").hidden = !vehicle || !view;
   if (!vehicle) return;
   const { position: [e, n, u], speed } = stateAt(vehicle, state.time);
-  const motion = speed === null ? "" : `   ${speed.toFixed(2)} m/s`;
+  const lost = isNumber(vehicle.lost_s) && state.time >= vehicle.lost_s ? "   lost" : "";
+  const motion = speed === null ? "" : `   ${speed.toFixed(2)} m/s${lost}`;
   byId("hud").textContent = `UAV ${vehicle.id}   E ${e.toFixed(2)}   N ${n.toFixed(2)}   U ${u.toFixed(2)} m${motion}`;
 }
 

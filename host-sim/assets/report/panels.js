@@ -238,7 +238,7 @@ function buildLayers(view, asked) {
   layer("Strips by UAV", "strips", true);
   layer("Footprints", "footprints", true);
   layer("Planned paths", "planned", true);
-  layer("Flown tracks", "track", true);
+  layer(flown ? "Flown tracks" : "Planned tracks", "track", true);
   layer("Starts □ and goals ◇", "terminals", true);
   layer("Vehicles", "vehicles", true);
   check("Labels", true, view.setLabels);

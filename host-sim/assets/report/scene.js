@@ -166,6 +166,14 @@ function circle(radius, color) {
   return new THREE.LineLoop(geometry, new THREE.LineBasicMaterial({ color, transparent: true, opacity: 0.8, depthWrite: false }));
 }
 
+// The grey of a vehicle that lost its power, and a cross in it.
+const LOST = [122, 130, 140];
+function cross(pen) {
+  disc(cssColor(LOST))(pen);
+  pen.beginPath(); pen.moveTo(20, 20); pen.lineTo(44, 44); pen.moveTo(44, 20); pen.lineTo(20, 44);
+  pen.lineWidth = 8; pen.strokeStyle = "#ff6370"; pen.stroke();
+}
+
 // One vehicle's objects, each kind for its own layer.
 function buildVehicle(v, safetyDistance) {
   const color = colorOf(v.color);
@@ -176,6 +184,12 @@ function buildVehicle(v, safetyDistance) {
   parts.dot.renderOrder = 6;
   // Seen through walls: where the vehicles are matters more than what stands before them.
   parts.dot.material.depthTest = false;
+  if (isNumber(v.lost_s)) {
+    parts.wreck = marker(15, cross);
+    parts.wreck.renderOrder = 6;
+    parts.wreck.material.depthTest = false;
+    parts.body.add(parts.wreck);
+  }
   parts.labelText = element("div", v.id, { class: "label", style: `border-color: ${css}` });
   parts.label = new THREE.CSS2DObject(parts.labelText);
   parts.body.add(parts.quadrotor, parts.dot, parts.label);

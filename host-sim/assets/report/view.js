@@ -58,6 +58,7 @@ function buildView(host, onPick) {
 
   let asked = false;
   let time = 0;
+  let rings = false;
   let selected = null;
   let followed = null;
   let fitted = null;
@@ -85,8 +86,11 @@ function buildView(host, onPick) {
       if (p.ring) p.ring.quaternion.copy(camera.quaternion);
       // From far away a dot stands for the vehicle; near by one sees it in its true size.
       const size = (2 * p.vehicle.radius_m) / (perPixel * p.body.position.distanceTo(camera.position));
-      p.dot.visible = size < 26;
-      p.quadrotor.visible = size >= 8;
+      const lost = isLost(p);
+      p.dot.visible = size < 26 && !lost;
+      p.quadrotor.visible = size >= 8 && !lost;
+      if (p.wreck) p.wreck.visible = lost;
+      if (p.ring) p.ring.visible = rings && !lost;
     }
     renderer.render(scene, camera);
     labels.render(scene, camera);
@@ -127,12 +131,14 @@ function buildView(host, onPick) {
       for (const planned of p.planned) planned.line.visible = planned.division === division && isShown(p);
       const { position } = stateAt(p.vehicle, t);
       p.body.position.set(...position);
+      p.labelText.textContent = isLost(p) ? `${p.vehicle.id} lost` : p.vehicle.id;
       if (p.track) {
         const index = trackIndex(p.vehicle.track, t);
         p.track.visible = index > 0 && isShown(p);
         p.track.geometry.instanceCount = Math.max(0, index);
       }
     }
+    document.body.dataset.lost = parts.filter(isLost).length;
     for (const o of obstacles) o.mesh.visible = o.from <= t && t < o.until;
     if (followed) {
       const move = followed.body.position.clone().sub(controls.target);
@@ -142,6 +148,8 @@ function buildView(host, onPick) {
     invalidate();
   }
 
+  // From its loss on a vehicle is drawn as a wreck: it flies no more.
+  const isLost = (p) => isNumber(p.vehicle.lost_s) && time >= p.vehicle.lost_s;
   const isShown = (p) => selected === null || p.vehicle.id === selected;
 
   // Shows the paths of one vehicle alone; null shows all.
@@ -149,7 +157,7 @@ function buildView(host, onPick) {
     selected = id;
     for (const p of parts) {
       p.labelText.classList.toggle("dim", !isShown(p));
-      p.dot.material.opacity = isShown(p) ? 1 : 0.4;
+      for (const sprite of [p.dot, p.wreck]) if (sprite) sprite.material.opacity = isShown(p) ? 1 : 0.4;
       p.terminals.visible = isShown(p);
     }
     setTime(time);
@@ -169,7 +177,7 @@ function buildView(host, onPick) {
   }
 
   function setRings(shown) {
-    for (const p of parts) if (p.ring) p.ring.visible = shown;
+    rings = shown;
     invalidate();
   }
 

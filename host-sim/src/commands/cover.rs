@@ -202,6 +202,24 @@ fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
     vehicles.collect()
 }
 
+/// The line about the area: what is photographed of it, and how.
+fn area_line(coverage: &CoverageResult, findings: &CoverageFindings) -> String {
+    format!(
+        "area       {:.2} % photographed ({} of {:.2} m), {} on {} at {:.1}°",
+        100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
+        counted(findings.cells as usize, "cell"),
+        findings.cell_m,
+        counted(coverage.waypoints as usize, "waypoint"),
+        counted(coverage.lanes, "lane"),
+        coverage.angle_deg
+    )
+}
+
+/// A number with its noun, in the plural unless it is 1.
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Path) {
     let coverage = &result.coverage;
     say!("vehicle  waypoints         layer m  leaves s   cost s   cost m");
@@ -238,15 +256,7 @@ fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Pat
     }
     say!();
     say!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
-    say!(
-        "area       {:.2} % photographed ({} cells of {:.2} m), {} waypoints on {} lanes at {:.1}°",
-        100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
-        findings.cells,
-        findings.cell_m,
-        coverage.waypoints,
-        coverage.lanes,
-        coverage.angle_deg
-    );
+    say!("{}", area_line(coverage, findings));
     if let Some([x, y]) = findings.first_missing_cell {
         say!("left out   the first cell is at [{x:.1}, {y:.1}]");
     }
@@ -303,6 +313,26 @@ fn print_terrain(coverage: &CoverageResult) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_lane_is_counted_in_the_singular() {
+        let line = |width_m: u32| {
+            let text = format!(
+                "[area]\npolygon = [[0, 0], [50, 0], [50, {width_m}], [0, {width_m}]]\n\
+                 angle_deg = 0.0\ncamera = {{ fov_deg = 73.7 }}\nheight_m = 25.0\n\
+                 lane_m = 10.0\nwaypoint_m = 10.0\n\
+                 [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n"
+            );
+            let scenario = scenario::parse(&text, "lanes").unwrap();
+            let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
+            let flights = planned.flights();
+            let flown = check::flights_to_check(&planned, &flights);
+            let findings = check::check_flights(&planned, &flown);
+            area_line(&cover_result(&planned, &findings).coverage, &findings)
+        };
+        assert!(line(8).contains(" waypoints on 1 lane at "), "{}", line(8));
+        assert!(line(18).contains(" waypoints on 2 lanes at "), "{}", line(18));
+    }
 
     #[test]
     fn plans_of_an_earlier_run_are_removed_and_nothing_else() {

@@ -22,14 +22,14 @@ use std::time::Instant;
 
 use anyhow::bail;
 use planner_core::Point;
-use planner_core::coverage::area::Area;
+use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::pack::{
     PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work, binpat, binpat_by_shares,
 };
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
-use planner_core::coverage::{CoverageError, exact, powell};
+use planner_core::coverage::{CoverageError, Flat, exact, powell};
 use planner_core::field::follow::TerrainFollowing;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 
@@ -344,15 +344,33 @@ fn check_starts_outside_zones(
     area: &Area<'_>,
     vehicles: &[Vehicle],
 ) -> anyhow::Result<()> {
-    if let Some(index) = vehicles.iter().position(|vehicle| area.is_in_no_fly_zone(&vehicle.place))
-    {
-        let place = &scenario.vehicle_places[index];
-        bail!(
-            "bad vehicle: {place}: vehicle {} starts inside a no-fly zone",
-            scenario.vehicles[index].id
-        );
+    let ids = scenario.vehicles.iter().map(|vehicle| vehicle.id);
+    let given = scenario.area.as_ref().map_or(0, |area| area.given_zones);
+    for ((vehicle, place), id) in vehicles.iter().zip(&scenario.vehicle_places).zip(ids) {
+        match zone_at(area, &vehicle.place) {
+            None => {}
+            Some(zone) if zone < given => {
+                bail!("bad vehicle: {place}: vehicle {id} starts inside no-fly zone {zone}")
+            }
+            Some(_) => bail!(
+                "bad vehicle: {place}: vehicle {id} starts inside the no-fly zone around an \
+                 obstacle of the map"
+            ),
+        }
     }
     Ok(())
+}
+
+/// Index of the first no-fly zone that holds a place, among the area's no-fly zones; `None` if none
+/// does.
+fn zone_at(area: &Area<'_>, place: &Flat) -> Option<usize> {
+    let zones = area.rings().iter().enumerate().filter(|(_, ring)| ring.kind == RingKind::NoFly);
+    let holds = |(index, _): (usize, &Ring)| {
+        let corners = area.ring(index);
+        let alone = [Ring { end: corners.len() as u16, kind: RingKind::Outer }];
+        Area::new(corners, &alone).is_ok_and(|zone| zone.contains(place))
+    };
+    zones.map(holds).position(|holds| holds)
 }
 
 /// The planner's description of a vehicle: pad, speeds and weight.
@@ -472,3 +490,6 @@ fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize)
     };
     anyhow::anyhow!("cannot cover the area: {place}: {why}")
 }
+
+#[cfg(test)]
+mod tests;

@@ -36,6 +36,7 @@ pub fn report_data(
             goal: None,
             planned: track.iter().map(|point| point.position).collect(),
             track,
+            lost_s: None,
         }
     });
     ReportData {

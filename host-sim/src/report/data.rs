@@ -100,6 +100,8 @@ pub struct VehicleTrack {
     /// Flown track by rising time, 5–10 points a second; empty if nothing was flown.
     #[serde(serialize_with = "pack::track")]
     pub track: Vec<TrackPoint>,
+    /// When the vehicle lost its power, or its motors in the air, seconds; `None` if it did not.
+    pub lost_s: Option<f32>,
 }
 
 /// A spherical obstacle that appears during the flight.

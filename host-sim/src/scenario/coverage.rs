@@ -28,6 +28,9 @@ pub struct Area {
     pub vertices: Vec<Flat>,
     /// Kind of each ring, and where its vertices end.
     pub rings: Vec<Ring>,
+    /// Number of no-fly zones that the scenario and its file give; in `rings` those around
+    /// obstacles of the map come after them.
+    pub given_zones: usize,
     /// Origin of the mission frame.
     pub origin: Geodetic,
     /// The camera; `None` if `lane_m` and `waypoint_m` are given instead.

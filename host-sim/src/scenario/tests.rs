@@ -284,6 +284,7 @@ fn what_a_coverage_mission_does_not_act_on_is_refused_by_name() {
         ("weight", "altitude_m = 40.0\nweight", "altitude_m"),
         ("[mission]", "[formation]\npure = true\n[mission]", "[formation]"),
         ("[[veh", "goals = [[1.0, 2.0, 3.0]]\n[[veh", "mission.goals beside [area]"),
+        ("[[veh", "objective = \"total\"\n[[veh", "mission.objective beside [area]"),
         ("[[veh", "goals_file = \"no.txt\"\n[[veh", "mission.goals_file beside [area]"),
     ] {
         let error = scenario(from, to).check_supported().unwrap_err();
@@ -308,7 +309,13 @@ fn faults_of_an_area_are_named_where_they_stand() {
         place(41.0, -2.0)
     );
     let cases = [
-        (polygon, crossing, metres, "x.toml:4:11: area: the edge from vertex 0"),
+        (
+            polygon,
+            crossing,
+            metres,
+            "x.toml:4:11: area: the edges from vertex 0 of no-fly zone 0 and from vertex 2 of \
+             no-fly zone 0 cross",
+        ),
         (polygon, outside, metres, "x.toml:4:42: area: hole 1"),
         (polygon, "", &place(41.0, -3.0), "is 111 km from the origin at 40.0000, -3.0000"),
         (polygon, "", &place(-3.0, 40.0), "order of latitude and longitude"),

@@ -53,8 +53,13 @@ pub struct SimulatedVehicle {
     pub last_warning: Option<&'static str>,
     /// When the vehicle first left the ground, seconds.
     pub took_off_s: Option<f64>,
-    /// When the vehicle first stood on the ground again, disarmed, seconds.
+    /// When the vehicle first stood on the ground again, disarmed, seconds; `None` for one that
+    /// lost its power before.
     pub landed_s: Option<f64>,
+    /// When the vehicle first stood or lay on the ground again, its motors off, seconds.
+    pub down_s: Option<f64>,
+    /// When the vehicle lost its power, or its motors in the air, seconds.
+    pub lost_s: Option<f64>,
     config: Config<VEHICLES>,
     to_companion: SerialLink,
     to_autopilot: SerialLink,
@@ -88,6 +93,8 @@ impl SimulatedVehicle {
             last_warning: None,
             took_off_s: None,
             landed_s: None,
+            down_s: None,
+            lost_s: None,
             to_companion: SerialLink::new(serial, seed, 2 * id),
             to_autopilot: SerialLink::new(serial, seed, 2 * id + 1),
             ground_m: autopilot.start.z - autopilot.vehicle.radius_m,
@@ -220,6 +227,7 @@ impl SimulatedVehicle {
                 .unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
+        self.note_times(now_us as f64 * 1e-6);
         if self.killed {
             return Ok(());
         }
@@ -244,14 +252,24 @@ impl SimulatedVehicle {
         if !self.bytes.is_empty() && !booting {
             self.autopilot.handle_bytes(&self.bytes);
         }
-        let (t_s, truth) = (now_us as f64 * 1e-6, self.autopilot.true_state());
+        Ok(())
+    }
+
+    /// Notes when the vehicle takes off, is lost and is down again.
+    fn note_times(&mut self, t_s: f64) {
+        let truth = self.autopilot.true_state();
         if !truth.touching && truth.armed {
             self.took_off_s.get_or_insert(t_s);
         }
-        if self.took_off_s.is_some() && truth.touching && !truth.armed {
-            self.landed_s.get_or_insert(t_s);
+        if self.killed || self.wrecked {
+            self.lost_s.get_or_insert(t_s);
         }
-        Ok(())
+        if self.took_off_s.is_some() && truth.touching && !truth.armed {
+            self.down_s.get_or_insert(t_s);
+            if !self.killed {
+                self.landed_s.get_or_insert(t_s);
+            }
+        }
     }
 
     /// Carries bytes between the vehicle's board, its autopilot and the radio for one step.

@@ -64,6 +64,8 @@ pub struct Flight {
     pub result: MissionResult,
     /// True track of each vehicle: times in seconds, positions in ENU metres.
     pub tracks: Vec<Vec<(f32, Point)>>,
+    /// When each vehicle lost its power, or its motors in the air, seconds; `None` for the others.
+    pub lost_s: Vec<Option<f32>>,
     /// Smallest distances over time, one sample each 0.2 s.
     pub samples: Vec<Sample>,
     /// Pictures taken, sorted by vehicle.
@@ -166,12 +168,14 @@ fn simulate(
     let result = run.result(command);
     run.log_losses(&result);
     let tracks = (0..run.members.len()).map(|i| run.referee.track(i).to_vec()).collect();
+    let lost_s = run.members.iter().map(|m| m.lost_s.map(|t_s| t_s as f32)).collect();
     let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::take_pictures).collect();
     let SimulationRun { referee, log, done, divisions, t_s, .. } = run;
     let divisions = divisions.into_divisions();
     Ok(Flight {
         result,
         tracks,
+        lost_s,
         samples: referee.samples,
         pictures,
         log,
@@ -442,8 +446,7 @@ fn vehicle_result(
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
         _ => member.describe_end(),
     };
-    let flight_time_s =
-        member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
+    let flight_time_s = member.took_off_s.map_or(0.0, |from| member.down_s.unwrap_or(now_s) - from);
     VehicleResult {
         id: flight.id,
         goal: flight.task.goal(),

@@ -71,8 +71,10 @@ pub enum AreaError {
     },
     /// Two edges of one ring cross.
     SelfCrossing {
-        /// The vertex at which one of them begins.
+        /// The vertex at which the first of them begins.
         vertex: u16,
+        /// The vertex at which the second one begins.
+        other: u16,
     },
     /// Edges of two rings cross, both of them outer rings or holes.
     RingsCross {
@@ -233,8 +235,10 @@ impl<'a> Area<'a> {
         let mut start = 0;
         for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
             for (k, (a, b)) in edges_of(ring).enumerate() {
-                if edges_of(ring).skip(k + 1).any(|(c, d)| segments_cross(&a, &b, &c, &d)) {
-                    return Err(AreaError::SelfCrossing { vertex: (start + k) as u16 });
+                let crosses = |(c, d): (Flat, Flat)| segments_cross(&a, &b, &c, &d);
+                if let Some(further) = edges_of(ring).skip(k + 1).position(crosses) {
+                    let [vertex, other] = [start + k, start + k + 1 + further].map(|v| v as u16);
+                    return Err(AreaError::SelfCrossing { vertex, other });
                 }
             }
             start += ring.len();

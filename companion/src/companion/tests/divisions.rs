@@ -19,7 +19,7 @@ use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use crate::{Link, RosterEntry};
 
 /// Vehicle 77, where it is in no way.
-const FAR_AWAY: Option<(Point, u8, f32, u32)> =
+pub(super) const FAR_AWAY: Option<(Point, u8, f32, u32)> =
     Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
 
 /// A place ahead on the vehicle's path, at this height.
@@ -36,7 +36,7 @@ pub(super) fn over_a_field(px4: bool) -> Bench {
 }
 
 /// The same with other settings.
-fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Bench {
+pub(super) fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
     set(&mut config);
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();

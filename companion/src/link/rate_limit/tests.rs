@@ -6,8 +6,12 @@ use std::vec::Vec;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 
+use planner_core::Point;
+
 use super::*;
+use crate::link::done;
 use crate::link::frame::{self, Header};
+use crate::link::roster::{self, RosterReport, RosterReportEntry};
 use crate::storage::store::{ErasePermission, MAX_READ};
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, execute, started};
@@ -21,15 +25,17 @@ struct Greedy {
     packet: u16,
     /// Bytes that went to the radio, and when.
     sent: Vec<(Instant, usize)>,
-    /// Intents among them.
+    /// Intents among them, and reports of a coverage mission.
     told: usize,
+    /// Roster reports among them.
+    rosters: usize,
 }
 
 impl Greedy {
     fn new(mut bench: Bench) -> Self {
         let mut flash = Flash::new(3);
         bench.companion.attach_store(started(&mut flash));
-        Self { bench, flash, sequence: 0, packet: 0, sent: Vec::new(), told: 0 }
+        Self { bench, flash, sequence: 0, packet: 0, sent: Vec::new(), told: 0, rosters: 0 }
     }
 
     fn ask<M: MessageData>(&mut self, message: &M) {
@@ -79,14 +85,17 @@ impl Greedy {
         }
         self.bench.drain();
         for frame in self.bench.swarm.drain(..) {
-            self.told += usize::from(frame.message_id == TUNNEL_DATA::ID);
+            let tunnel = frame.message_id == TUNNEL_DATA::ID;
+            let roster = tunnel && frame.payload().starts_with(&roster::PAYLOAD_TYPE.to_le_bytes());
+            self.told += usize::from(tunnel);
+            self.rosters += usize::from(roster);
             self.sent.push((now, frame.payload().len() + 12));
         }
     }
 
     /// So many seconds in which all is asked for forty times each.
     fn run(&mut self, seconds: u32) {
-        (self.told, self.bench.swarm) = (0, Vec::new());
+        (self.told, self.rosters, self.bench.swarm) = (0, 0, Vec::new());
         self.sent.clear();
         for _ in 0..seconds * 20 {
             self.ask_all();
@@ -148,6 +157,41 @@ fn the_radio_gets_no_more_whatever_is_asked() {
         air.bytes()
     );
     assert!(air.told >= 20 * usize::from(HZ) - 1, "the state goes out all the same: {}", air.told);
+}
+
+#[test]
+fn rosters_go_out_whatever_is_asked_and_are_counted() {
+    let mut over_area = two_vehicles();
+    over_area.lost_vehicle_down_s = Some(60.0);
+    let mut bench = Bench::new(over_area);
+    bench.answer_plan = Some(Ok(field_plan()));
+    bench.neighbour = Some((Point::new(8.0, 120.0, 1.5), crate::link::intent::ON_PLAN, 0.0, 5));
+    bench.run_until(State::Ready, 6.0);
+    bench.start();
+    bench.run_until(State::Follow, 30.0);
+    bench.stuck = true;
+    let mut air = Greedy::new(bench);
+    air.run(20);
+    assert_eq!(air.bench.state(), State::Follow);
+    assert!((39..=41).contains(&air.rosters), "{}", air.rosters);
+    let most = state_bytes_per_s(HZ) + COVERAGE_BYTES_PER_S + ARMED_BYTES_PER_S;
+    assert!(air.bytes() <= 20 * most + MAX_SAVED_BYTES + MAX_FRAME_LEN as u32, "{}", air.bytes());
+}
+
+/// The table of docs/coverage.md, and the reports of [`COVERAGE_BYTES_PER_S`].
+#[test]
+fn reports_of_a_coverage_mission_are_as_long_as_said() {
+    let roster = |vehicles: usize| {
+        let entries = core::iter::repeat_n(RosterReportEntry::default(), vehicles).collect();
+        let report = RosterReport { entries, ..RosterReport::default() };
+        report.encode(&mut [0; roster::MAX_LEN]) + 12
+    };
+    assert_eq!([3, 5, 22, 10].map(roster), [50, 60, 145, 85]);
+    assert_eq!(roster(4) - roster(3), 5, "5 bytes a vehicle");
+    assert_eq!(NAMED_VALUE_FLOAT_DATA::ENCODED_LEN + 12, 30);
+    assert_eq!(done::MAX_LEN + 12, 141);
+    assert_eq!(COVERAGE_BYTES_PER_S, 575 + 30 + 141);
+    assert_ne!(roster::PAYLOAD_TYPE, crate::link::intent::PAYLOAD_TYPE);
 }
 
 #[test]

@@ -7,13 +7,15 @@ mod world;
 use std::vec;
 use std::vec::Vec;
 
+use planner_core::coverage::Flat;
+use planner_core::field::{self, FieldShape, FieldView};
 use rand_core::Rng;
 
 use self::world::{Packet, World};
 use super::packet::{ACK, EFBIG, EIO, NAK, op};
 use super::stream::PACKETS_PER_BURST;
 use super::*;
-use crate::testing::fake_flash::{LAYOUT, roadmap};
+use crate::testing::fake_flash::{LAYOUT, bytes_at, roadmap};
 
 /// CRC-32 as clients compute it: from 0, not inverted.
 fn client_crc(bytes: &[u8]) -> u32 {
@@ -154,6 +156,53 @@ fn a_damaged_upload_keeps_the_old_file_and_says_so() {
     assert_eq!((answer.opcode, answer.data), (NAK, vec![2, EIO]));
     assert_eq!(world.texts.last(), Some(&"Upload is no such file or damaged: old file kept"));
     assert_eq!(world.download("roadmap.bin", 239), old);
+}
+
+/// A field of heights of so many rows.
+fn field_file(rows: u16) -> Vec<u8> {
+    let shape = FieldShape { low: Flat::new(-20.0, 10.0), cell_m: 5.0, columns: 31, rows };
+    let heights: Vec<i16> = (0..31 * rows as i16).map(|node| 3 * node - 400).collect();
+    let mut bytes = vec![0; shape.encoded_len()];
+    field::write(&shape, &heights, &mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn a_field_goes_into_its_slots_in_turn_and_a_damaged_one_keeps_the_old() {
+    for (loss, repeats) in [(0, 0), (60, 60)] {
+        let mut world = World::new(54, loss, repeats);
+        let mut slots = Vec::new();
+        for rows in [20, 33, 12] {
+            let file = field_file(rows);
+            assert_eq!(world.upload("/field.bin\0", &file, 200).opcode, ACK, "{rows}");
+            assert_eq!(world.texts.last(), Some(&"Field stored: used from the next start"));
+            assert_eq!(world.download("field.bin", 239), file);
+            let sum = world.ask(9, op::CRC32, 0, b"field.bin");
+            assert_eq!(sum.data, client_crc(&file).to_le_bytes());
+            world.restart();
+            let extent = world.store.roadmap().expect("it is in a slot");
+            slots.push(extent.start / LAYOUT.slot_len);
+            assert_eq!(bytes_at(&world.flash, Some(extent)), Some(&file[..]));
+            // Whatever byte is damaged, and a file of another kind.
+            let refused = [10, file.len() / 2, file.len() - 1].map(|at| {
+                let mut damaged = field_file(rows + 1);
+                damaged[at] ^= 0x10;
+                damaged
+            });
+            for damaged in refused.iter().chain([&roadmap(60)]) {
+                let answer = world.upload("field.bin", damaged, 200);
+                assert_eq!((answer.opcode, answer.data), (NAK, vec![2, EIO]));
+                let kept = "Upload is no such file or damaged: old file kept";
+                assert_eq!(world.texts.last(), Some(&kept));
+                world.restart();
+                assert_eq!(world.download("field.bin", 239), file);
+            }
+        }
+        assert!(slots[0] != slots[1] && slots[1] != slots[2], "A, then B: {slots:?}");
+        let view = world.download("field.bin", 239);
+        let view = FieldView::parse(&view).expect("a field");
+        assert_eq!(view.height_at(&Flat::new(-20.0, 10.0)), -40.0);
+    }
 }
 
 #[test]

@@ -234,15 +234,50 @@ fn a_text_has_room_for_why_a_mission_is_refused() {
     }
 }
 
+/// The mission of [`file`] byte by byte as version 1 or 2 was laid out, by no code that writes
+/// files today.
+fn old_file(version: u8) -> List<u8> {
+    let f32s = |numbers: &[f32]| -> List<u8> {
+        numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
+    };
+    let mut out = b"FLKMISS\n".to_vec();
+    out.extend([version, 0, 104, 0, 236, 0, 0, 0, 0x78, 0x56, 0x34, 0x12]);
+    // Least makespan, priority, a geofence; three vehicles, two goals.
+    out.extend([2, 2, 1, 0, 3, 0, 2, 0]);
+    // Reserved in version 1.
+    out.extend(if version == 1 { [0; 4] } else { [255, 0, 245, 9] });
+    out.extend([40.3327f64, -3.7659, 700.0].iter().flat_map(|number| number.to_le_bytes()));
+    out.extend(f32s(&[2.0, 1.0, 1.5, 2.0, 1.75, -5.0, -5.0, 0.0, 50.0, 30.0, 60.0, 1.8]));
+    for (id, goal, east_m) in [(7, [0xFF, 0xFF], 0.1 * 7.0), (2, [1, 0], 0.2), (250, [0, 0], 25.0)]
+    {
+        out.extend([id, 0, goal[0], goal[1]]);
+        out.extend(f32s(&[east_m, 3.0, 1.5, 0.3, 0.8, 1.2, 1.5]));
+    }
+    out.extend(f32s(&[28.0, 0.0, 1.8, 1.5, 28.0, 1.0, 1.8, 1.5]));
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&out);
+    out.extend(crc.to_le_bytes());
+    out
+}
+
 #[test]
-fn a_file_of_version_1_means_the_usual_ground_station() {
-    let old = forged(8, &[1]);
-    let config = MissionView::parse(&old).unwrap().companion_config::<3>(2).unwrap();
-    assert_eq!(
-        config.ground_stations,
-        [255, 0, 0, 0],
-        "what its reserved bytes hold does not count"
-    );
+fn files_of_versions_1_and_2_are_read_with_their_values() {
+    for (version, ground_stations) in [(1, [255, 0, 0, 0]), (2, [255, 0, 245, 9])] {
+        let old = old_file(version);
+        let view = MissionView::parse(&old).unwrap();
+        assert_eq!(view.header(), &MissionHeader { ground_stations, ..header() }, "{version}");
+        let vehicles: List<_> = view.vehicles().collect();
+        let today = [vehicle(7, None), vehicle(2, Some(1)), vehicle(250, Some(0))];
+        assert_eq!((vehicles, view.byte_len()), (today.to_vec(), old.len()));
+        assert_eq!(view.goals().collect::<List<_>>(), [goal(0), goal(1)]);
+        assert!(matches!(view.kind(), MissionKind::Goals));
+        let config = view.companion_config::<3>(2).unwrap();
+        assert_eq!((config.check(), config.ground_stations), (Ok(()), ground_stations));
+        assert_eq!((config.mission_crc, config.geofence), (view.crc(), header().geofence));
+    }
+    // What version 1's reserved bytes hold does not count, and version 2 has no coverage missions.
+    let reserved = forged(8, &[1]);
+    let config = MissionView::parse(&reserved).unwrap().companion_config::<3>(2).unwrap();
+    assert_eq!(config.ground_stations, [255, 0, 0, 0]);
 }
 
 #[test]

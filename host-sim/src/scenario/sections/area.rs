@@ -71,7 +71,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
     let mission = mission.unwrap_or_else(|| empty_table(text, "mission"));
-    unsupported.extend(goals_beside_area(text, &mission));
+    unsupported.extend(goal_keys_beside_area(text, &mission));
     let mission = self::read_coverage_mission(&mission, &vehicles)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = super::read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
@@ -118,15 +118,17 @@ pub(in crate::scenario) fn read_coverage_scenario(
     })
 }
 
-/// Errors of goals, which a coverage mission does not fly to.
-fn goals_beside_area(text: Text<'_>, mission: &Table<'_>) -> Vec<ScenarioError> {
+/// Errors of goals, which a coverage mission does not fly to, and of how they are assigned.
+fn goal_keys_beside_area(text: Text<'_>, mission: &Table<'_>) -> Vec<ScenarioError> {
     let unsupported = |key: &'static str| {
-        let goals = mission.get(key)?;
-        Some(unsupported_error(text, &goals.span, &format!("mission.{key} beside [area]")))
+        let value = mission.get(key)?;
+        Some(unsupported_error(text, &value.span, &format!("mission.{key} beside [area]")))
     };
-    ["goals", "goals_file"].into_iter().filter_map(unsupported).collect()
+    GOAL_KEYS.into_iter().filter_map(unsupported).collect()
 }
 
+/// Keys of `[mission]` that only missions with goals support.
+const GOAL_KEYS: [&str; 3] = ["objective", "goals", "goals_file"];
 /// Keys of a vehicle that only coverage missions support.
 const FLOWN_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
 
@@ -177,7 +179,7 @@ fn read_coverage_mission(
     vehicles: &[(Vehicle, VehicleSpans)],
 ) -> Result<Mission> {
     table.one_of("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
-    table.declare_keys(&["objective", "goals", "goals_file"]);
+    table.declare_keys(&GOAL_KEYS);
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
     let mission = Mission {
         mode: Mode::Coverage,
@@ -220,6 +222,7 @@ fn read_area(
         place: table.text.line(&source),
         vertices,
         rings,
+        given_zones: polygons.no_fly.len(),
         origin,
         camera,
         spacing,

@@ -159,6 +159,36 @@ fn comes_back_as_written_and_is_planned() {
     assert_eq!(pictures.sum::<u32>(), ws.tracks().waypoint_count());
 }
 
+/// Of the vertices as many rings are formed as there can be.
+#[test]
+fn what_32_vehicles_photograph_within_256_vertices_fits_into_a_board() {
+    let vehicles: List<MissionVehicle> = (1..=32)
+        .map(|id| MissionVehicle {
+            task: VehicleTask { id, required_clearance_m: 1.5, climb_m: 3.0, goal: None },
+            start: Point::new(5.0 * f32::from(id), -10.0, 3.3),
+            radius_m: 0.3,
+            speed_max_mps: 5.0,
+        })
+        .collect();
+    let shares = [shares()[0]; 32];
+    let vertices: List<Flat> = (0..256).map(|i| Flat::new(i as f32, (i * i % 7) as f32)).collect();
+    let kind = |i: u16| if i == 0 { RingKind::Outer } else { RingKind::NoFly };
+    let rings: List<Ring> = (0..85)
+        .map(|i| Ring { end: if i == 84 { 256 } else { 3 * i + 3 }, kind: kind(i) })
+        .collect();
+    let parts =
+        CoverageParts { header: header(), shares: &shares, rings: &rings, vertices: &vertices };
+    let block = MissionBlock::Coverage(parts);
+    let mut out = [0; 4096];
+    let length = mission_file::write_mission(&mission(), &vehicles, &block, &mut out);
+    assert_eq!(length, Ok(104 + 32 * 32 + 60 + 32 * 12 + 85 * 4 + 256 * 8 + 4));
+    assert!(length.unwrap() <= mission_file::MAX_BYTES, "a board stores it");
+    let view = MissionView::parse(&out).unwrap();
+    let MissionKind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
+    assert_eq!((area.shares().len(), area.rings().len(), area.vertices().len()), (32, 85, 256));
+    assert_eq!(area.vertices().last(), vertices.last().copied());
+}
+
 #[test]
 fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
     // A ramp of 4 m over the area.

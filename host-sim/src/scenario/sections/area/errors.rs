@@ -52,8 +52,8 @@ pub(super) fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -
         E::NoArea { ring: r } => {
             format!("{} encloses nothing: its vertices lie on one line", ring(r))
         }
-        E::SelfCrossing { vertex: v } => {
-            format!("the edge from {} crosses another one of it", vertex(v))
+        E::SelfCrossing { vertex: v, other } => {
+            format!("the edges from {} and from {} cross", vertex(v), vertex(other))
         }
         E::RingsCross { ring: r, other } => format!("{} and {} cross", ring(r), ring(other)),
         E::HoleOutside { ring: r } => format!("{} lies outside every polygon", ring(r)),
@@ -75,7 +75,7 @@ pub(super) fn faulty_ring(error: core_area::AreaError, rings: &[Ring]) -> Option
         E::NotFinite { vertex }
         | E::TooFar { vertex }
         | E::Duplicate { vertex }
-        | E::SelfCrossing { vertex } => rings.iter().position(|ring| vertex < ring.end),
+        | E::SelfCrossing { vertex, .. } => rings.iter().position(|ring| vertex < ring.end),
         E::NoOuter | E::Shape | E::AreaFull => None,
     }
 }

@@ -70,6 +70,9 @@ pub(super) fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result
                 .error("cannot stand beside the distance that follows from it: give one of them"));
         }
     }
+    if let (None, Some(_), Some(overlap)) = (camera, &lane, table.get("overlap_front")) {
+        return Err(overlap.error("needs area.camera"));
+    }
     let side = table.f32("overlap_side", 0.6, 0.0..=0.95)?;
     let front = table.f32("overlap_front", 0.7, 0.0..=0.95)?;
     let footprint = match camera {
