@@ -225,7 +225,8 @@ fn around(seed: u64) -> (bool, Option<String>) {
             100.0 * coverage.covered_share
         );
         format!(
-            "seed {seed}: {first} pictures, {reported} reported, {after}, {second} pictures\n{log}\n{then}"
+            "seed {seed}: {first} pictures, {reported} reported, {after}, {second} pictures\n\
+             {struck}\n{log}\n{then}"
         )
     };
     (true, wrong.then(said))

@@ -23,6 +23,9 @@ const AT_HOLD_M: f32 = 0.2;
 pub(super) const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which a vehicle counts as having left the mission.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
+/// Time for which a vehicle that cannot start (autopilot or position missing, or not at its pad)
+/// keeps its share while another one flies.
+const CANNOT_START_MOST: Duration = Duration::from_secs(60);
 /// Stands for the plan's CRC where the planner cannot divide the rest of the area.
 const UNDIVIDED: u32 = u32::MAX;
 /// Time after which an unanswered request for a division is sent to the shell again.
@@ -87,7 +90,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             PilotControl | PilotReturned => {
                 self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER
             }
-            _ => off_plan && !beside,
+            _ => (off_plan && !beside) || self.is_start_hopeless(),
         };
         let along_m = self.guidance.progress_m(state, &self.guidance_inputs());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
@@ -125,6 +128,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let soon_m = self.guidance.along_m() + COMMITMENT_S * self.config.cruise_mps;
         photographs.is_first_part
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
+    }
+
+    /// Whether this vehicle, not started, has not been able to start for so long that the others
+    /// are to divide its share: without a promise of its own they cannot divide otherwise. Once it
+    /// can start, it plans again, and takes part as a new vehicle.
+    fn is_start_hopeless(&self) -> bool {
+        let waits_for_autopilot =
+            matches!(self.mission.state(), State::WaitAutopilot | State::WaitPosition);
+        let elsewhere = self.mission.state() == State::Ready && !self.is_at_start();
+        (waits_for_autopilot || elsewhere)
+            && self.mission.time_in_state(self.now) >= CANNOT_START_MOST
+            && self.neighbours.does_another_take_part(self.now, MISSED_AFTER)
     }
 
     /// Whether this vehicle is on its pad and was not started: it may take part as a new vehicle.
@@ -167,8 +182,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Place where this vehicle would hold if it promised now, decimetres along its path: at the
-    /// last picture within `COMMITMENT_S` of flight, no further than its gates are open and no
-    /// nearer than it can stop. `None` where it cannot promise, or has promised.
+    /// last picture within `COMMITMENT_S` of flight, no further than gates and other vehicles let
+    /// it fly, and no nearer than it can stop. `None` where it cannot promise, or has promised.
     fn commitment_dm(&self) -> Option<u16> {
         use State::*;
         let fleet = self.neighbours.fleet()?;
@@ -186,7 +201,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let promise_s =
             if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
-        let clear_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
+        let gates_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
+        // What stops the vehicle before another one may stay: it promises no place beyond that.
+        let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
         let stop_m = (self.guidance.stopping_point_m() + EXTRA_STOPPING_MARGIN_M).min(most_m);
         let picture_m =

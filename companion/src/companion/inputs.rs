@@ -9,7 +9,7 @@ use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 /// Greatest horizontal distance from the place where landing was commanded in flight to the
 /// touchdown, metres: the stopping distance from cruise.
@@ -23,6 +23,8 @@ const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Time without its lease renewed, after which silence counts over an area: 1 s before the lease
 /// ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
+/// Time after a lost vehicle is down within which a division becomes binding, seconds.
+const DIVIDES_WITHIN_S: f32 = 60.0;
 /// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may be off a setpoint
 /// that stands before it lands: gusts push it further there than walls would allow indoors.
 const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
@@ -53,9 +55,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             _ => !offboard,
         };
-        let climb_m = self.mission.climb_m();
-        let away = t.position - (self.mission.path_start() - Point::new(0.0, 0.0, climb_m));
-        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_START_HEIGHT_ERROR_M);
         let beneath = self.mission.uninterrupted_state();
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.on_ground == Some(true);
@@ -94,20 +93,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             unfollowed_for,
             blocked_for: self.detours.blocked_for(now),
-            // A vehicle that flies back, or aside to land, does not stop because no other vehicle
-            // hears it: it is about to land anyway.
-            neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
-                fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER)
-            } else {
-                match self.guidance.returning
-                    || self.detours.lands_at_end()
-                    || self.detours.seeks_landing()
-                    || self.is_flying_unheard()
-                {
-                    true => Duration::default(),
-                    false => self.neighbours.silence_duration(now, self.mission.entered_at()),
-                }
-            },
+            neighbour_age: self.neighbour_age(),
+            division_due_after: self.division_due_after(),
             way_free: self.is_flying_unheard(),
             out_of_range: self.neighbours.are_all_out_of_range(),
             neighbour_heard: self.is_linked(),
@@ -122,8 +109,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::NoRoadmap),
             has_goal: self.mission.plan().is_some_and(|plan| plan.task.leaves_pad()),
             plans_as_others: self.plans_as_others(),
-            at_start: away.xy().length() <= self.config.start_tolerance_m
-                && away.z.abs() <= height_tolerance_m,
+            at_start: self.is_at_start(),
             imprecise: self.mission.state() == State::Ready
                 && self.guidance.estimate_speed_share < 1.0,
             imprecise_for: self.mission.estimate_imprecise_for(now),
@@ -221,6 +207,42 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             no_way_around: self.detours.has_given_up(),
             time_below_landing: self.detours.time_below_landing(&view),
             standing,
+        }
+    }
+
+    fn division_due_after(&self) -> Duration {
+        let due_s = self.config.lost_vehicle_down_s.map_or(0.0, |down_s| down_s + DIVIDES_WITHIN_S);
+        Duration::from_millis((1000.0 * due_s) as u64)
+    }
+
+    /// Whether this vehicle is at its start, within the tolerances.
+    pub(super) fn is_at_start(&self) -> bool {
+        let pad = self.mission.path_start() - Point::new(0.0, 0.0, self.mission.climb_m());
+        let away = self.telemetry.position - pad;
+        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_START_HEIGHT_ERROR_M);
+        away.xy().length() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m
+    }
+
+    /// Time for which this vehicle has been unheard, beyond what it may fly on for; over an area
+    /// since shortly before its lease ended.
+    fn neighbour_age(&self) -> Duration {
+        let (now, state) = (self.now, self.mission.state());
+        if let Some(fleet) = self.neighbours.fleet() {
+            let age = fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER);
+            // On its pad it is reported again after a while only.
+            let on_pad = state == State::Scheduled;
+            return if on_pad { age.min(self.mission.time_in_state(now)) } else { age };
+        }
+        // A vehicle that flies back, or aside to land, does not stop because no other vehicle hears
+        // it: it is about to land anyway. Unless it was paused: others assume that it is down after
+        // a while, however long it has stood.
+        let stands = matches!(state, State::Paused | State::AutopilotSilent);
+        let is_landing =
+            self.guidance.returning || self.detours.lands_at_end() || self.detours.seeks_landing();
+        match (is_landing && !stands) || self.is_flying_unheard() {
+            true => Duration::default(),
+            false if stands => self.neighbours.silence_duration(now, Instant::ZERO),
+            false => self.neighbours.silence_duration(now, self.mission.entered_at()),
         }
     }
 

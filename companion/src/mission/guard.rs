@@ -239,6 +239,13 @@ pub enum Guard {
     /// The waypoints that this vehicle's plan is to leave out have changed since the plan was
     /// requested.
     MoreIsDone,
+    /// In a coverage mission: the lease has ended, and the limit has passed since.
+    LeaseLost,
+    /// The division has not become binding within the limit, nor within a minute from when a lost
+    /// vehicle is down.
+    NotDivided,
+    /// A pause is commanded in a climb that has not left the ground.
+    PausedBeforeLiftOff,
     /// A vehicle that follows another plan of this mission has been heard, and the state has lasted
     /// for the limit.
     PlansDiffer,
@@ -355,6 +362,9 @@ impl Guard {
             Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
+            Self::LeaseLost => i.area && i.neighbour_age > limit,
+            Self::NotDivided => i.in_state >= limit.max(i.division_due_after),
+            Self::PausedBeforeLiftOff => i.pause && i.on_ground && !i.vertical,
             Self::WayFree => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,

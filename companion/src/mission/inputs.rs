@@ -25,6 +25,9 @@ pub struct GuardInputs {
     /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
     /// vehicle, in this state; zero once all have landed or left the plan.
     pub neighbour_age: Duration,
+    /// Time in `Dividing` after which a division is due: a lost vehicle is down by then, and a
+    /// minute has passed since. Zero in other missions than those over an area.
+    pub division_due_after: Duration,
     /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
     /// gate is open or none is left.
     pub way_free: bool,

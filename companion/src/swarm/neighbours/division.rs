@@ -66,13 +66,17 @@ impl<const V: usize> Neighbours<V> {
     /// Whether another vehicle that takes part is in flight, and none of those has been silent for
     /// `missed_after`: while a vehicle may be lost, each that lives counts for a majority.
     pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
+        let whole =
+            |fleet: &Fleet<V>| !fleet.is_dividing() && !fleet.is_any_missing(now, missed_after);
+        self.fleet.as_ref().is_some_and(whole) && self.does_another_take_part(now, missed_after)
+    }
+
+    /// Whether another vehicle that takes part is in flight, heard within `missed_after`.
+    pub(crate) fn does_another_take_part(&self, now: Instant, missed_after: Duration) -> bool {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
         let flies = |c: &&NeighbourEntry| heard(c) && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
         let mut others = self.contacts[..self.roster_count].iter().filter(flies);
-        self.fleet.as_ref().is_some_and(|fleet| {
-            let whole = !fleet.is_dividing() && !fleet.is_any_missing(now, missed_after);
-            whole && others.any(|c| fleet.is_alive(usize::from(c.rank)))
-        })
+        self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
     }
 
     /// Handles another vehicle's roster report. `waits`: this vehicle has not been started.

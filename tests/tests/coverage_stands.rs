@@ -1,0 +1,123 @@
+//! Coverage missions in which a vehicle stands, or cannot start: paused, in its climb, without a
+//! position. The others may neither fly into it nor wait for it to the end.
+//!
+//! `FLOCKMATE_STANDS=N` flies N missions of each test, `FLOCKMATE_STANDS_FROM` others; with N = 1
+//! the scenario is printed.
+
+use flockmate_tests::{areas, covered, number};
+use host_sim::result::MissionResult;
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+const MISSIONS: u64 = 8;
+
+fn fault(at_s: f64, kind: &str, vehicle: usize, rest: &str) -> String {
+    format!("[[faults]]\nat_s = {at_s:.1}\nkind = \"{kind}\"\nvehicle = {vehicle}\n{rest}")
+}
+
+/// An area for so many vehicles, their pads side by side.
+fn area(random: &mut Pcg32, count: usize) -> String {
+    areas::lossy_radio_scenario(random, count, 0.1)
+}
+
+fn is_not_whole(result: &MissionResult) -> bool {
+    result.coverage.as_ref().is_none_or(|coverage| coverage.covered_share < 1.0)
+}
+
+/// Flies what `draw` draws, and fails where `wrong` says so of the result and the log.
+fn fly_all(draw: fn(&mut Pcg32) -> String, wrong: impl Fn(&MissionResult, &str) -> bool + Sync) {
+    let one = |seed: u64| -> Option<(u64, bool)> {
+        let text = draw(&mut Pcg32::seed_from_u64(seed));
+        if std::env::var("FLOCKMATE_STANDS").is_ok_and(|n| n == "1") {
+            println!("{text}");
+        }
+        let (result, log) = covered::fly_text(&text).ok()?;
+        let (safety, coverage) =
+            (&result.safety, result.coverage.as_ref().expect("it has an area"));
+        let wrong = safety.violations + safety.wall_contacts > 0 || wrong(&result, &log);
+        if wrong {
+            let share = 100.0 * coverage.covered_share;
+            println!("seed {seed}: {share:.2} %, left {}, {safety:?}\n{log}", coverage.left);
+        }
+        Some((seed, wrong))
+    };
+    let (from, count) = (number("FLOCKMATE_STANDS_FROM", 0), number("FLOCKMATE_STANDS", MISSIONS));
+    let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
+    let wrong: Vec<u64> = all.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
+    println!("{} flown, wrong {wrong:?}", all.len());
+    assert!(wrong.is_empty() && 2 * all.len() as u64 > count);
+}
+
+/// Others take a silent vehicle to be down after a while, and fly where it was: so no state may
+/// keep it up for longer, a pause or a slow climb neither.
+#[test]
+fn a_vehicle_that_stands_unheard_is_down_before_others_fly_there() {
+    let draw = |random: &mut Pcg32| {
+        let count = 3 + (random.next_u32() % 2) as usize;
+        let mut text = area(random, count);
+        let vehicle = 1 + random.next_u32() as usize % count;
+        let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
+        match random.next_u32() % 3 {
+            0 => {
+                let slow = "climb_mps = 0.7\nspeed_max_mps";
+                text = text.replace("speed_max_mps", slow);
+                text + &fault(5.0 + 60.0 * share, "radio-cut", vehicle, "")
+            }
+            _ => {
+                let paused_s = 20.0 + 180.0 * share;
+                let silent_s = paused_s + f64::from(random.next_u32() % 60) - 10.0;
+                text += &fault(paused_s, "pause-order", vehicle, "");
+                text + &fault(silent_s, "radio-cut", vehicle, "")
+            }
+        }
+    };
+    fly_all(draw, |result, _| is_not_whole(result));
+}
+
+/// One without a position on its pad, or that a restart left without one in the field, is heard but
+/// promises nothing: the others divide its share all the same, after a loss and without one.
+#[test]
+fn what_cannot_start_leaves_its_share_to_the_others() {
+    let draw = |random: &mut Pcg32| {
+        let count = 4;
+        let mut text = area(random, count);
+        let vehicle = 1 + random.next_u32() as usize % count;
+        let for_long = "duration_s = 3000.0\n";
+        text += &match random.next_u32() % 3 {
+            0 => fault(0.0, "gps-loss", vehicle, for_long),
+            1 => {
+                let held = fault(0.5, "pause-order", vehicle, "duration_s = 20.0\n");
+                held + &fault(15.0, "gps-loss", vehicle, for_long)
+            }
+            // Autopilot and board lose power in flight.
+            _ => {
+                ["autopilot-reboot", "companion-reset"]
+                    .map(|kind| fault(60.0, kind, vehicle, ""))
+                    .concat()
+                    + &fault(60.0, "gps-loss", vehicle, for_long)
+            }
+        };
+        if random.next_u32().is_multiple_of(2) {
+            text += &fault(90.0, "kill", 1 + vehicle % count, "");
+        }
+        text
+    };
+    // Without a majority those that are left land.
+    let lands = |log: &str| log.contains("Neighbours still silent: landing");
+    fly_all(draw, |result, log| is_not_whole(result) && !lands(log));
+}
+
+/// A pause as vehicles take off delays the mission, and ends it for none.
+#[test]
+fn a_pause_in_the_start_ends_no_mission() {
+    let draw = |random: &mut Pcg32| {
+        let count = 2;
+        let text = area(random, count);
+        let vehicle = 1 + random.next_u32() as usize % count;
+        let at_s = 0.5 + f64::from(random.next_u32() % 100) / 10.0;
+        let for_s = 12.0 + f64::from(random.next_u32() % 20);
+        text + &fault(at_s, "pause-order", vehicle, &format!("duration_s = {for_s:.1}\n"))
+    };
+    fly_all(draw, |result, _| !result.complete);
+}
